@@ -1,0 +1,236 @@
+! The boundary to Python: flat subroutines with explicit shapes, wrapped by f2py.
+!
+! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
+
+!> Run the earthquake-like model for some advances of the slider.
+subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_ratio, coupling, &
+   & reattach, law, relative_width, initial, seed, realization, slider_kind, mass, spring, damping, &
+   & stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, quiet_time, &
+   & started, reals, integers, state_real, state_integer, record, detached, detached_contact, &
+   & trace_capacity, trace, slip_trace_capacity, slip_trace, slip_capacity, slips, most_advances, &
+   & rows, finished, time, breaks, advances, energy, status, message)
+   !f2py threadsafe
+   use mesoslip_kinds, only: wp
+   use mesoslip_errors, only: error_type, status_invalid
+   use mesoslip_archive, only: archive_type
+   use mesoslip_threshold_law, only: new_threshold_law
+   use mesoslip_contact_ensemble, only: contact_parameters_type, new_contact_ensemble
+   use mesoslip_slider_prescribed, only: slider_prescribed_type
+   use mesoslip_slider_rigid, only: slider_rigid_type
+   use mesoslip_recorder, only: recorder_parameters_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   !> Number of contacts, mean threshold, stiffness and drag of one, delay, backward force
+   integer, intent(in) :: count
+   real(8), intent(in) :: static_force, stiffness, drag, delay, back_force_ratio
+   !> Codes of coupling, threshold law and initial state; whether contacts attach again
+   integer, intent(in) :: coupling, reattach, law, initial
+   real(8), intent(in) :: relative_width
+   !> Key of the random numbers
+   integer(8), intent(in) :: seed, realization
+   !> Kind of the slider, its mass, spring constant and damping rate
+   integer, intent(in) :: slider_kind
+   real(8), intent(in) :: mass, spring, damping
+   !> Stages of the drive
+   integer, intent(in) :: stages
+   real(8), intent(in) :: stage_end(stages), stage_velocity(stages)
+   !> What to record
+   real(8), intent(in) :: interval, slip_interval, slip_velocity, quiet_time
+   !> Whether the state is that of a run under way, rather than to be made
+   integer, intent(in) :: started
+   !> State of the run
+   integer, intent(in) :: reals, integers
+   real(8), intent(inout) :: state_real(reals)
+   integer(8), intent(inout) :: state_integer(integers)
+   real(8), intent(inout), target :: record(4, count), detached(3, count)
+   integer, intent(inout), target :: detached_contact(count)
+   !> Arrays to record into
+   integer, intent(in) :: trace_capacity, slip_trace_capacity, slip_capacity
+   real(8), intent(inout), target :: trace(7, trace_capacity)
+   real(8), intent(inout), target :: slip_trace(8, slip_trace_capacity)
+   real(8), intent(inout), target :: slips(7, slip_capacity)
+   !> Largest number of advances
+   integer(8), intent(in) :: most_advances
+   !> Rows of trace, slip_trace and slips that were filled
+   integer, intent(out) :: rows(3)
+   !> Whether the run is over, and the time it has come to
+   integer, intent(out) :: finished
+   real(8), intent(out) :: time
+   !> Terms of the energy balance; breaks and advances so far
+   real(8), intent(out) :: energy(8)
+   integer(8), intent(out) :: breaks, advances
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   integer, parameter :: kind_rigid = 1, kind_prescribed = 2
+   type(simulation_type) :: simulation
+   type(contact_parameters_type) :: parameters
+   type(recorder_parameters_type) :: recorder_parameters
+   type(archive_type) :: archive
+   type(error_type), allocatable :: error
+
+   rows = 0
+   finished = 0
+   time = 0.0_wp
+   breaks = 0
+   advances = 0
+   energy = 0.0_wp
+   status = 0
+   message = ""
+
+   call new_threshold_law(parameters%law, law, relative_width, back_force_ratio, error)
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+      return
+   end if
+   parameters%count = count
+   parameters%static_force = static_force
+   parameters%stiffness = stiffness
+   parameters%drag = drag
+   parameters%delay = delay
+   parameters%back_force_ratio = back_force_ratio
+   parameters%coupling = coupling
+   parameters%reattach = reattach /= 0
+   parameters%seed = seed
+   parameters%realization = realization
+   call new_contact_ensemble(simulation%contacts, parameters, record, detached, detached_contact, &
+      & error)
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+      return
+   end if
+
+   select case (slider_kind)
+   case (kind_rigid)
+      allocate (simulation%slider, source=slider_rigid_type(mass=mass, stiffness=spring, &
+         & damping=damping))
+   case (kind_prescribed)
+      allocate (simulation%slider, source=slider_prescribed_type())
+   case default
+      status = status_invalid
+      message = "unknown kind of slider"
+      return
+   end select
+   simulation%stage_end = stage_end
+   simulation%stage_velocity = stage_velocity
+   recorder_parameters%interval = interval
+   recorder_parameters%slip_interval = slip_interval
+   recorder_parameters%slip_velocity = slip_velocity
+   recorder_parameters%quiet_time = quiet_time
+   recorder_parameters%duration = stage_end(stages)
+   recorder_parameters%contacts = count
+   simulation%recorder%parameters = recorder_parameters
+   call simulation%recorder%attach(trace, slip_trace, slips)
+
+   archive%reals = state_real
+   archive%integers = state_integer
+   if (started /= 0) then
+      call simulation%exchange(archive)
+   else
+      call simulation%start(initial)
+   end if
+
+   call simulation%run(most_advances, error)
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+   end if
+
+   time = simulation%slider%time
+   breaks = simulation%contacts%breaks
+   advances = simulation%advances
+   energy = simulation%energy_balance()
+   if (simulation%finished) finished = 1
+   rows = [simulation%recorder%trace_count, simulation%recorder%slip_trace_count, &
+      & simulation%recorder%slip_count]
+   archive = archive_type(reals=state_real, integers=state_integer, saving=.true.)
+   call simulation%exchange(archive)
+   state_real = archive%reals
+   state_integer = archive%integers
+end subroutine run_contacts
+
+!> Sizes of the state of a run.
+subroutine state_sizes(reals, integers)
+   !f2py threadsafe
+   implicit none
+   integer, intent(out) :: reals, integers
+
+   reals = 64
+   integers = 32
+end subroutine state_sizes
+
+!> Thresholds, densities or survival probabilities of a threshold law.
+subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, argument, value, &
+   & acceptance, status, message)
+   !f2py threadsafe
+   use mesoslip_kinds, only: wp
+   use mesoslip_errors, only: error_type, status_invalid
+   use mesoslip_threshold_law, only: new_threshold_law, threshold_law_type
+   implicit none
+   integer, intent(in) :: law
+   real(8), intent(in) :: relative_width, minimum
+   !> 1 for thresholds of exceedance probabilities, 2 for densities, 3 for survival probabilities
+   integer, intent(in) :: what
+   integer, intent(in) :: length
+   real(8), intent(in) :: argument(length)
+   real(8), intent(out) :: value(length)
+   !> Probability that a draw is not rejected
+   real(8), intent(out) :: acceptance
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(threshold_law_type) :: threshold_law
+   type(error_type), allocatable :: error
+
+   value = 0.0_wp
+   acceptance = 0.0_wp
+   status = 0
+   message = ""
+   call new_threshold_law(threshold_law, law, relative_width, minimum, error)
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+      return
+   end if
+   acceptance = threshold_law%acceptance
+   select case (what)
+   case (1)
+      value = threshold_law%quantile(argument)
+   case (2)
+      value = threshold_law%density(argument)
+   case (3)
+      value = threshold_law%survival(argument)
+   case default
+      status = status_invalid
+      message = "a threshold law has thresholds, densities and survival probabilities"
+   end select
+end subroutine evaluate_threshold_law
+
+!> Philox 4x32-10, for its tests and for whoever wants the same numbers elsewhere.
+subroutine philox(length, counter, key, word)
+   !f2py threadsafe
+   use mesoslip_random, only: philox4x32
+   implicit none
+   integer, intent(in) :: length
+   !> 32-bit words in 64-bit integers, shapes (4, length), (2, length)
+   integer(8), intent(in) :: counter(4, length), key(2, length)
+   integer(8), intent(out) :: word(4, length)
+
+   integer :: draw
+
+   do draw = 1, length
+      call philox4x32(counter(:, draw), key(:, draw), word(:, draw))
+   end do
+end subroutine philox
+
+!> Version of the SUNDIALS library in use.
+subroutine sundials(version)
+   !f2py threadsafe
+   use mesoslip_sundials_cvode, only: sundials_version
+   implicit none
+   character(len=32), intent(out) :: version
+
+   version = sundials_version()
+end subroutine sundials

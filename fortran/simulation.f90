@@ -1,0 +1,194 @@
+!> The loop of a run: a slider moves under the law of its contacts until a contact breaks or attaches.
+module mesoslip_simulation
+   use mesoslip_kinds, only: i8, wp
+   use mesoslip_errors, only: error_type, raise, status_stalled
+   use mesoslip_archive, only: archive_type
+   use mesoslip_interface_law, only: window_type
+   use mesoslip_contact_ensemble, only: contact_ensemble_type
+   use mesoslip_slider, only: slider_type
+   use mesoslip_recorder, only: recorder_type, most_samples_in_step
+   implicit none
+   private
+
+   public :: simulation_type
+   public :: energy_length
+
+   !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
+   !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
+   integer, parameter :: energy_length = 8
+
+   !> The origin of displacements follows the slider when it is this many breaking stretches ahead.
+   real(wp), parameter :: farthest_stretches = 64.0_wp
+   !> Advances in a row that leave both time and displacement as they were.
+   integer, parameter :: most_idle_advances = 1000000
+
+   !> A slider on contacts, driven in stages, and what is recorded of it.
+   type :: simulation_type
+      !> The slider
+      class(slider_type), allocatable :: slider
+      !> The contacts
+      type(contact_ensemble_type) :: contacts
+      !> The recorder
+      type(recorder_type) :: recorder
+      !> Ends of the stages of the drive, shape (number of stages) [s]
+      real(wp), allocatable :: stage_end(:)
+      !> Velocities of the drive, shape (number of stages) [m/s]
+      real(wp), allocatable :: stage_velocity(:)
+      !> Advances of the slider so far
+      integer(i8) :: advances = 0
+      !> Whether the end of the last stage was reached
+      logical :: finished = .false.
+
+      integer, private :: stage = 1
+      real(wp), private :: start_energy = 0.0_wp
+   contains
+      !> Prepare the start of a run
+      procedure :: start
+      !> Go on for some advances, or until the end
+      procedure :: run
+      !> Terms of the energy balance
+      procedure :: energy_balance
+      !> Put the state into an archive or take it out
+      procedure :: exchange
+      procedure, private :: advance, follow
+   end type simulation_type
+
+contains
+
+   !> Prepare the start of a run: contacts drawn, slider at rest and in balance.
+   subroutine start(self, initial)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> Initial state of the contacts, an initial_ code of the ensemble
+      integer, intent(in) :: initial
+
+      call self%contacts%initialize(initial)
+      call self%slider%drive(self%stage_velocity(1))
+      call self%slider%start(self%contacts%law())
+      if (abs(self%stage_velocity(1)) > 0.0_wp) then
+         self%slider%sense = sign(1.0_wp, self%stage_velocity(1))
+      end if
+      call self%contacts%break_due(self%slider%displacement, self%slider%time)
+      self%start_energy = self%slider%energy() &
+         & + self%contacts%elastic_energy(self%slider%displacement)
+      call self%recorder%record(self%slider, 0, 0_i8)
+   end subroutine start
+
+   !> Go on for some advances, or until the recorder is full, or until the end.
+   subroutine run(self, most_advances, error)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> Largest number of advances of the slider
+      integer(i8), intent(in) :: most_advances
+      !> Set if the motion makes no progress
+      type(error_type), allocatable, intent(out) :: error
+
+      integer(i8) :: advance
+      integer :: idle
+      real(wp) :: time, displacement
+
+      idle = 0
+      do advance = 1, most_advances
+         if (self%finished .or. .not. self%recorder%has_room()) exit
+         time = self%slider%time
+         displacement = self%slider%displacement
+         call self%advance()
+         if (self%slider%time > time &
+            & .or. abs(self%slider%displacement - displacement) > 0.0_wp) then
+            idle = 0
+         else
+            idle = idle + 1
+            if (idle > most_idle_advances) then
+               call raise(error, status_stalled, "the motion makes no progress: contacts break "// &
+                  & "and attach again without end at one displacement")
+               return
+            end if
+         end if
+      end do
+   end subroutine run
+
+   !> One advance of the slider and the events at its end.
+   subroutine advance(self)
+      class(simulation_type), intent(inout) :: self
+
+      type(window_type) :: window
+      real(wp) :: sampling
+
+      call self%contacts%limits(window%upper, window%lower)
+      sampling = self%recorder%parameters%interval
+      if (self%recorder%parameters%slip_interval > 0.0_wp) then
+         sampling = min(sampling, self%recorder%parameters%slip_interval)
+      end if
+      window%end_time = min(self%contacts%next_attachment, self%stage_end(self%stage), &
+         & self%slider%time + 0.5_wp * most_samples_in_step * sampling)
+
+      call self%slider%advance(self%contacts%law(), window)
+      self%advances = self%advances + 1
+      call self%recorder%record(self%slider, self%contacts%detached_count, self%contacts%breaks)
+
+      call self%contacts%break_due(self%slider%displacement, self%slider%time)
+      call self%contacts%attach_due(self%slider%displacement, self%slider%time, self%slider%sense)
+
+      if (self%slider%time >= self%stage_end(self%stage)) then
+         if (self%stage == size(self%stage_end)) then
+            self%finished = .true.
+            call self%recorder%finish(self%slider, self%contacts%breaks)
+            return
+         end if
+         self%stage = self%stage + 1
+         call self%slider%drive(self%stage_velocity(self%stage))
+      end if
+      call self%follow()
+   end subroutine advance
+
+   !> Move the origin of displacements along with the slider.
+   subroutine follow(self)
+      class(simulation_type), intent(inout) :: self
+
+      real(wp) :: stretch, grid, shift
+
+      stretch = self%contacts%parameters%static_force / self%contacts%parameters%stiffness
+      if (abs(self%slider%displacement) < farthest_stretches * stretch) return
+      ! On a grid of powers of two the origin and the new displacement have no rounding error.
+      grid = scale(1.0_wp, exponent(stretch))
+      shift = grid * anint(self%slider%displacement / grid)
+      call self%slider%shift_origin(shift)
+      call self%contacts%shift_origin(shift, self%slider%displacement)
+   end subroutine follow
+
+   !> Terms of the energy balance, and how far it is from closing.
+   function energy_balance(self) result(energy)
+      !> The simulation
+      class(simulation_type), intent(in) :: self
+      !> Terms in the order of energy_length [J]
+      real(wp) :: energy(energy_length)
+
+      energy(1) = self%slider%drive_work%high
+      energy(2) = self%slider%energy()
+      energy(3) = self%contacts%elastic_energy(self%slider%displacement)
+      energy(4) = self%slider%damping_loss%high
+      energy(5) = self%slider%drag_loss%high
+      energy(6) = self%contacts%break_loss%high
+      energy(7) = self%contacts%birth_gain%high
+      energy(8) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
+         & - energy(4) - energy(5) - energy(6) + energy(7)
+   end function energy_balance
+
+   !> Put the state into an archive or take it out; a queue taken out is ordered anew.
+   subroutine exchange(self, archive)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call self%slider%exchange(archive)
+      call self%contacts%exchange(archive)
+      call self%recorder%exchange(archive)
+      call archive%exchange(self%stage)
+      call archive%exchange(self%start_energy)
+      call archive%exchange(self%advances)
+      call archive%exchange(self%finished)
+      if (.not. archive%saving) call self%contacts%rebuild(self%slider%displacement)
+   end subroutine exchange
+
+end module mesoslip_simulation

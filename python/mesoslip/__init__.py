@@ -1,0 +1,51 @@
+"""mesoslip: stick-slip friction of a multicontact interface.
+
+>>> import mesoslip
+>>> tree = mesoslip.run("runs/klein.toml")        # doctest: +SKIP
+>>> tree["spring_force"].plot()                   # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from mesoslip.errors import ConfigError, FileError, MesoslipError, RunError
+
+if TYPE_CHECKING:
+    from mesoslip.api import figures, info, plot, read, run, slips
+    from mesoslip.config import Config
+    from mesoslip.threshold import ThresholdLaw
+
+__all__ = [
+    "Config",
+    "ConfigError",
+    "FileError",
+    "MesoslipError",
+    "RunError",
+    "ThresholdLaw",
+    "figures",
+    "info",
+    "plot",
+    "read",
+    "run",
+    "slips",
+]
+
+# What takes long to import is imported when it is asked for.
+_LAZY = {
+    "Config": "config",
+    "ThresholdLaw": "threshold",
+    "figures": "api",
+    "info": "api",
+    "plot": "api",
+    "read": "api",
+    "run": "api",
+    "slips": "api",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"mesoslip.{_LAZY[name]}"), name)

@@ -1,0 +1,138 @@
+"""What each command does, as a Python function."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from mesoslip import catalogue, engine, store
+from mesoslip.config import Config
+from mesoslip.derived import Derived, derived_quantities
+
+PathLike = str | os.PathLike[str]
+
+
+def as_config(
+    config: PathLike | Mapping[str, Any] | Config, overrides: Iterable[str] = ()
+) -> Config:
+    """A configuration from a TOML file, from an output of an earlier run, or from nested tables.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If the configuration is wrong.
+    """
+    if isinstance(config, Config):
+        return config
+    if isinstance(config, Mapping):
+        return Config.from_dict(config)
+    path = Path(config)
+    if path.suffix == ".nc":
+        return store.configuration(path, overrides)
+    return Config.load(path, overrides)
+
+
+def run(
+    config: PathLike | Mapping[str, Any] | Config,
+    *,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> xr.DataTree:
+    """Simulate.
+
+    Parameters
+    ----------
+    config
+        A TOML file, an output to run again, nested tables, or a `Config`.
+    workers
+        Realizations at the same time; as many as there are processors by default. The result does
+        not depend on it.
+    progress
+        Called now and then with the part of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    xarray.DataTree
+        The same as in an output file. After Ctrl-C its attribute ``complete`` is "false", and what
+        was not come to is NaN.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong.
+    RunError
+        If the run fails.
+    """
+    config = as_config(config)
+    start = time.perf_counter()
+    realizations, complete = engine.run_realizations(config, workers=workers, progress=progress)
+    return store.build(
+        config, realizations, complete=complete, wall_seconds=time.perf_counter() - start
+    )
+
+
+def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
+    """Derived quantities of a configuration by name, see `mesoslip.derived`."""
+    return derived_quantities(as_config(config))
+
+
+def read(path: PathLike) -> xr.DataTree:
+    """Read an output into memory.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it is no output of mesoslip, or it is damaged.
+    """
+    return store.read(Path(path))
+
+
+def _as_tree(output: PathLike | xr.DataTree) -> xr.DataTree:
+    return output if isinstance(output, xr.DataTree) else read(output)
+
+
+def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
+    """The catalogue of slips of an output, dimension ``slip``."""
+    return catalogue.slips(_as_tree(output))
+
+
+def plot(output: PathLike | xr.DataTree, figure: PathLike) -> None:
+    """Draw an output: spring force with one slip in an inset, velocity, detached contacts.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or the figure not be written.
+    """
+    from mesoslip import plots
+
+    plots.save(plots.overview(_as_tree(output)), Path(figure))
+
+
+def figures(
+    names: Iterable[str] = (), *, outputs: PathLike = "out", folder: PathLike = "out/figures"
+) -> list[Path]:
+    """Draw figures of the source, all by default, from the outputs of their runs.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files.
+
+    Raises
+    ------
+    FileError
+        If an output is missing or a figure cannot be written.
+    ConfigError
+        If there is no figure of a name.
+    """
+    from mesoslip import source_figures
+
+    return source_figures.draw(names, Path(outputs), Path(folder))

@@ -1,0 +1,89 @@
+"""The catalogue of slips of an output, and its statistics."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from mesoslip.errors import FileError
+
+COLUMNS = (
+    "realization",
+    "start_time",
+    "end_time",
+    "force_before",
+    "force_after",
+    "force_drop",
+    "peak_velocity",
+    "contacts_broken",
+)
+
+
+def slips(tree: xr.DataTree) -> xr.Dataset:
+    """The slips of an output, dimension ``slip``, with ``slip_time`` [s] and ``waiting_time`` [s].
+
+    The waiting time is that since the start of the slip before; NaN for the first of a realization.
+    """
+    data = tree["slips"].to_dataset(inherit=False)
+    slip_time = data["end_time"] - data["start_time"]
+    waiting = np.diff(data["start_time"].values, prepend=np.nan)
+    if data.sizes["slip"]:
+        waiting[np.diff(data["realization"].values, prepend=-1) != 0] = np.nan
+    return data.assign(
+        slip_time=slip_time.assign_attrs(units="s", long_name="duration of the drop"),
+        waiting_time=xr.Variable(
+            "slip", waiting, {"units": "s", "long_name": "time since the start of the slip before"}
+        ),
+    )
+
+
+def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
+    """Mean, standard deviation, minimum and maximum of each column, in SI; and the number of slips.
+
+    The first slip of a run from relaxed contacts is larger than the others and is part of this.
+    """
+    data = slips(tree)
+    result: dict[str, dict[str, float]] = {"slips": {"count": float(data.sizes["slip"])}}
+    for name in (*COLUMNS[3:], "slip_time", "waiting_time"):
+        values = data[name].values[np.isfinite(data[name].values)]
+        if values.size:
+            result[name] = {
+                "mean": float(np.mean(values)),
+                "standard_deviation": float(np.std(values)),
+                "minimum": float(np.min(values)),
+                "maximum": float(np.max(values)),
+            }
+    return result
+
+
+def rows(tree: xr.DataTree) -> list[dict[str, Any]]:
+    """The catalogue, a dictionary for each slip."""
+    data = slips(tree)
+    return [
+        {name: data[name].values[number].item() for name in COLUMNS}
+        for number in range(data.sizes["slip"])
+    ]
+
+
+def write_csv(tree: xr.DataTree, path: Path) -> None:
+    """Write the catalogue as a table with the units in its header.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    data = slips(tree)
+    header = {name: f"{name} [{data[name].attrs.get('units', '1')}]" for name in COLUMNS}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, COLUMNS)
+            writer.writerow(header)
+            writer.writerows(rows(tree))
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,231 @@
+"""The command line."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mesoslip.errors import MesoslipError
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="mesoslip",
+    help="Stick-slip friction of a multicontact interface.",
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+ConfigArgument = Annotated[
+    str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
+]
+OutputArgument = Annotated[
+    Path, typer.Argument(help="Output of mesoslip run", metavar="OUT.nc")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", help="Change one key, as in contacts.delay=1ms; may be repeated", metavar="KEY=VALUE"
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"mesoslip {version('mesoslip')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    _: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def run(
+    config: ConfigArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"),
+    ] = None,
+    changes: SetOption = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+) -> None:
+    """Simulate, and write an output file."""
+    from mesoslip import api, store
+
+    checked = api.as_config(config, changes or ())
+    path = output or Path("out") / f"{Path(config).stem}.nc"
+    store.check_writable(path)
+    with _progress(quiet) as progress:
+        tree = api.run(checked, workers=workers, progress=progress)
+    if tree.attrs["complete"] == "false":
+        partial = path.with_name(f"{path.stem}.partial{path.suffix}")
+        store.write(tree, partial)
+        typer.echo(f"{tree.attrs['comment']}; what there is, is in {partial}", err=True)
+        raise typer.Exit(INTERRUPTED)
+    store.write(tree, path)
+    if not quiet:
+        typer.echo(
+            f"{path}: {tree.attrs['break_count']} breaks, {tree['slips'].sizes['slip']} slips, "
+            f"energy balance to {abs(tree.attrs['energy_residual']):.0e}, "
+            f"{tree.attrs['wall_seconds']:.2f} s",
+            err=True,
+        )
+
+
+@app.command()
+def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
+    """Show derived quantities."""
+    from mesoslip.config import Config
+    from mesoslip.derived import derived_quantities
+
+    if Path(config).suffix == ".nc":
+        from mesoslip import store
+
+        checked = store.configuration(Path(config), changes or ())
+    else:
+        checked = Config.load(config, changes or ())
+    quantities = derived_quantities(checked)
+    if as_json:
+        typer.echo(json.dumps({name: one.value for name, one in quantities.items()}, indent=2))
+        return
+    for name, one in quantities.items():
+        unit = "" if one.unit == "1" else f" {one.unit}"
+        typer.echo(f"{name:22} {f'{one.value:.6g}{unit}':20} {one.meaning}")
+
+
+@app.command()
+def slips(
+    output: OutputArgument,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the catalogue of slips, with statistics."""
+    from mesoslip import catalogue, store
+
+    tree = store.read(output)
+    if table is not None:
+        catalogue.write_csv(tree, table)
+    rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
+    if as_json:
+        typer.echo(json.dumps({"slips": rows, "statistics": statistics}, indent=2))
+        return
+    typer.echo("  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s   breaks")
+    for row in rows:
+        typer.echo(
+            f"{row['realization']:13d} {row['start_time']:10.4f} "
+            f"{1e3 * (row['end_time'] - row['start_time']):13.3f} {1e6 * row['force_before']:11.4f} "
+            f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
+            f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8d}"
+        )
+    typer.echo(f"{len(rows)} slips")
+    for name, values in statistics.items():
+        if name != "slips":
+            typer.echo(
+                f"{name:16} mean {values['mean']:.5g}, standard deviation "
+                f"{values['standard_deviation']:.2g}, from {values['minimum']:.5g} "
+                f"to {values['maximum']:.5g}  (SI)"
+            )
+
+
+@app.command()
+def plot(
+    output: OutputArgument,
+    figure: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Picture; beside the output by default", metavar="FIG"),
+    ] = None,
+) -> None:
+    """Draw an output."""
+    from mesoslip import plots, store
+
+    path = figure or output.with_suffix(".png")
+    plots.save(plots.overview(store.read(output)), path)
+    typer.echo(str(path), err=True)
+
+
+@app.command()
+def figures(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Such as S20; all by default", metavar="[NAME]...")
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder of the pictures", metavar="DIR")
+    ] = Path("out/figures"),
+    outputs: Annotated[
+        Path, typer.Option("--from", help="Folder of the outputs of the runs", metavar="DIR")
+    ] = Path("out"),
+) -> None:
+    """Draw the figures of the source from the outputs of their runs."""
+    from mesoslip import source_figures
+
+    for path in source_figures.draw(names or (), outputs, folder):
+        typer.echo(str(path), err=True)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[float], None]]:
+    """A progress bar on a terminal, otherwise a line for each tenth; yields what takes the part done."""
+    if quiet:
+        yield lambda _: None
+        return
+    if not sys.stderr.isatty():
+        yield _plain_progress()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("simulating"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda part: bar.update(task, completed=part)
+
+
+def _plain_progress() -> Callable[[float], None]:
+    start = time.monotonic()
+    told = 0
+
+    def tell(part: float) -> None:
+        nonlocal told
+        passed = time.monotonic() - start
+        # Runs that are over in a moment need no lines.
+        if int(10 * part) > told and passed > 2:
+            told = int(10 * part)
+            left = passed * (1 - part) / part
+            typer.echo(f"{10 * told} % after {passed:.0f} s, {left:.0f} s left", err=True)
+
+    return tell
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    try:
+        app()
+    except MesoslipError as error:
+        typer.echo(f"mesoslip: {error}", err=True)
+        sys.exit(error.exit_status)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)

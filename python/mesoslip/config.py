@@ -1,0 +1,515 @@
+"""The configuration of a run: TOML files, checked, in SI units.
+
+Every table of the file is a model here. Adding a key is adding a field; adding a kind of slider is
+adding a model to `Slider`. Everything that is wrong with a file is reported at once.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.units import to_si
+
+# What a run needs for each contact, and for each sample of the trace [bytes].
+BYTES_PER_CONTACT = 150
+BYTES_PER_SAMPLE = 3 * 7 * 8
+
+# Tables and keys that the format knows and this version does not.
+NOT_YET_KEYS = {
+    "slider": ("layers", "layer_damping", "base", "solver"),
+    "contacts": ("ageing",),
+    "drive": ("force_rate",),
+    "": ("interaction",),
+}
+NOT_YET_VALUES = {"run.engine": ("me",), "slider.kind": ("layered", "quasistatic")}
+
+# Keys that exclude each other: laid over a base, one replaces the other.
+EXCLUSIVE = {"drive": ("velocity", "stage"), "slider": ("damping", "damping_ratio")}
+
+
+def _quantity(unit: str, example: str) -> Any:
+    return BeforeValidator(partial(to_si, unit=unit, example=example))
+
+
+Time = Annotated[float, _quantity("s", "0.5 ms")]
+Velocity = Annotated[float, _quantity("m/s", "0.1 um/s")]
+Mass = Annotated[float, _quantity("kg", "1.47 g")]
+Stiffness = Annotated[float, _quantity("N/m", "97 N/m")]
+Rate = Annotated[float, _quantity("1/s", "51.4 1/s")]
+Force = Annotated[float, _quantity("N", "18 uN")]
+Area = Annotated[float, _quantity("m^2", "1e-10 m^2")]
+Length = Annotated[float, _quantity("m", "3.5 nm")]
+Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3")]
+Number = Annotated[float, _quantity("1", "0.2")]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are errors, and nothing changes after checking."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _problem(key: str, message: str) -> PydanticCustomError:
+    return PydanticCustomError("table", "{message}", {"key": key, "message": message})
+
+
+class Run(Table):
+    """What is computed, for how long, and with which random numbers."""
+
+    engine: Literal["eq"] = "eq"
+    duration: Annotated[Time, Field(gt=0)] | None = None
+    realizations: Annotated[StrictInt, Field(ge=1, lt=2**31)] = 1
+    seed: Annotated[StrictInt, Field(ge=0, lt=2**63)] = 1
+
+
+class Stage(Table):
+    """A stage of the drive: a constant velocity, of either sign or zero, for a time."""
+
+    duration: Annotated[Time, Field(gt=0)]
+    velocity: Velocity
+
+
+class Drive(Table):
+    """How the drive moves: one velocity, or stages one after another."""
+
+    velocity: Velocity | None = None
+    stage: Annotated[tuple[Stage, ...], Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.velocity is None) == (self.stage is None):
+            raise _problem("velocity", "give either a velocity or [[drive.stage]] tables")
+        return self
+
+
+class RigidSlider(Table):
+    """A rigid block on a spring; damping acts on its velocity relative to the running mean."""
+
+    kind: Literal["rigid"] = "rigid"
+    mass: Annotated[Mass, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(gt=0)]
+    damping_ratio: Annotated[Number, Field(ge=0)] | None = None
+    damping: Annotated[Rate, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _one_damping(self) -> Self:
+        if self.damping is not None and self.damping_ratio is not None:
+            raise _problem("damping", "give either damping or damping_ratio, not both")
+        return self
+
+    @property
+    def omega_s(self) -> float:
+        """Setup frequency √(K/M) [1/s]."""
+        return math.sqrt(self.stiffness / self.mass)
+
+    @property
+    def damping_rate(self) -> float:
+        """η_S [1/s]."""
+        if self.damping is not None:
+            return self.damping
+        return (self.damping_ratio or 0.0) * self.omega_s
+
+
+class PrescribedSlider(Table):
+    """A block that goes where the drive goes, K = ∞."""
+
+    kind: Literal["prescribed"] = "prescribed"
+
+
+def _slider_kind(value: Any) -> Any:
+    return value.get("kind", "rigid") if isinstance(value, Mapping) else value.kind
+
+
+Slider = Annotated[
+    Annotated[RigidSlider, Tag("rigid")] | Annotated[PrescribedSlider, Tag("prescribed")],
+    Discriminator(_slider_kind),
+]
+
+
+class Threshold(Table):
+    """Law of the relative thresholds: mean 1, and a standard deviation."""
+
+    law: Literal["gaussian", "uniform", "lognormal", "weibull", "exponential"] = "gaussian"
+    relative_width: Annotated[Number, Field(gt=0)]
+
+    @model_validator(mode="after")
+    def _thresholds_positive(self) -> Self:
+        widest = {"uniform": 1 / math.sqrt(3), "exponential": 1.0}.get(self.law, 20.0)
+        if self.relative_width > widest * (1 + 1e-4):
+            raise _problem(
+                "relative_width",
+                f"must be at most {widest:.4g} for the {self.law} law"
+                + (", whose least threshold would be negative" if widest < 20 else ""),
+            )
+        return self
+
+    def probability_above(self, threshold: float) -> float:
+        """Probability that a draw of the law is above a relative threshold."""
+        width = self.relative_width
+        if self.law == "gaussian":
+            return 0.5 * math.erfc((threshold - 1) / (math.sqrt(2) * width))
+        if self.law == "uniform":
+            return min(1.0, max(0.0, 0.5 * (1 - (threshold - 1) / (math.sqrt(3) * width))))
+        if self.law == "exponential":
+            return min(1.0, math.exp(-(threshold - 1 + width) / width))
+        from mesoslip.threshold import ThresholdLaw
+
+        return float(ThresholdLaw(self.law, width).survival(threshold))
+
+
+class Contacts(Table):
+    """The contacts of the interface; forces, stiffness and area are those of all together."""
+
+    count: Annotated[StrictInt, Field(ge=1, lt=2**31)]
+    static_force: Annotated[Force, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(gt=0)]
+    area: Annotated[Area, Field(gt=0)] | None = None
+    film_thickness: Annotated[Length, Field(gt=0)] | None = None
+    film_density: Annotated[Density, Field(gt=0)] | None = None
+    drag_rate: Annotated[Rate, Field(ge=0)] = 0.0
+    delay: Annotated[Time, Field(ge=0)] = 0.0
+    back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    coupling: Literal["scaled", "equal"] = "scaled"
+    initial: Literal["relaxed", "steady", "uniform"] = "relaxed"
+    reattach: StrictBool = True
+    threshold: Threshold
+
+    @model_validator(mode="after")
+    def _mass_for_drag(self) -> Self:
+        if self.drag_rate > 0:
+            for key in ("area", "film_thickness", "film_density"):
+                if getattr(self, key) is None:
+                    raise _problem(key, "needed for the mass of the contacts, as drag_rate is given")
+        return self
+
+    @model_validator(mode="after")
+    def _contacts_attach(self) -> Self:
+        least = 0.5
+        above = self.threshold.probability_above(self.back_force_ratio)
+        if above < least:
+            raise _problem(
+                "back_force_ratio",
+                f"only {above:.3g} of the thresholds are above the back force, at least {least} must "
+                "be: choose a lower back_force_ratio or a narrower threshold law",
+            )
+        return self
+
+    @property
+    def contact_static_force(self) -> float:
+        """f_s [N]."""
+        return self.static_force / self.count
+
+    @property
+    def contact_stiffness(self) -> float:
+        """k [N/m]."""
+        return self.stiffness / self.count
+
+    @property
+    def contact_mass(self) -> float:
+        """m = ρ (A/N) h [kg]; 0 where the film is not described."""
+        if self.area is None or self.film_thickness is None or self.film_density is None:
+            return 0.0
+        return self.film_density * self.area / self.count * self.film_thickness
+
+    @property
+    def contact_drag(self) -> float:
+        """m η [N s/m]."""
+        return self.contact_mass * self.drag_rate
+
+
+class Output(Table):
+    """What is recorded. A prescribed slider has no slips, so ``slip_interval`` says nothing there."""
+
+    interval: Annotated[Time, Field(gt=0)] | None = None
+    slip_interval: Annotated[Time, Field(gt=0)] | None = None
+    slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
+
+
+class DriveStage(NamedTuple):
+    """A stage of the drive as it is run."""
+
+    duration: float
+    velocity: float
+
+
+class Config(Table):
+    """A whole configuration."""
+
+    title: StrictStr | None = None
+    run: Run
+    drive: Drive
+    slider: Slider
+    contacts: Contacts
+    output: Output = Output()
+
+    @property
+    def duration(self) -> float:
+        """Duration of the run [s]."""
+        if self.run.duration is not None:
+            return self.run.duration
+        return math.fsum(stage.duration for stage in self.drive.stage or ())
+
+    @property
+    def drive_stages(self) -> tuple[DriveStage, ...]:
+        """Stages of the drive; the last one ends with the run."""
+        if self.drive.stage is None:
+            return (DriveStage(self.duration, self.drive.velocity or 0.0),)
+        stages = []
+        left = self.duration
+        for stage, is_last in zip(
+            self.drive.stage, [False] * (len(self.drive.stage) - 1) + [True], strict=True
+        ):
+            length = left if is_last else min(stage.duration, left)
+            stages.append(DriveStage(length, stage.velocity))
+            left -= length
+            if left <= 0:
+                break
+        return tuple(stages)
+
+    @property
+    def output_interval(self) -> float:
+        """Interval of the trace [s]; a ten-thousandth of the run unless given."""
+        return self.output.interval or self.duration / 10000
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
+        """Read a TOML file and what it is based on, lay overrides over it, and check it.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overrides
+            Changes such as "contacts.delay=1ms".
+
+        Raises
+        ------
+        FileError
+            If a file cannot be read.
+        ConfigError
+            If anything in it is wrong.
+        """
+        path = Path(path)
+        return cls.from_dict(_override(_read_toml(path, ()), overrides), source=str(path))
+
+    @classmethod
+    def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
+        """Check a configuration given as nested tables.
+
+        Raises
+        ------
+        ConfigError
+            If anything in it is wrong.
+        """
+        try:
+            config = cls.model_validate(tables)
+        except ValidationError as error:
+            raise ConfigError(_problems(error, source)) from None
+        problems = [Problem(source, *problem) for problem in _cross_checks(config)]
+        if problems:
+            raise ConfigError(problems)
+        return config
+
+    @classmethod
+    def from_toml(
+        cls, text: str, source: str = "configuration", overrides: Iterable[str] = ()
+    ) -> Config:
+        """Check a configuration given as the text of a TOML file, with changes laid over it."""
+        return cls.from_dict(_override(_parse_toml(text, source), overrides), source)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The configuration as nested tables with plain SI numbers."""
+        return self.model_dump(exclude_none=True)
+
+    def to_toml(self) -> str:
+        """The configuration as the text of a TOML file with plain SI numbers."""
+        import tomli_w
+
+        return tomli_w.dumps(self.to_dict())
+
+
+def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
+    """What is wrong between tables: key, message, value."""
+    if config.duration <= 0:
+        yield "run.duration", "needed, as the drive has no stages", None
+        return
+    interval = config.output_interval
+    if interval > config.duration:
+        yield "output.interval", f"must not exceed the duration, {config.duration:g} s", interval
+    finer = config.output.slip_interval
+    if finer is not None and finer > interval:
+        yield "output.slip_interval", f"must not exceed the interval, {interval:g} s", finer
+
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    together = min(config.run.realizations, os.cpu_count() or 1)
+    for key, needed, value in (
+        ("contacts.count", BYTES_PER_CONTACT * config.contacts.count * together, config.contacts.count),
+        (
+            "output.interval",
+            BYTES_PER_SAMPLE * config.duration / interval * config.run.realizations,
+            interval,
+        ),
+    ):
+        if needed > memory:
+            yield (
+                key,
+                f"the run needs {needed / 2**30:.3g} GiB for this, and the machine has "
+                f"{memory / 2**30:.3g} GiB",
+                value,
+            )
+
+
+def _problems(error: ValidationError, source: str) -> list[Problem]:
+    """Everything that pydantic found, in our words."""
+    return [_problem_of(details, source) for details in error.errors()]
+
+
+def _problem_of(details: ErrorDetails, source: str) -> Problem:
+    place = [part for part in details["loc"] if part not in {"rigid", "prescribed"}]
+    context = details.get("ctx", {})
+    kind, value, message = details["type"], details["input"], details["msg"]
+    table, name = _dotted(place[:-1]), str(place[-1]) if place else ""
+    if kind == "table":
+        return Problem(source, _dotted([*place, context["key"]]), context["message"])
+    if kind == "missing":
+        return Problem(source, _dotted(place), "missing; it has no default")
+    if kind == "extra_forbidden":
+        if name in NOT_YET_KEYS.get(table, ()):
+            return Problem(source, _dotted(place), "not available in this version")
+        near = difflib.get_close_matches(name, _known_keys(place[:-1], details), 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        return Problem(source, _dotted(place), f"unknown key{hint}")
+    if kind in {"union_tag_invalid", "literal_error"}:
+        if kind == "union_tag_invalid":
+            place, value = [*place, "kind"], context["tag"]
+            expected = context["expected_tags"]
+        else:
+            expected = context["expected"]
+        not_yet = value in NOT_YET_VALUES.get(_dotted(place), ())
+        message = f"not available in this version; choose {expected}" if not_yet else (
+            f"must be {expected}"
+        )
+    elif kind == "value_error":
+        message = str(context["error"])
+    elif kind in {"model_type", "dict_type", "model_attributes_type", "union_tag_not_found"}:
+        message = "must be a table"
+    else:
+        message = message.replace("Input should", "must").replace("Tuple should", "must")
+    return Problem(source, _dotted(place), message, value)
+
+
+def _dotted(place: Iterable[Any]) -> str:
+    text = ""
+    for part in place:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return text.lstrip(".")
+
+
+def _known_keys(place: list[Any], details: ErrorDetails) -> list[str]:
+    """Keys of the table at a place of the file."""
+    model: Any = Config
+    tables: dict[str, Any] = {
+        "run": Run,
+        "drive": Drive,
+        "slider": PrescribedSlider if "prescribed" in details["loc"] else RigidSlider,
+        "contacts": Contacts,
+        "output": Output,
+        "threshold": Threshold,
+        "stage": Stage,
+    }
+    for part in place:
+        model = tables.get(part, model)
+    return [*model.model_fields, *(["base"] if model is Config else [])]
+
+
+def _read_toml(path: Path, outer: tuple[Path, ...]) -> dict[str, Any]:
+    """Tables of a file, laid over those of its base."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise FileError(f"{path}: is a directory, not a configuration file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{path}: cannot be read: {error}") from None
+    tables = _parse_toml(text, str(path))
+    base = tables.pop("base", None)
+    if base is None:
+        return tables
+    if not isinstance(base, str):
+        raise ConfigError([Problem(str(path), "base", "must be the name of a file", base)])
+    outer = (*outer, path.resolve())
+    base_path = path.parent / base
+    if base_path.resolve() in outer:
+        raise ConfigError([Problem(str(path), "base", "files are based on each other", base)])
+    return _merge(_read_toml(base_path, outer), tables)
+
+
+def _parse_toml(text: str, source: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError([Problem(source, "", f"not valid TOML: {error}")]) from None
+
+
+def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
+    """Lay tables over others; of keys that exclude each other, the one laid over stays."""
+    changes_kind = table == "slider" and over.get("kind", base.get("kind")) != base.get("kind", "rigid")
+    merged = {} if changes_kind and "kind" in over else dict(base)
+    for one, other in (*pairwise(EXCLUSIVE.get(table, ())), *pairwise(EXCLUSIVE.get(table, ())[::-1])):
+        if one in over:
+            merged.pop(other, None)
+    for key, value in over.items():
+        below = merged.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            merged[key] = _merge(below, value, key)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _override(tables: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """Lay changes such as "contacts.delay=1ms" over tables."""
+    for override in overrides:
+        tables = _merge(tables, _parse_override(override))
+    return tables
+
+
+def _parse_override(text: str) -> dict[str, Any]:
+    """The tables of a change such as "contacts.delay=1ms"."""
+    key, equals, value = text.partition("=")
+    key, value = key.strip(), value.strip()
+    if not equals or not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", key):
+        raise ConfigError([Problem("--set", text, "must look like contacts.delay=1ms")])
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value
+    for part in reversed(key.split(".")):
+        parsed = {part: parsed}
+    return parsed

@@ -1,0 +1,99 @@
+"""Quantities that follow from a configuration in closed form, for ``mesoslip info``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mesoslip.config import Config, RigidSlider
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A derived quantity: its value in SI, the unit, and what it is."""
+
+    value: float
+    unit: str
+    meaning: str
+
+
+def derived_quantities(config: Config) -> dict[str, Derived]:
+    """Derived quantities by name.
+
+    What has no meaning for the configuration is left out: the setup's frequency of a prescribed
+    slider, for example, or what refers to the drive's velocity if that is zero. With several stages
+    the first one that moves counts. Equation numbers are those of Braun's "Stick-slip kinetics".
+    """
+    return {
+        name: Derived(value, unit, meaning)
+        for name, value, unit, meaning in (*_contacts(config), *_slider(config))
+        if math.isfinite(value)
+    }
+
+
+def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
+    contacts = config.contacts
+    width = contacts.threshold.relative_width
+    static, stiffness = contacts.contact_static_force, contacts.contact_stiffness
+    yield "contact_static_force", static, "N", "mean static threshold of a contact, f_s = F_s/N"
+    yield "contact_stiffness", stiffness, "N/m", "mean stiffness of a contact, k"
+    yield "break_stretch", static / stiffness, "m", "mean stretch at which a contact breaks, f_s/k"
+    if contacts.contact_mass > 0:
+        yield "contact_mass", contacts.contact_mass, "kg", "mass of a contact, m = rho (A/N) h"
+    if contacts.area is not None:
+        area = contacts.area / contacts.count
+        yield "contact_spacing", math.sqrt(area), "m", "distance between neighbours, a = (A/N)^(1/2)"
+        yield "contact_radius", math.sqrt(area / math.pi), "m", "radius of a contact"
+    yield (
+        "threshold_acceptance",
+        contacts.threshold.probability_above(contacts.back_force_ratio),
+        "1",
+        "probability that a threshold drawn is above the back force",
+    )
+    yield (
+        "K_star_estimate",
+        contacts.stiffness * (1 - contacts.back_force_ratio) / width,
+        "N/m",
+        "estimate of the stiffness above which sliding is smooth, K* ~ Nk (f_s - f_b)/Delta f_s (S48)",
+    )
+
+
+def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
+    slider, contacts = config.slider, config.contacts
+    if not isinstance(slider, RigidSlider):
+        return
+    omega_s = slider.omega_s
+    omega_l = math.sqrt(contacts.stiffness / slider.mass)
+    yield "omega_s", omega_s, "1/s", "setup frequency, Omega_S = (K/M)^(1/2)"
+    yield "setup_period", 2 * math.pi / omega_s, "s", "period of the setup, tau_S = 2 pi/Omega_S"
+    yield "damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S"
+    yield "omega_l", omega_l, "1/s", "ringing frequency of the pinned slider, Omega_L = (Nk/M)^(1/2)"
+    yield "ringing_period", 2 * math.pi / omega_l, "s", "period of the ringing, 2 pi/Omega_L"
+    film = contacts.count * contacts.contact_drag / slider.mass
+    yield "film_drag_rate", film, "1/s", "drag of the whole molten film per slider mass, N m eta/M"
+    velocity_scale = omega_s * contacts.static_force / slider.stiffness
+    yield "slip_velocity_scale", velocity_scale, "m/s", "velocity of a slip, Omega_S F_s/K"
+
+    velocity = next((abs(one.velocity) for one in config.drive_stages if one.velocity), 0.0)
+    if velocity == 0:
+        return
+    loading = contacts.static_force / slider.stiffness / velocity
+    yield "loading_time", loading, "s", "time in which the spring alone loads to F_s, F_s/(K v_d)"
+    d_1 = velocity * math.sqrt(slider.stiffness * slider.mass) / contacts.static_force
+    yield "D1", d_1, "1", "v_d (K M)^(1/2)/F_s (S46)"
+    alpha = (6 / d_1) ** (1 / 3)
+    yield "alpha", alpha, "1", "slip time of sequential breaking times Omega_S, (6/D1)^(1/3)"
+    yield "slip_time_sequential", alpha / omega_s, "s", "slip time of sequential breaking"
+    # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
+    start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s
+    if start > 0:
+        beta = math.sqrt(2 / start)
+        yield (
+            "beta",
+            beta,
+            "1",
+            "slip time of instant melting times Omega_S, [2/(D0 - eta D1/Omega_S)]^(1/2), "
+            "with D0 ~ 1 - delta",
+        )
+        yield "slip_time_melting", beta / omega_s, "s", "slip time of instant melting"

@@ -1,0 +1,273 @@
+"""The earthquake-like engine: one realization after another, or side by side on threads.
+
+The kernel's whole state is plain arrays held here, so a realization can stop after any segment
+and go on; its numbers do not depend on where segments end, or on what runs beside it.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip import _core
+from mesoslip.errors import RunError
+from mesoslip.threshold import LAWS
+
+if TYPE_CHECKING:
+    from mesoslip.config import Config
+
+Array = NDArray[np.float64]
+
+TRACE_COLUMNS = (
+    "time",
+    "drive_displacement",
+    "displacement",
+    "velocity",
+    "spring_force",
+    "contact_force",
+    "detached_contacts",
+)
+SLIP_COLUMNS = (
+    "slip",
+    "start_time",
+    "end_time",
+    "force_before",
+    "force_after",
+    "peak_velocity",
+    "contacts_broken",
+)
+ENERGY_COLUMNS = (
+    "drive_work",
+    "slider_energy",
+    "contact_energy",
+    "damping_loss",
+    "drag_loss",
+    "break_loss",
+    "birth_gain",
+    "residual",
+)
+
+COUPLINGS = {"scaled": 1, "equal": 2}
+INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
+SLIDERS = {"rigid": 1, "prescribed": 2}
+
+# Part of the slip velocity scale, Omega_S F_s/K, that the slider must exceed the drive by in a slip.
+SLIP_VELOCITY_RATIO = 0.02
+
+# Wall time of a segment, between two looks at progress and Ctrl-C [s].
+SEGMENT_SECONDS = 0.25
+SEGMENT_ADVANCES = 100_000
+# Rows of the buffers that a segment fills; each must hold the most samples of one advance twice.
+TRACE_ROWS = 20_000
+SLIP_ROWS = 2_000
+
+
+def slip_velocity(config: Config) -> float:
+    """Velocity above the drive's beyond which a rigid slider slips [m/s]; 0 where there are no slips."""
+    if config.slider.kind != "rigid":
+        return 0.0
+    if config.output.slip_velocity is not None:
+        return config.output.slip_velocity
+    omega_s = np.sqrt(config.slider.stiffness / config.slider.mass)
+    return float(SLIP_VELOCITY_RATIO * omega_s * config.contacts.static_force / config.slider.stiffness)
+
+
+@dataclass
+class Realization:
+    """One run of the earthquake-like model, advanced in segments.
+
+    ``trace`` has shape (samples, 7) with the columns `TRACE_COLUMNS`, ``slips`` (slips, 7) with
+    `SLIP_COLUMNS`, ``slip_trace`` (samples, 8): a trace and the number of the slip.
+    """
+
+    config: Config
+    number: int
+    time: float = 0.0
+    finished: bool = False
+    breaks: int = 0
+    advances: int = 0
+    kernel_seconds: float = 0.0
+    energy: Array = field(default_factory=lambda: np.full(len(ENERGY_COLUMNS), np.nan))
+
+    def __post_init__(self) -> None:
+        self._traces: list[Array] = []
+        self._slip_traces: list[Array] = []
+        self._slips: list[Array] = []
+        self._started = False
+        self._segment = SEGMENT_ADVANCES
+
+    def _allocate(self) -> None:
+        """Make the arrays of the state, and the buffers that a segment fills."""
+        count = self.config.contacts.count
+        reals, integers = _core.state_sizes()
+        self._state_real = np.zeros(reals)
+        self._state_integer = np.zeros(integers, dtype=np.int64)
+        self._record = np.zeros((4, count), order="F")
+        self._detached = np.zeros((3, count), order="F")
+        self._detached_contact = np.zeros(count, dtype=np.int32)
+        self._trace = np.empty((len(TRACE_COLUMNS), TRACE_ROWS), order="F")
+        self._slip_trace = np.empty((len(TRACE_COLUMNS) + 1, TRACE_ROWS), order="F")
+        self._slip = np.empty((len(SLIP_COLUMNS), SLIP_ROWS), order="F")
+
+    def release(self) -> None:
+        """Give back the memory of the state, of a realization that will not go on."""
+        del self._record, self._detached, self._detached_contact
+        del self._trace, self._slip_trace, self._slip
+
+    @property
+    def trace(self) -> Array:
+        return np.concatenate([np.empty((0, len(TRACE_COLUMNS))), *self._traces])
+
+    @property
+    def slips(self) -> Array:
+        return np.concatenate([np.empty((0, len(SLIP_COLUMNS))), *self._slips])
+
+    @property
+    def slip_trace(self) -> Array:
+        rows = np.concatenate([np.empty((0, len(TRACE_COLUMNS) + 1)), *self._slip_traces])
+        slips = self.slips
+        number = rows[:, -1].astype(int)
+        rows, number = rows[number < len(slips)], number[number < len(slips)]
+        # Fast motion that came to nothing may have been sampled under the number of a later slip.
+        return rows[rows[:, 0] >= slips[number, 1]]
+
+    @property
+    def energy_residual(self) -> float:
+        """What the energy balance lacks, relative to the work of the drive (or its largest term)."""
+        scale = abs(self.energy[0]) or float(np.max(np.abs(self.energy)))
+        return float(self.energy[-1] / scale) if scale else 0.0
+
+    def advance(self, advances: int | None = None) -> None:
+        """Go on for one segment: about a quarter of a second, or a number of advances.
+
+        Raises
+        ------
+        RunError
+            If the kernel cannot go on.
+        """
+        config = self.config
+        contacts, slider = config.contacts, config.slider
+        rigid = slider.kind == "rigid"
+        stages = config.drive_stages
+        setup = np.sqrt(slider.stiffness / slider.mass) if rigid else 1.0
+        if not self._started:
+            self._allocate()
+        start = time.perf_counter()
+        rows, finished, now, breaks, made, energy, status, message = _core.run_contacts(
+            static_force=contacts.contact_static_force,
+            stiffness=contacts.contact_stiffness,
+            drag=contacts.contact_drag,
+            delay=contacts.delay,
+            back_force_ratio=contacts.back_force_ratio,
+            coupling=COUPLINGS[contacts.coupling],
+            reattach=int(contacts.reattach),
+            law=LAWS[contacts.threshold.law],
+            relative_width=contacts.threshold.relative_width,
+            initial=INITIAL_STATES[contacts.initial],
+            seed=config.run.seed,
+            realization=self.number,
+            slider_kind=SLIDERS[slider.kind],
+            mass=slider.mass if rigid else 1.0,
+            spring=slider.stiffness if rigid else 1.0,
+            damping=slider.damping_rate if rigid else 0.0,
+            stage_end=np.cumsum([stage.duration for stage in stages]),
+            stage_velocity=np.array([stage.velocity for stage in stages]),
+            interval=config.output_interval,
+            slip_interval=config.output.slip_interval or 0.0,
+            slip_velocity=slip_velocity(config),
+            quiet_time=np.pi / setup,
+            started=int(self._started),
+            state_real=self._state_real,
+            state_integer=self._state_integer,
+            record=self._record,
+            detached=self._detached,
+            detached_contact=self._detached_contact,
+            trace=self._trace,
+            slip_trace=self._slip_trace,
+            slips=self._slip,
+            most_advances=advances or self._segment,
+        )
+        seconds = time.perf_counter() - start
+        self.kernel_seconds += seconds
+        if advances is None and seconds < 0.5 * SEGMENT_SECONDS:
+            self._segment *= 2
+        self._started = True
+        if status != 0:
+            raise RunError(f"realization {self.number}: {message.decode().strip()}")
+        self._traces.append(self._trace[:, : rows[0]].T.copy())
+        self._slip_traces.append(self._slip_trace[:, : rows[1]].T.copy())
+        self._slips.append(self._slip[:, : rows[2]].T.copy())
+        self.finished = bool(finished)
+        self.time, self.breaks, self.advances, self.energy = now, breaks, made, energy
+
+    @property
+    def contacts(self) -> dict[str, Array]:
+        """The contacts now: origin [m], stiffness [N/m], 0 if detached, breaking stretch [m], renewals."""
+        names = ("origin", "stiffness", "break_stretch", "renewals")
+        return {name: self._record[row].copy() for row, name in enumerate(names)}
+
+
+def run_realizations(
+    config: Config,
+    *,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[Realization], bool]:
+    """Run all realizations of a configuration on threads.
+
+    Parameters
+    ----------
+    config
+        What to run.
+    workers
+        Realizations that run at the same time; as many as there are processors by default.
+    progress
+        Called now and then, from this thread, with the part of the work that is done.
+
+    Returns
+    -------
+    realizations, complete
+        The realizations, and whether they came to their ends; not so after Ctrl-C.
+
+    Raises
+    ------
+    RunError
+        If a realization fails.
+    """
+    realizations = [Realization(config, number) for number in range(config.run.realizations)]
+    workers = min(workers or os.cpu_count() or 1, len(realizations))
+    stop = threading.Event()
+
+    def finish(realization: Realization) -> None:
+        while not (realization.finished or stop.is_set()):
+            realization.advance()
+        if realization.finished:
+            realization.release()
+
+    def report() -> None:
+        if progress is not None:
+            progress(sum(one.time for one in realizations) / (config.duration * len(realizations)))
+
+    with ThreadPoolExecutor(workers) as pool:
+        pending = {pool.submit(finish, realization) for realization in realizations}
+        try:
+            while pending:
+                done, pending = wait(pending, timeout=0.1, return_when="FIRST_EXCEPTION")
+                for future in done:
+                    future.result()
+                report()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            stop.set()
+            for future in pending:
+                future.cancel()
+    return realizations, all(one.finished for one in realizations)

@@ -1,0 +1,160 @@
+"""Pictures of outputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mesoslip.catalogue import slips
+from mesoslip.errors import FileError
+
+Array = NDArray[np.float64]
+
+STYLE = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "legend.fontsize": 7,
+    "lines.linewidth": 0.9,
+    "figure.dpi": 200,
+    "savefig.dpi": 200,
+    "figure.constrained_layout.use": True,
+}
+
+# As in the source: the spring force in red and dashed, the contact force in black.
+SPRING: dict[str, Any] = {"color": "tab:red", "linestyle": "--", "label": "spring force $F_d$"}
+CONTACT: dict[str, Any] = {"color": "black", "label": "contact force $F$"}
+
+# Scale and unit in which a variable is drawn.
+SCALES = {
+    "spring_force": (1e6, "µN"),
+    "contact_force": (1e6, "µN"),
+    "velocity": (1e6, "µm/s"),
+    "detached_contacts": (1.0, ""),
+}
+
+
+def series(tree: xr.DataTree, name: str, realization: int = 0) -> tuple[Array, Array]:
+    """Times [s] and values of a variable of a realization, with the finer samples of its slips."""
+    root = tree.to_dataset().isel(realization=realization)
+    times, values = root["time"].values, root[name].values.astype(float)
+    if "slip_traces" in tree.children:
+        fine = tree["slip_traces"].to_dataset(inherit=False)
+        mine = fine["realization"].values == root["realization"].item()
+        times = np.concatenate([times, fine["time"].values[mine]])
+        values = np.concatenate([values, fine[name].values[mine].astype(float)])
+        order = np.argsort(times, kind="stable")
+        times, values = times[order], values[order]
+    return times, values
+
+
+def draw_series(
+    axes: Axes,
+    tree: xr.DataTree,
+    name: str,
+    *,
+    window: tuple[float, float] | None = None,
+    time_unit: float = 1.0,
+    **style: Any,
+) -> None:
+    """Draw a variable against time, or against the time since a window's start.
+
+    Parameters
+    ----------
+    axes, tree, name
+        Where, of which output, and which variable.
+    window
+        Start and end [s]; everything by default.
+    time_unit
+        Unit of the time axis [s].
+    style
+        Of the line.
+    """
+    times, values = series(tree, name)
+    start = 0.0
+    if window is not None:
+        start, end = window
+        inside = (times >= start) & (times <= end)
+        times, values = times[inside], values[inside]
+    axes.plot((times - start) / time_unit, values * SCALES[name][0], **style)
+
+
+def largest_slip(tree: xr.DataTree) -> xr.Dataset | None:
+    """The slip with the greatest drop of the spring force; None if there is no slip."""
+    all_slips = slips(tree)
+    mine = np.flatnonzero(all_slips["realization"].values == tree["realization"].values[0])
+    if mine.size == 0:
+        return None
+    drops = all_slips["force_drop"].values[mine]
+    return all_slips.isel(slip=mine[np.argmax(drops)])
+
+
+def slip_window(slip: xr.Dataset, before: float = 0.3, after: float = 2.0) -> tuple[float, float]:
+    """Start and end [s] of a window around a slip, in parts of its duration."""
+    start, length = slip["start_time"].item(), slip["slip_time"].item()
+    return start - before * length, start + (1 + after) * length
+
+
+def overview(tree: xr.DataTree) -> Figure:
+    """Spring force with a slip in an inset, velocity, and detached contacts against time."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.5, 5.2))
+        force, velocity, detached = figure.subplots(
+            3, 1, sharex=True, gridspec_kw={"height_ratios": [2.4, 1, 1]}
+        )
+        draw_series(force, tree, "spring_force", color="black")
+        force.set_ylabel("spring force (µN)")
+        draw_series(velocity, tree, "velocity", color="black")
+        velocity.set_ylabel("velocity (µm/s)")
+        draw_series(detached, tree, "detached_contacts", color="black")
+        detached.set_ylabel("detached contacts")
+        detached.set_xlabel("time (s)")
+        detached.set_xlim(0, tree["time"].max().item())
+
+        slip = largest_slip(tree)
+        if slip is not None:
+            low, high = force.get_ylim()
+            force.set_ylim(low, high + 0.75 * (high - low))
+            inset = force.inset_axes((0.3, 0.60, 0.45, 0.38))
+            window = slip_window(slip)
+            draw_series(inset, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+            draw_series(inset, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
+            inset.set_xlabel(f"time after {window[0]:.3f} s (ms)", fontsize=7)
+            inset.set_ylabel("force (µN)", fontsize=7)
+            inset.tick_params(labelsize=7)
+            inset.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        title = tree.attrs.get("title", "")
+        if tree.attrs.get("complete") == "false":
+            title = f"{title} ({tree.attrs['comment']})"
+        force.set_title(title, loc="left")
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Save a figure; its name appears only when it is whole.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written, or its ending names no kind of picture.
+    """
+    part = path.with_name(f".part.{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(part)
+        part.replace(path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{path}: cannot be written: {reason}") from error
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,161 @@
+"""The figures of Braun's "Stick-slip kinetics", from the outputs of the runs of the same names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import xarray as xr
+from matplotlib.figure import Figure
+
+from mesoslip import plots, store
+from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.config import Config
+
+
+def configuration(tree: xr.DataTree) -> Config:
+    """The configuration of an output."""
+    return Config.from_toml(tree.attrs["configuration"])
+
+
+def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
+    """S20: the spring force in the stick-slip regime; an inset shows one slip."""
+    (tree,) = trees
+    figure = Figure(figsize=(6.5, 3.6))
+    axes = figure.subplots()
+    plots.draw_series(axes, tree, "spring_force", color="black")
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("spring force $F_d$ (µN)")
+    axes.set_xlim(0, tree["time"].max().item())
+    slip = plots.largest_slip(tree)
+    if slip is not None:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.6 * (high - low))
+        inset = axes.inset_axes((0.4, 0.62, 0.57, 0.36))
+        window = plots.slip_window(slip, before=0.5, after=9)
+        plots.draw_series(
+            inset, tree, "spring_force", window=window, time_unit=1e-3, color="black"
+        )
+        inset.set_xlabel(f"time after {window[0]:.3f} s (ms)", fontsize=7)
+        inset.tick_params(labelsize=7)
+    return figure
+
+
+def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
+    """S21: velocity (a), spring and contact force (b), detached contacts (c) during a slip."""
+    (tree,) = trees
+    figure = Figure(figsize=(4.5, 6))
+    velocity, force, detached = figure.subplots(3, 1, sharex=True)
+    slip = plots.largest_slip(tree)
+    if slip is not None:
+        window = plots.slip_window(slip, before=0.1, after=0.8)
+        for axes, name in ((velocity, "velocity"), (detached, "detached_contacts")):
+            plots.draw_series(axes, tree, name, window=window, time_unit=1e-3, color="black")
+        plots.draw_series(force, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT)
+        plots.draw_series(force, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING)
+        detached.set_xlabel(f"time after {window[0]:.4f} s (ms)")
+        force.legend()
+    velocity.set_ylabel("slider velocity (µm/s)")
+    force.set_ylabel("force (µN)")
+    detached.set_ylabel("detached contacts $N_d$")
+    for letter, axes in zip("abc", (velocity, force, detached), strict=True):
+        axes.set_title(f"({letter})", loc="left")
+    return figure
+
+
+def _stacked(trees: Sequence[xr.DataTree], label: Callable[[Config], str]) -> Figure:
+    """The spring force of several runs, one above the other."""
+    figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
+    panels = figure.subplots(len(trees), 1, sharex=True, squeeze=False)[:, 0]
+    for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
+        plots.draw_series(axes, tree, "spring_force", color="black")
+        axes.set_title(f"({letter}) {label(configuration(tree))}", loc="left")
+        axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
+        axes.set_ylabel("$F_d$ (µN)")
+    panels[-1].set_xlabel("time (s)")
+    panels[-1].set_xlim(0, max(tree["time"].max().item() for tree in trees))
+    return figure
+
+
+def delays(trees: Sequence[xr.DataTree]) -> Figure:
+    """S22: the spring force for different values of the delay time."""
+    return _stacked(trees, lambda config: rf"$\tau_d$ = {config.contacts.delay * 1e3:g} ms")
+
+
+def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
+    """S23: the spring force for different dispersions of the thresholds."""
+    return _stacked(
+        trees, lambda config: rf"$\Delta f_s/f_s$ = {config.contacts.threshold.relative_width:g}"
+    )
+
+
+def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
+    """S28: the spring force for different viscosities of the lubricant, during the first slip too."""
+    figure = Figure(figsize=(6.5, 3))
+    whole, detail = figure.subplots(1, 2, width_ratios=[2, 1])
+    for tree, style in zip(trees, ("-", "--", ":", "-."), strict=False):
+        rate = configuration(tree).contacts.drag_rate
+        label = rf"$\eta$ = {rate:.0e} s$^{{-1}}$"
+        plots.draw_series(whole, tree, "spring_force", linestyle=style, label=label)
+        slip = plots.largest_slip(tree)
+        if slip is not None:
+            start = slip["start_time"].item() - 5e-3
+            plots.draw_series(
+                detail,
+                tree,
+                "spring_force",
+                window=(start, start + 0.045),
+                time_unit=1e-3,
+                linestyle=style,
+            )
+    whole.set_xlabel("time (s)")
+    whole.set_ylabel("spring force $F_d$ (µN)")
+    whole.legend()
+    detail.set_xlabel("time in the first slip (ms)")
+    return figure
+
+
+@dataclass(frozen=True)
+class SourceFigure:
+    """A figure of the source: the runs it needs, and the function that draws it."""
+
+    runs: tuple[str, ...]
+    draw: Callable[[Sequence[xr.DataTree]], Figure]
+
+
+FIGURES = {
+    "S20": SourceFigure(("S20",), stick_slip),
+    "S21": SourceFigure(("S21",), slip_details),
+    "S22": SourceFigure(("S22a", "S22b", "S22c", "S22d"), delays),
+    "S23": SourceFigure(("S23a", "S23b", "S23c"), dispersions),
+    "S28": SourceFigure(("S28a", "S28b", "S28c"), viscosities),
+}
+
+
+def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
+    """Draw figures from outputs; see `mesoslip.figures`."""
+    names = tuple(names) or tuple(FIGURES)
+    unknown = [name for name in names if name not in FIGURES]
+    if unknown:
+        known = ", ".join(FIGURES)
+        raise ConfigError([Problem("", name, f"no such figure; choose of {known}") for name in unknown])
+    missing = [
+        path
+        for name in names
+        for path in (outputs / f"{run}.nc" for run in FIGURES[name].runs)
+        if not path.exists()
+    ]
+    if missing:
+        targets = " ".join(str(path) for path in missing)
+        raise FileError(f"outputs are missing; make them first: make {targets}")
+    paths = []
+    for name in names:
+        trees = [store.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
+        with mpl.rc_context(plots.STYLE):
+            figure = FIGURES[name].draw(trees)
+        path = folder / f"{name}.png"
+        plots.save(figure, path)
+        paths.append(path)
+    return paths

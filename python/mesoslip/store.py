@@ -1,0 +1,258 @@
+"""Output files: netCDF-4 with the layout that `mesoslip.run` returns in memory."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from mesoslip import _build, engine
+from mesoslip.config import Config
+from mesoslip.errors import FileError
+
+if TYPE_CHECKING:
+    from mesoslip.engine import Realization
+
+# Name: units, long name.
+VARIABLES = {
+    "time": ("s", "time"),
+    "drive_displacement": ("m", "displacement of the drive"),
+    "displacement": ("m", "displacement of the slider"),
+    "velocity": ("m s-1", "velocity of the slider"),
+    "spring_force": ("N", "force of the drive on the slider"),
+    "contact_force": ("N", "force of the slider on the contacts"),
+    "detached_contacts": ("1", "number of detached contacts"),
+    "realization": ("1", "number of the realization"),
+    "slip": ("1", "number of the slip within its realization"),
+    "start_time": ("s", "time of the greatest spring force before the slip"),
+    "end_time": ("s", "time of the least spring force after the slip"),
+    "force_before": ("N", "spring force at the start of the slip"),
+    "force_after": ("N", "spring force at the end of the slip"),
+    "force_drop": ("N", "drop of the spring force in the slip"),
+    "peak_velocity": ("m s-1", "greatest velocity of the slider in the slip"),
+    "contacts_broken": ("1", "breaks of contacts in the slip"),
+    "breaks": ("1", "breaks of contacts in the run"),
+    "energy_residual": ("1", "what the energy balance lacks, relative to the work of the drive"),
+    "kernel_seconds": ("s", "computing time of the kernel"),
+    "drive_work": ("J", "work done by the drive"),
+    "slider_energy": ("J", "energy of the slider and its spring at the end"),
+    "contact_energy": ("J", "elastic energy of the contacts at the end"),
+    "damping_loss": ("J", "energy lost to the damping of the setup"),
+    "drag_loss": ("J", "energy lost to the drag of detached contacts"),
+    "break_loss": ("J", "elastic energy lost by breaking contacts"),
+    "birth_gain": ("J", "elastic energy of contacts at their attaching"),
+}
+
+
+def variable(name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
+    """A variable with its units and long name."""
+    units, long_name = VARIABLES[name]
+    return xr.Variable(dimensions, values, {"units": units, "long_name": long_name})
+
+
+def build(
+    config: Config, realizations: Sequence[Realization], *, complete: bool, wall_seconds: float
+) -> xr.DataTree:
+    """Put the results of a run together.
+
+    Returns
+    -------
+    xarray.DataTree
+        Root: the trace, dimensions (realization, time), and figures for each realization. Groups:
+        ``slips`` (slip), ``slip_traces`` (sample), ``energy`` (realization). What an interrupted run
+        did not come to is NaN in the trace.
+    """
+    traces = [one.trace for one in realizations]
+    longest = max(traces, key=len)
+    columns = engine.TRACE_COLUMNS
+    samples = np.full((len(columns), len(traces), len(longest)), np.nan)
+    for number, trace in enumerate(traces):
+        samples[:, number, : len(trace)] = trace.T
+    each = ("realization",)
+    root = xr.Dataset(
+        {
+            name: variable(name, ("realization", "time"), samples[column])
+            for column, name in enumerate(columns)
+            if name != "time"
+        }
+        | {
+            "breaks": variable("breaks", each, [one.breaks for one in realizations]),
+            "energy_residual": variable(
+                "energy_residual", each, [one.energy_residual for one in realizations]
+            ),
+            "kernel_seconds": variable(
+                "kernel_seconds", each, [one.kernel_seconds for one in realizations]
+            ),
+        },
+        coords={
+            "realization": variable("realization", each, [one.number for one in realizations]),
+            "time": variable("time", ("time",), longest[:, 0]),
+        },
+        attrs=attributes(config, realizations, complete=complete, wall_seconds=wall_seconds),
+    )
+    if complete:
+        root["detached_contacts"] = root["detached_contacts"].astype(np.int32)
+
+    groups = {"slips": slip_catalogue(realizations), "energy": energy_balance(realizations)}
+    if config.output.slip_interval is not None and engine.slip_velocity(config) > 0:
+        groups["slip_traces"] = slip_traces(realizations)
+    return xr.DataTree(root, children={name: xr.DataTree(data) for name, data in groups.items()})
+
+
+def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
+    """All slips of all realizations, dimension ``slip``."""
+    # As a coordinate, here and below, the realization is not hidden by that of the root.
+    rows = np.concatenate([one.slips for one in realizations])
+    owner = np.concatenate([np.full(len(one.slips), one.number) for one in realizations])
+    values = dict(zip(engine.SLIP_COLUMNS, rows.T, strict=True))
+    values["force_drop"] = values["force_before"] - values["force_after"]
+    order = ("start_time", "end_time", "force_before", "force_after", "force_drop", "peak_velocity")
+    return xr.Dataset(
+        {"realization": variable("realization", ("slip",), owner)}
+        | {name: variable(name, ("slip",), values[name]) for name in order}
+        | {
+            "contacts_broken": variable(
+                "contacts_broken", ("slip",), values["contacts_broken"].astype(np.int64)
+            )
+        }
+    ).set_coords("realization")
+
+
+def slip_traces(realizations: Sequence[Realization]) -> xr.Dataset:
+    """The finer traces of all slips one after another, dimension ``sample``."""
+    rows = np.concatenate([one.slip_trace for one in realizations])
+    owner = np.concatenate([np.full(len(one.slip_trace), one.number) for one in realizations])
+    data = {
+        name: variable(name, ("sample",), rows[:, column])
+        for column, name in enumerate(engine.TRACE_COLUMNS)
+    }
+    data["slip"] = variable("slip", ("sample",), rows[:, -1].astype(np.int32))
+    data["realization"] = variable("realization", ("sample",), owner)
+    data["detached_contacts"] = variable("detached_contacts", ("sample",), rows[:, 6].astype(np.int32))
+    return xr.Dataset(data).set_coords(["realization", "slip", "time"])
+
+
+def energy_balance(realizations: Sequence[Realization]) -> xr.Dataset:
+    """The terms of the energy balance of each realization, from the start of the run [J]."""
+    terms = np.array([one.energy for one in realizations]).T
+    return xr.Dataset(
+        {
+            name: variable(name, ("realization",), terms[column])
+            for column, name in enumerate(engine.ENERGY_COLUMNS)
+            if name != "residual"
+        }
+    )
+
+
+def attributes(
+    config: Config, realizations: Sequence[Realization], *, complete: bool, wall_seconds: float
+) -> dict[str, Any]:
+    """Attributes of an output: what was run, by what, and how it went."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    program = f"mesoslip {version('mesoslip')}"
+    reached = min(one.time for one in realizations)
+    return {
+        "Conventions": "CF-1.11, ACDD-1.3",
+        "title": config.title or "Stick-slip of a multicontact interface",
+        "summary": "A slider pulled over contacts with random breaking thresholds, simulated with "
+        "the earthquake-like model of multicontact friction",
+        "keywords": "friction, stick-slip, multicontact interface, earthquake-like model",
+        "source": program,
+        "history": f"{now} {program}: run",
+        "date_created": now,
+        "configuration": config.to_toml(),
+        "seed": config.run.seed,
+        "complete": "true" if complete else "false",
+        "comment": "" if complete else f"interrupted; every realization came to {reached:.6g} s",
+        "program_version": version("mesoslip"),
+        "commit": _build.COMMIT,
+        "compiler": _build.COMPILER,
+        "library_versions": ", ".join(
+            [f"python {platform.python_version()}"]
+            + [f"{name} {version(name)}" for name in ("numpy", "xarray", "netCDF4", "pydantic")]
+        ),
+        "break_count": sum(one.breaks for one in realizations),
+        "advance_count": sum(one.advances for one in realizations),
+        "energy_residual": max((one.energy_residual for one in realizations), key=abs),
+        "wall_seconds": wall_seconds,
+    }
+
+
+def check_writable(path: Path) -> None:
+    """Make sure, before a run, that its output can be written.
+
+    Raises
+    ------
+    FileError
+        If the path is a directory, or its folder cannot be made or written to.
+    """
+    if path.is_dir():
+        raise FileError(f"{path}: is a directory; give the name of a file such as {path / 'out.nc'}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.with_name(f".{path.name}.{os.getpid()}")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def write(tree: xr.DataTree, path: Path) -> None:
+    """Write an output; its name appears only when it is whole.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    encoding = {
+        group.path: {
+            name: {"zlib": True, "complevel": 1, "shuffle": True}
+            for name, data in group.data_vars.items()
+            if data.size > 1000
+        }
+        for group in tree.subtree
+    }
+    try:
+        tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
+        part.replace(path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def read(path: str | Path) -> xr.DataTree:
+    """Read an output into memory.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it is not an output of mesoslip, or it is damaged.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileError(f"{path}: is a directory, not an output file")
+    if not path.exists():
+        raise FileError(f"{path}: no such file")
+    try:
+        with xr.open_datatree(path, engine="netcdf4") as tree:
+            tree = tree.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
+    if "configuration" not in tree.attrs or "spring_force" not in tree.data_vars:
+        raise FileError(f"{path}: not an output of mesoslip run")
+    return tree
+
+
+def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:
+    """The configuration of an output, to run it again, with changes laid over it."""
+    return Config.from_toml(read(path).attrs["configuration"], str(path), overrides)

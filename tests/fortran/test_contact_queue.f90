@@ -1,0 +1,92 @@
+!> The queue against a plain search for the least key, through many shapes of load.
+program test_contact_queue
+   use mesoslip_contact_queue, only: contact_queue_type, new_contact_queue, no_key
+   use mesoslip_contact_record, only: ahead_coordinate, record_length, row_limit, row_origin, &
+      & row_stiffness
+   use mesoslip_errors, only: error_type
+   use mesoslip_kinds, only: i8, wp
+   use mesoslip_random, only: uniform_pair
+   use testing, only: check, finish
+   implicit none
+
+   call exercise(1, 1.0_wp, 0.5_wp, 1.0_wp, 1.0_wp, "one contact")
+   call exercise(50, 1.0_wp, 0.5_wp, 1.0_wp, 1.0_wp, "few contacts")
+   call exercise(3000, 1.0_wp, 0.5_wp, 1.0_wp, 1.0_wp, "keys spread evenly")
+   call exercise(3000, 1.0_wp, 0.999999_wp, 1.0_wp, -1.0_wp, "keys in one bucket")
+   call exercise(3000, 1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, "keys right ahead of the slider")
+   call exercise(1000, 1.0_wp, 0.5_wp, 50.0_wp, -1.0_wp, "keys beyond the ring")
+   call exercise(1000, 0.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, "equal keys")
+   call finish()
+
+contains
+
+   !> Take contacts out and put them in again farther ahead, many times over.
+   subroutine exercise(count, spread, least, stretch, direction, name)
+      !> Contacts
+      integer, intent(in) :: count
+      !> Keys are ahead of the last one by stretch (least + spread times a deviate)
+      real(wp), intent(in) :: spread, least, stretch, direction
+      character(len=*), intent(in) :: name
+
+      type(contact_queue_type) :: queue
+      type(error_type), allocatable :: error
+      real(wp) :: record(record_length, count), key, position, uniform(2)
+      integer :: contact, expected, event, other
+      logical :: in_order
+
+      call new_contact_queue(queue, count, 1.5_wp, error)
+      call queue%clear(direction, 0.0_wp)
+      record = 0.0_wp
+      do contact = 1, count
+         call uniform_pair(1_i8, 0_i8, int(contact, i8), 0_i8, 0_i8, uniform)
+         call put(queue, record, direction, contact, stretch * (least + spread * uniform(1)))
+      end do
+
+      position = 0.0_wp
+      in_order = .true.
+      do event = 1, 6 * count
+         key = queue%first_key
+         expected = 0
+         do other = 1, count
+            if (record(row_stiffness, other) <= 0.0_wp) cycle
+            if (expected == 0) then
+               expected = other
+            else if (ahead_coordinate(record(:, other), direction) &
+               & < ahead_coordinate(record(:, expected), direction)) then
+               expected = other
+            end if
+         end do
+         call queue%pop(record, contact)
+         in_order = in_order .and. contact == expected &
+            & .and. abs(ahead_coordinate(record(:, contact), direction) - key) <= 0.0_wp
+         record(row_stiffness, contact) = 0.0_wp
+         call uniform_pair(1_i8, 0_i8, int(contact, i8), int(event, i8), 0_i8, uniform)
+         ! Now and then the slider has gone back before the contact attaches.
+         position = key
+         if (uniform(2) < 0.02_wp) position = key - 0.4_wp * stretch
+         call put(queue, record, direction, contact, &
+            & position + stretch * (least + spread * uniform(1)))
+      end do
+      call check(in_order, "least key first: " // name)
+      call check(queue%count == count, "none lost: " // name)
+      do event = 1, count
+         call queue%pop(record, contact)
+      end do
+      call check(queue%count == 0 .and. queue%first_key >= no_key, "emptied: " // name)
+
+   end subroutine exercise
+
+   !> Pin a contact so that it breaks at a coordinate.
+   subroutine put(queue, record, direction, contact, coordinate)
+      type(contact_queue_type), intent(inout) :: queue
+      real(wp), intent(inout) :: record(:, :)
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: direction, coordinate
+
+      record(row_limit, contact) = 1.0_wp
+      record(row_origin, contact) = direction * (coordinate - 1.0_wp)
+      record(row_stiffness, contact) = 1.0_wp
+      call queue%insert(contact, ahead_coordinate(record(:, contact), direction))
+   end subroutine put
+
+end program test_contact_queue

@@ -1,0 +1,107 @@
+!> CVODE is there and right: a damped oscillator against its closed form.
+module oscillator
+   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
+   use fsundials_nvector_mod, only: FN_VGetArrayPointer, N_Vector
+   implicit none
+   private
+
+   public :: oscillator_type, right_side
+
+   !> x'' + 2 damping x' + frequency**2 x = 0
+   type :: oscillator_type
+      !> Both in 1/s
+      real(c_double) :: damping = 0.1_c_double, frequency = 2.0_c_double
+   end type oscillator_type
+
+contains
+
+   !> Right side of the first-order system, for CVODE.
+   function right_side(time, state, rate, user_data) bind(c) result(status)
+      real(c_double), value :: time
+      type(N_Vector) :: state, rate
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+
+      type(oscillator_type), pointer :: parameters
+      real(c_double), pointer :: y(:), dy(:)
+
+      call c_f_pointer(user_data, parameters)
+      y => FN_VGetArrayPointer(state)
+      dy => FN_VGetArrayPointer(rate)
+      dy(1) = y(2)
+      dy(2) = -2 * parameters%damping * y(2) - parameters%frequency**2 * y(1)
+      status = 0
+   end function right_side
+
+end module oscillator
+
+program test_cvode
+   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_funloc, c_int, c_loc, c_long, &
+      & c_null_ptr, c_ptr
+   use fcvode_mod, only: CV_ADAMS, CV_NORMAL, FCVode, FCVodeCreate, FCVodeFree, FCVodeGetDky, &
+      & FCVodeInit, FCVodeSetMaxNumSteps, FCVodeSetNonlinearSolver, FCVodeSetUserData, &
+      & FCVodeSStolerances
+   use fnvector_serial_mod, only: FN_VMake_Serial
+   use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
+   use fsundials_nonlinearsolver_mod, only: FSUNNonlinSolFree, SUNNonlinearSolver
+   use fsundials_nvector_mod, only: FN_VDestroy, N_Vector
+   use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
+   use mesoslip_kinds, only: wp
+   use mesoslip_sundials_cvode, only: sundials_version
+   use oscillator, only: oscillator_type, right_side
+   use testing, only: check, check_close, finish
+   implicit none
+
+   real(c_double), parameter :: end_time = 20.0_c_double
+   type(oscillator_type), target :: parameters
+   real(c_double), target :: values(2), middle(2)
+   real(c_double) :: time(1)
+   type(N_Vector), pointer :: state, dense
+   type(SUNNonlinearSolver), pointer :: solver
+   type(c_ptr) :: context, memory
+   integer(c_int) :: status
+
+   values = [1.0_c_double, 0.0_c_double]
+   status = FSUNContext_Create(c_null_ptr, context)
+   state => FN_VMake_Serial(2_c_long, values, context)
+   dense => FN_VMake_Serial(2_c_long, middle, context)
+   memory = FCVodeCreate(CV_ADAMS, context)
+   call check(c_associated(memory), "CVODE is created")
+   status = FCVodeInit(memory, c_funloc(right_side), 0.0_c_double, state)
+   status = FCVodeSetUserData(memory, c_loc(parameters))
+   status = FCVodeSStolerances(memory, 1.0e-11_c_double, 1.0e-12_c_double)
+   status = FCVodeSetMaxNumSteps(memory, 100000_c_long)
+   solver => FSUNNonlinSol_FixedPoint(state, 0_c_int, context)
+   status = FCVodeSetNonlinearSolver(memory, solver)
+
+   time = 0.0_c_double
+   status = FCVode(memory, end_time, state, time, CV_NORMAL)
+   call check(status == 0, "CVODE integrates")
+   call check_close(values(1), exact(end_time), 1.0e-8_wp, "displacement at the end")
+   status = FCVodeGetDky(memory, end_time - 1.0e-3_c_double, 0_c_int, dense)
+   call check(status == 0, "dense output")
+   call check_close(middle(1), exact(end_time - 1.0e-3_wp), 1.0e-8_wp, "displacement in between")
+   call check(index(sundials_version(), ".") > 0, "SUNDIALS tells its version")
+
+   call FCVodeFree(memory)
+   status = FSUNNonlinSolFree(solver)
+   call FN_VDestroy(state)
+   call FN_VDestroy(dense)
+   status = FSUNContext_Free(context)
+   call finish()
+
+contains
+
+   !> Closed form of the displacement.
+   pure function exact(at) result(displacement)
+      real(wp), intent(in) :: at
+      real(wp) :: displacement
+
+      real(wp) :: frequency
+
+      frequency = sqrt(parameters%frequency**2 - parameters%damping**2)
+      displacement = exp(-parameters%damping * at) &
+         & * (cos(frequency * at) + parameters%damping / frequency * sin(frequency * at))
+   end function exact
+
+end program test_cvode

@@ -1,0 +1,57 @@
+!> Philox 4x32-10 against the known answers published with Random123, and the keying of draws.
+program test_random
+   use mesoslip_kinds, only: i8, wp
+   use mesoslip_random, only: philox4x32, uniform_pair
+   use testing, only: check, check_close, finish
+   implicit none
+
+   integer(i8), parameter :: ones = int(z'FFFFFFFF', i8)
+   integer, parameter :: draws = 100000
+   real(wp) :: pair(2), other(2), total, squares
+   integer :: draw
+
+   call known_answer([0_i8, 0_i8, 0_i8, 0_i8], [0_i8, 0_i8], &
+      & [int(z'6627E8D5', i8), int(z'E169C58D', i8), int(z'BC57AC4C', i8), int(z'9B00DBD8', i8)], &
+      & "zeros")
+   call known_answer([ones, ones, ones, ones], [ones, ones], &
+      & [int(z'408F276D', i8), int(z'41C83B0E', i8), int(z'A20BC7C6', i8), int(z'6D5451FD', i8)], &
+      & "ones")
+   call known_answer( &
+      & [int(z'243F6A88', i8), int(z'85A308D3', i8), int(z'13198A2E', i8), int(z'03707344', i8)], &
+      & [int(z'A4093822', i8), int(z'299F31D0', i8)], &
+      & [int(z'D16CFE09', i8), int(z'94FDCCEB', i8), int(z'5001E420', i8), int(z'24126EA1', i8)], &
+      & "digits of pi")
+
+   call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 0_i8, pair)
+   call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8 + 2_i8**32, 0_i8, other)
+   call check(all(abs(pair - other) > 0.0_wp), "renewals beyond 2**32 are told apart")
+   call uniform_pair(7_i8 + 2_i8**40, 2_i8, 5_i8, 3_i8, 0_i8, other)
+   call check(all(abs(pair - other) > 0.0_wp), "seeds beyond 2**32 are told apart")
+   call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 1_i8, other)
+   call check(all(abs(pair - other) > 0.0_wp), "attempts are told apart")
+
+   total = 0.0_wp
+   squares = 0.0_wp
+   do draw = 1, draws
+      call uniform_pair(1_i8, 0_i8, int(draw, i8), 0_i8, 0_i8, pair)
+      total = total + sum(pair)
+      squares = squares + sum(pair**2)
+   end do
+   call check_close(total / (2 * draws), 0.5_wp, 0.003_wp, "mean of the deviates")
+   call check_close(squares / (2 * draws), 1.0_wp / 3.0_wp, 0.003_wp, "mean square of the deviates")
+   call finish()
+
+contains
+
+   !> Check one published answer.
+   subroutine known_answer(counter, key, expected, name)
+      integer(i8), intent(in) :: counter(4), key(2), expected(4)
+      character(len=*), intent(in) :: name
+
+      integer(i8) :: word(4)
+
+      call philox4x32(counter, key, word)
+      call check(all(word == expected), "known answer: " // name)
+   end subroutine known_answer
+
+end program test_random

@@ -1,0 +1,119 @@
+!> The rigid slider against closed forms, and its ends of windows.
+program test_slider_rigid
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_kinds, only: wp
+   use mesoslip_slider_rigid, only: slider_rigid_type
+   use testing, only: check, check_close, finish
+   implicit none
+
+   real(wp), parameter :: frequency = 3.0_wp, drive_velocity = 0.7_wp
+
+   call oscillates()
+   call stops_at_crossing()
+   call turns_short_of_crossing()
+   call stays_at_rest()
+   call finish()
+
+contains
+
+   !> From rest under a drive of constant velocity, x = v (t - sin(w t)/w).
+   subroutine oscillates()
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      real(wp) :: time
+
+      slider = slider_rigid_type(mass=2.0_wp, stiffness=2.0_wp * frequency**2)
+      call slider%start(law)
+      call slider%drive(drive_velocity)
+      window%end_time = 10.0_wp
+      do while (slider%time < window%end_time)
+         call slider%advance(law, window)
+      end do
+      time = slider%time
+      call check(abs(time - window%end_time) <= 0.0_wp, "the end of the window is met to the bit")
+      call check_close(slider%displacement, drive_velocity * (time - sin(frequency * time) &
+         & / frequency), 1.0e-13_wp, "displacement of a free oscillator")
+      call check_close(slider%velocity, drive_velocity * (1.0_wp - cos(frequency * time)), &
+         & 1.0e-13_wp, "velocity of a free oscillator")
+      call check_close(slider%drive_work%high, slider%energy(), 1.0e-12_wp, "energy is conserved")
+   end subroutine oscillates
+
+   !> A crossing is met to the bit in displacement, and to rounding in time.
+   subroutine stops_at_crossing()
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+
+      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
+      call slider%start(law)
+      call slider%drive(drive_velocity)
+      window%end_time = 10.0_wp
+      window%upper = drive_velocity * (0.5_wp - sin(0.5_wp * frequency) / frequency)
+      do while (slider%displacement < window%upper)
+         call slider%advance(law, window)
+      end do
+      call check(abs(slider%displacement - window%upper) <= 0.0_wp, "displacement of a crossing")
+      call check_close(slider%time, 0.5_wp, 1.0e-13_wp, "time of a crossing")
+   end subroutine stops_at_crossing
+
+   !> An oscillation of amplitude 1 about 0 stays inside a window slightly wider, and meets one
+   !> slightly narrower, on either side.
+   subroutine turns_short_of_crossing()
+      integer :: side
+
+      do side = -1, 1, 2
+         call check(reaches(1.0_wp + 1.0e-9_wp, side) > 9.0_wp, "no crossing beyond the turning point")
+         call check_close(reaches(1.0_wp - 1.0e-9_wp, side), &
+            & (acos(-1.0_wp) - acos(1.0_wp - 1.0e-9_wp)) / frequency, 1.0e-8_wp, &
+            & "crossing right before the turning point")
+      end do
+   end subroutine turns_short_of_crossing
+
+   !> Time at which a free oscillation from one side leaves a window on the other; 10 if never.
+   function reaches(limit, side) result(time)
+      real(wp), intent(in) :: limit
+      integer, intent(in) :: side
+      real(wp) :: time
+
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+
+      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
+      call slider%start(law)
+      call slider%drive(0.0_wp)
+      slider%displacement = -side
+      window%end_time = 10.0_wp
+      if (side > 0) then
+         window%upper = limit
+      else
+         window%lower = -limit
+      end if
+      do while (slider%time < window%end_time .and. slider%displacement < window%upper &
+         & .and. slider%displacement > window%lower)
+         call slider%advance(law, window)
+      end do
+      time = slider%time
+   end function reaches
+
+   !> At rest and in balance under a drive at rest nothing happens.
+   subroutine stays_at_rest()
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      integer :: advances
+
+      law = interface_law_type(stiffness=5.0_wp, offset=-1.0_wp, drag=0.1_wp)
+      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2, damping=0.4_wp)
+      call slider%start(law)
+      window%end_time = 1.0_wp
+      window%upper = 1.0e-300_wp
+      do advances = 1, 100
+         call slider%advance(law, window)
+      end do
+      call check(abs(slider%velocity) <= 1.0e-16_wp, "a balanced slider stays at rest")
+      call check(slider%time >= 1.0_wp, "and time passes")
+   end subroutine stays_at_rest
+
+end program test_slider_rigid

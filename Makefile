@@ -1,61 +1,71 @@
-# mesoslip: `make demo` and `make test` need nothing but make, git and Python 3.11.
+# mesoslip: `make demo` and `make test` need nothing but make, git and Python 3.11 or later.
 
 PYTHON ?= python3
+# Options of meson.options, after make clean: MESON_ARGS=-Dnative=true
+MESON_ARGS ?=
 VENV := .venv
-UV := $(VENV)/bin/uv
 MESOSLIP := $(VENV)/bin/mesoslip
+UV := $(VENV)/bin/uv
+
+# Stamps: the locked Python packages are there, and mesoslip itself, built from these sources.
 ENVIRONMENT := $(VENV)/.environment
 INSTALLED := $(VENV)/.installed
-SYSTEM := gcc gfortran libsundials-dev libsundials-fortran-dev
 
-SOURCES := $(wildcard meson.build meson.options pyproject.toml fortran/* python/* python/mesoslip/*)
-FIGURE_RUNS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml))
+# .git/logs/HEAD, as outputs tell the commit of the program.
+SOURCES := meson.build meson.options pyproject.toml \
+  $(wildcard fortran/meson.build fortran/*.f90 python/meson.build python/f2cmap) \
+  $(wildcard python/mesoslip/*.py python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
+
+SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
+FIGURE_OUTPUTS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml))
+
+# meson and meson-python find ninja here.
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+export UV_PROJECT_ENVIRONMENT := $(CURDIR)/$(VENV)
+export UV_PYTHON_DOWNLOADS := never
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+.PRECIOUS: out/%.nc
+.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures bench \
+  reference lint clean
 
-.PHONY: help
 help: ## Show the targets
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1\t\2/' | expand -t 16
+	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
 
-.PHONY: setup
 setup: $(INSTALLED) ## Install what is missing, and build
+	@:
 
-.PHONY: demo
 demo: out/klein.nc out/klein.png ## Simulate Klein's experiment, and draw it
+	@:
 
-.PHONY: test
-test: test-python test-fortran test-debug ## Build, and pass all tests
+test: test-fortran test-debug test-python ## Build, and pass all tests
 
-.PHONY: test-python
 test-python: $(INSTALLED)
 	$(VENV)/bin/pytest -n 2 -q
 
-.PHONY: test-fortran
-test-fortran: build/test/build.ninja
-	$(VENV)/bin/meson test -C build/test --print-errorlogs
+test-fortran: build/release/build.ninja
+	@ninja --quiet -C build/release
+	$(VENV)/bin/meson test -C build/release --no-rebuild --print-errorlogs
 
-.PHONY: test-debug
 test-debug: build/debug/build.ninja ## Fortran unit tests with all run-time checks
-	$(VENV)/bin/meson test -C build/debug --print-errorlogs
+	@ninja --quiet -C build/debug
+	$(VENV)/bin/meson test -C build/debug --no-rebuild --print-errorlogs
 
-.PHONY: test-sanitize
-test-sanitize: build/sanitize/build.ninja ## Fortran unit tests under the address and undefined-behaviour sanitizers
-	ASAN_OPTIONS=detect_leaks=0 $(VENV)/bin/meson test -C build/sanitize --print-errorlogs
+test-sanitize: build/sanitize/build.ninja ## Fortran unit tests with the sanitizers
+	@ninja --quiet -C build/sanitize
+	$(VENV)/bin/meson test -C build/sanitize --no-rebuild --print-errorlogs
 
-.PHONY: figures
-figures: $(FIGURE_RUNS) ## Draw the source's figures into out/figures
+figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/figures
 	$(MESOSLIP) figures -o out/figures
 
-.PHONY: bench
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py
 
-.PHONY: reference
 reference: $(INSTALLED) ## Write the reference outputs of the tests anew, on purpose only
 	$(VENV)/bin/python tests/python/make_reference.py
 
-.PHONY: lint
 lint: $(INSTALLED) ## Check the style of all sources
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
@@ -63,11 +73,10 @@ lint: $(INSTALLED) ## Check the style of all sources
 	$(VENV)/bin/fortitude check fortran tests/fortran
 	$(VENV)/bin/codespell
 
-.PHONY: clean
 clean: ## Remove the environment, what was built, and outputs
 	rm -rf build out $(VENV)
 
-# An output depends on its run, not on the program: a new build does not make hours of outputs stale.
+# An output depends on its run, not on the program: a build does not make hours of outputs stale.
 out/%.nc: runs/%.toml | $(INSTALLED)
 	$(MESOSLIP) run $< -o $@
 
@@ -75,29 +84,31 @@ out/%.png: out/%.nc | $(INSTALLED)
 	$(MESOSLIP) plot $< -o $@
 
 # The runs of the source's figures are variations of Klein's.
-$(FIGURE_RUNS): runs/klein.toml
+$(FIGURE_OUTPUTS): runs/klein.toml
 
-$(ENVIRONMENT): uv.lock tools/system-packages
-	PYTHON=$(PYTHON) tools/system-packages $(SYSTEM)
-	test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
-	test -x $(UV) || $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check uv
-	$(UV) sync --quiet --locked --no-install-project
+$(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
+	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)
+	@echo "Installing Python packages into $(VENV)"
+	@test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
+	@test -x $(UV) || $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check uv
+	@$(UV) sync --quiet --locked --no-install-project
 	@touch $@
 
 $(INSTALLED): $(ENVIRONMENT) $(SOURCES)
+	@echo "Building and installing mesoslip"
 	@mkdir -p build/package
-	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(UV) pip install --quiet --python $(VENV)/bin/python \
-	  --no-deps --no-build-isolation --reinstall-package mesoslip -Cbuild-dir=build/package .
+	@$(UV) pip install --quiet --python $(VENV)/bin/python --no-deps --no-build-isolation \
+	  --reinstall-package mesoslip -Cbuild-dir=build/package \
+	  $(addprefix -Csetup-args=,$(MESON_ARGS)) .
 	@touch $@
 
-# Debug information costs nothing; checks and sanitizers need their own builds.
-MESON_SETUP = PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(VENV)/bin/meson setup --reconfigure -Dpython=false -Dtests=true
-
-build/test/build.ninja: $(ENVIRONMENT) meson.build meson.options fortran/meson.build tests/fortran/meson.build
-	$(MESON_SETUP) build/test >/dev/null
-
-build/debug/build.ninja: $(ENVIRONMENT) meson.build meson.options fortran/meson.build tests/fortran/meson.build
-	$(MESON_SETUP) --buildtype=debug -Db_lto=false -Dchecks=true build/debug >/dev/null
-
-build/sanitize/build.ninja: $(ENVIRONMENT) meson.build meson.options fortran/meson.build tests/fortran/meson.build
-	$(MESON_SETUP) --buildtype=debug -Db_lto=false -Db_sanitize=address,undefined -Db_lundef=false build/sanitize >/dev/null
+# The Fortran tests, without Python, in three profiles.
+build/release/build.ninja: PROFILE := --buildtype=release
+build/debug/build.ninja: PROFILE := --buildtype=debug -Db_lto=false -Dchecks=true
+build/sanitize/build.ninja: PROFILE := --buildtype=debug -Db_lto=false -Db_sanitize=address,undefined \
+  -Db_lundef=false
+build/%/build.ninja: Makefile | $(ENVIRONMENT)
+	@mkdir -p $(@D)
+	@meson setup --reconfigure -Dpython=false -Dtests=true $(PROFILE) $(MESON_ARGS) $(@D) \
+	  >$(@D)/setup.log || { cat $(@D)/setup.log; exit 1; }
+	@touch $@

@@ -67,6 +67,8 @@ module mesoslip_recorder
       integer(i8), private :: slip = 0
       !> Samples of the present slip's trace so far
       integer(i8), private :: slip_samples = 0
+      !> Time of the next one [s]
+      real(wp), private :: next_slip_sample = huge(1.0_wp)
       real(wp), private :: sense = 1.0_wp, last_excess = 0.0_wp, last_fast = 0.0_wp
       real(wp), private :: start_time = 0.0_wp, end_time = 0.0_wp, force_before = 0.0_wp
       real(wp), private :: force_after = 0.0_wp, peak_velocity = 0.0_wp, last_acceleration = 0.0_wp
@@ -87,7 +89,7 @@ module mesoslip_recorder
       procedure :: finish
       !> Put the state into an archive or take it out
       procedure :: exchange
-      procedure, private :: record_slip, begin_fast, follow_slip, close_slip, sample_slip
+      procedure, private :: begin_fast, follow_slip, close_slip, take_samples, take_slip_samples
    end type recorder_type
 
 contains
@@ -131,26 +133,10 @@ contains
       !> Breaks before and during the advance
       integer(i8), intent(in) :: breaks
 
-      do while (self%next_sample <= slider%time)
-         self%trace_count = self%trace_count + 1
-         self%trace(:, self%trace_count) = sample(slider%observe(self%next_sample), detached)
-         self%samples = self%samples + 1
-         self%next_sample = real(self%samples, wp) * self%parameters%interval
-         ! The end of the run is a sample if rounding alone keeps it from being one.
-         if (abs(self%next_sample - self%parameters%duration) <= self%parameters%interval * tiny_part) &
-            & self%next_sample = self%parameters%duration
-      end do
-      if (self%parameters%slip_velocity > 0.0_wp) call self%record_slip(slider, detached, breaks)
-   end subroutine record
-
-   !> Follow the slips through the last advance of a slider.
-   subroutine record_slip(self, slider, detached, breaks)
-      class(recorder_type), intent(inout) :: self
-      class(slider_type), intent(in) :: slider
-      integer, intent(in) :: detached
-      integer(i8), intent(in) :: breaks
-
       real(wp) :: excess, start_excess
+
+      if (self%next_sample <= slider%time) call self%take_samples(slider, detached)
+      if (self%parameters%slip_velocity <= 0.0_wp) return
 
       if (self%phase == phase_slow .and. abs(slider%drive_velocity) > 0.0_wp) then
          self%sense = sign(1.0_wp, slider%drive_velocity)
@@ -158,12 +144,12 @@ contains
       start_excess = self%last_excess
       excess = self%sense * (slider%velocity - slider%drive_velocity)
       self%last_excess = excess
-
       if (self%phase == phase_slow) then
          if (excess <= 0.0_wp) return
          call self%begin_fast(slider, start_excess, breaks)
       end if
-      call self%sample_slip(slider, detached)
+
+      if (self%next_slip_sample <= slider%time) call self%take_slip_samples(slider, detached)
       if (self%phase == phase_fast) then
          if (excess > self%parameters%slip_velocity) then
             self%phase = phase_slip
@@ -176,7 +162,24 @@ contains
       if (self%phase == phase_slip) then
          call self%follow_slip(slider, start_excess, excess, detached, breaks)
       end if
-   end subroutine record_slip
+   end subroutine record
+
+   !> Take the samples of the trace that the last advance of a slider came past.
+   subroutine take_samples(self, slider, detached)
+      class(recorder_type), intent(inout) :: self
+      class(slider_type), intent(in) :: slider
+      integer, intent(in) :: detached
+
+      do while (self%next_sample <= slider%time)
+         self%trace_count = self%trace_count + 1
+         self%trace(:, self%trace_count) = sample(slider%observe(self%next_sample), detached)
+         self%samples = self%samples + 1
+         self%next_sample = real(self%samples, wp) * self%parameters%interval
+         ! The end of the run is a sample if rounding alone keeps it from being one.
+         if (abs(self%next_sample - self%parameters%duration) &
+            & <= self%parameters%interval * tiny_part) self%next_sample = self%parameters%duration
+      end do
+   end subroutine take_samples
 
    !> The slider has become faster than the drive: a slip may start here.
    subroutine begin_fast(self, slider, start_excess, breaks)
@@ -197,6 +200,8 @@ contains
       self%last_acceleration = 0.0_wp
       self%has_least = .false.
       self%slip_samples = 0
+      self%next_slip_sample = huge(1.0_wp)
+      if (self%parameters%slip_interval > 0.0_wp) self%next_slip_sample = self%start_time
       self%kept_count = self%slip_trace_count
    end subroutine begin_fast
 
@@ -212,7 +217,7 @@ contains
 
       self%peak_velocity = max(self%peak_velocity, self%sense * slider%velocity)
       if (self%last_acceleration > 0.0_wp .and. self%sense * slider%acceleration < 0.0_wp) then
-         self%peak_velocity = max(self%peak_velocity, self%sense * fastest(slider))
+         self%peak_velocity = max(self%peak_velocity, self%sense * fastest(slider, self%sense))
       end if
       self%last_acceleration = self%sense * slider%acceleration
 
@@ -281,25 +286,22 @@ contains
       self%phase = phase_slow
    end subroutine finish
 
-   !> Take the finer samples of the last advance of a slider.
-   subroutine sample_slip(self, slider, detached)
+   !> Take the finer samples that the last advance of a slider came past.
+   subroutine take_slip_samples(self, slider, detached)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
       integer, intent(in) :: detached
 
-      real(wp) :: time
-
-      if (self%parameters%slip_interval <= 0.0_wp) return
-      do
-         time = self%start_time + real(self%slip_samples, wp) * self%parameters%slip_interval
-         if (time > slider%time) exit
+      do while (self%next_slip_sample <= slider%time)
          self%slip_trace_count = self%slip_trace_count + 1
          self%slip_trace(:trace_length, self%slip_trace_count) &
-            & = sample(slider%observe(time), detached)
+            & = sample(slider%observe(self%next_slip_sample), detached)
          self%slip_trace(slip_trace_length, self%slip_trace_count) = real(self%slip, wp)
          self%slip_samples = self%slip_samples + 1
+         self%next_slip_sample = self%start_time &
+            & + real(self%slip_samples, wp) * self%parameters%slip_interval
       end do
-   end subroutine sample_slip
+   end subroutine take_slip_samples
 
    !> A sample of the trace.
    pure function sample(motion, detached)
@@ -335,30 +337,34 @@ contains
       end do
    end function pace
 
-   !> Velocity where the acceleration passed zero during the last advance.
-   pure function fastest(slider) result(velocity)
+   !> Greatest velocity, in a sense, during the last advance, which has one maximum; by golden section.
+   pure function fastest(slider, sense) result(velocity)
       class(slider_type), intent(in) :: slider
+      real(wp), intent(in) :: sense
       real(wp) :: velocity
 
-      integer, parameter :: bisections = 50
+      integer, parameter :: sections = 40
+      real(wp), parameter :: golden = 0.5_wp * (sqrt(5.0_wp) - 1.0_wp)
       real(wp) :: early, late
-      type(motion_type) :: motion, first
-      integer :: bisection
+      type(motion_type) :: left, right
+      integer :: section
 
       early = slider%step_time
       late = slider%time
-      first = slider%observe(early)
-      velocity = first%velocity
-      do bisection = 1, bisections
-         motion = slider%observe(0.5_wp * (early + late))
-         velocity = motion%velocity
-         if (motion%acceleration * first%acceleration > 0.0_wp) then
-            early = motion%time
+      left = slider%observe(late - golden * (late - early))
+      right = slider%observe(early + golden * (late - early))
+      do section = 1, sections
+         if (sense * left%velocity > sense * right%velocity) then
+            late = right%time
+            right = left
+            left = slider%observe(late - golden * (late - early))
          else
-            late = motion%time
+            early = left%time
+            left = right
+            right = slider%observe(early + golden * (late - early))
          end if
-         if (late - early <= spacing(late)) exit
       end do
+      velocity = left%velocity
    end function fastest
 
    !> Put the state into an archive or take it out.
@@ -373,6 +379,7 @@ contains
       call archive%exchange(self%phase)
       call archive%exchange(self%slip)
       call archive%exchange(self%slip_samples)
+      call archive%exchange(self%next_slip_sample)
       call archive%exchange(self%sense)
       call archive%exchange(self%last_excess)
       call archive%exchange(self%last_fast)

@@ -145,12 +145,13 @@ contains
    subroutine follow(self)
       class(simulation_type), intent(inout) :: self
 
-      real(wp) :: stretch, grid, shift
+      real(wp) :: grid, shift
 
-      stretch = self%contacts%parameters%static_force / self%contacts%parameters%stiffness
-      if (abs(self%slider%displacement) < farthest_stretches * stretch) return
+      if (abs(self%slider%displacement) * self%contacts%parameters%stiffness &
+         & < farthest_stretches * self%contacts%parameters%static_force) return
       ! On a grid of powers of two the origin and the new displacement have no rounding error.
-      grid = scale(1.0_wp, exponent(stretch))
+      grid = scale(1.0_wp, &
+         & exponent(self%contacts%parameters%static_force / self%contacts%parameters%stiffness))
       shift = grid * anint(self%slider%displacement / grid)
       call self%slider%shift_origin(shift)
       call self%contacts%shift_origin(shift, self%slider%displacement)

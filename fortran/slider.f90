@@ -22,8 +22,6 @@ module mesoslip_slider
       real(wp) :: displacement = 0.0_wp
       !> Velocity of the slider [m/s]
       real(wp) :: velocity = 0.0_wp
-      !> Acceleration of the slider [m/s2]
-      real(wp) :: acceleration = 0.0_wp
       !> Force that the drive exerts on the slider [N]
       real(wp) :: spring_force = 0.0_wp
       !> Force that the slider exerts on the contacts [N]

@@ -20,26 +20,36 @@ module mesoslip_slider_rigid
    real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 8.0e-2_wp, longest_step = 0.5_wp
 
    integer :: i
-   real(wp), parameter :: inverse(most_terms + 1) = [(1.0_wp / i, i=1, most_terms + 1)]
+   real(wp), parameter :: inverse(most_terms + 2) = [(1.0_wp / i, i=1, most_terms + 2)]
 
-   !> Gauss-Legendre points and weights on [0, 1], for the energy balance of long steps.
-   real(wp), parameter :: point(6) = [0.033765242898423986094_wp, 0.16939530676686774317_wp, &
+   !> Gauss-Legendre points and weights on [0, 1], for the energy balance of middling and long steps.
+   real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
+      & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
+   real(wp), parameter :: weight_4(4) = [0.17392742256872692869_wp, 0.32607257743127307131_wp, &
+      & 0.32607257743127307131_wp, 0.17392742256872692869_wp]
+   real(wp), parameter :: point_6(6) = [0.033765242898423986094_wp, 0.16939530676686774317_wp, &
       & 0.38069040695840154568_wp, 0.61930959304159845432_wp, 0.83060469323313225683_wp, &
       & 0.96623475710157601391_wp]
-   real(wp), parameter :: weight(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
+   real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
       & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
       & 0.085662246189585172520_wp]
-   !> Up to this step, in units of the fastest rate, integrals from values and two derivatives at
-   !> both ends are exact to rounding: their error is (2 step)**6/100800.
-   real(wp), parameter :: step_of_ends = 2.0e-2_wp
+   !> Up to this step, in units of the fastest rate, integrals from values and slopes at both ends
+   !> do: their error is (2 step)**4/720, of terms that are a small part of the balance.
+   real(wp), parameter :: step_of_slopes = 4.0e-3_wp
 
-   !> The motion at one end of a step, with derivatives.
-   type :: derivatives_type
-      !> How far the drive is ahead [m], velocity, acceleration and jerk of the slider
-      real(wp) :: drive_gap, velocity, acceleration, jerk
+   !> Coefficients of the equation of motion, per mass of the slider.
+   type :: system_type
+      !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
+      real(wp) :: inverse_mass, stiffness, drag, spring
+   end type system_type
+
+   !> Velocity of the slider with derivatives, and the same of the damper.
+   type :: motion_rates_type
+      !> Velocity, acceleration and jerk of the slider
+      real(wp) :: velocity, acceleration, jerk
       !> eta_S (V - W) [m/s2] and its rate [m/s3]
       real(wp) :: damper, damper_rate
-   end type derivatives_type
+   end type motion_rates_type
 
    !> A rigid slider on a spring.
    type, extends(slider_type) :: slider_rigid_type
@@ -47,14 +57,12 @@ module mesoslip_slider_rigid
       real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp, damping = 0.0_wp
       !> Running mean of the velocity, W [m/s]
       real(wp) :: mean_velocity = 0.0_wp
-      !> Contact force during the last advance
+      !> Contact force during the last advance, and displacement at its start [m]
       type(interface_law_type), private :: law
-      !> Taylor coefficients in (t - step_time)/unit of the displacement [m], the velocity times unit
-      !> [m], and eta_S (V - W) times unit**2 [m]
-      real(wp), private :: unit = 1.0_wp
+      real(wp), private :: start_displacement = 0.0_wp
+      !> Taylor coefficients of the velocity in the time since then
       integer, private :: terms = few_terms
-      real(wp), private :: way(0:most_terms) = 0.0_wp, pace(0:most_terms) = 0.0_wp
-      real(wp), private :: damper(0:most_terms) = 0.0_wp
+      real(wp), private :: series(0:most_terms - 1) = 0.0_wp
    contains
       procedure :: start
       procedure :: advance
@@ -75,10 +83,9 @@ contains
       self%law = law
       self%velocity = 0.0_wp
       self%mean_velocity = 0.0_wp
+      self%start_displacement = self%displacement
       self%drive_displacement = (law%stiffness * self%displacement - law%offset) / self%stiffness
-      self%way = 0.0_wp
-      self%pace = 0.0_wp
-      self%damper = 0.0_wp
+      self%series = 0.0_wp
    end subroutine start
 
    !> Move until the first end of a window, or less far.
@@ -90,15 +97,19 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      real(wp) :: inverse_mass, rate, step, gap
+      real(wp) :: rate, step, gap
+      type(system_type) :: system
       logical :: ends
 
       self%law = law
       self%step_time = self%time
+      self%start_displacement = self%displacement
 
-      inverse_mass = 1.0_wp / self%mass
-      rate = sqrt((self%stiffness + law%stiffness) * inverse_mass) + law%drag * inverse_mass &
-         & + 2.0_wp * self%damping
+      system%inverse_mass = 1.0_wp / self%mass
+      system%stiffness = (self%stiffness + law%stiffness) * system%inverse_mass
+      system%drag = law%drag * system%inverse_mass
+      system%spring = self%stiffness * system%inverse_mass
+      rate = sqrt(system%stiffness) + system%drag + 2.0_wp * self%damping
       step = window%end_time - self%time
       ends = step * rate <= longest_step
       if (.not. ends) step = longest_step / rate
@@ -114,183 +125,205 @@ contains
       end if
 
       if (.not. step > 0.0_wp) return
-      ! The number of terms is a constant in each call, so that the loops over them are unrolled.
+      ! The number of terms is a constant in each call, for which the compiler makes a copy of its own.
       if (rate * step <= short_step) then
-         call move(self, window, inverse_mass, rate, step, ends, few_terms)
+         call move(self, system, window, rate, step, ends, few_terms)
       else if (rate * step <= middling_step) then
-         call move(self, window, inverse_mass, rate, step, ends, some_terms)
+         call move(self, system, window, rate, step, ends, some_terms)
       else
-         call move(self, window, inverse_mass, rate, step, ends, most_terms)
+         call move(self, system, window, rate, step, ends, most_terms)
       end if
    end subroutine advance
 
    !> Move for a step, or to the first end of the window or turning point within it.
-   subroutine move(self, window, inverse_mass, rate, step, ends, terms)
+   subroutine move(self, system, window, rate, longest, ends, terms)
       type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
-      !> One over the mass [1/kg], the fastest rate of the system [1/s], length of the step [s]
-      real(wp), intent(in) :: inverse_mass, rate, step
+      !> The fastest rate of the system [1/s], length of the step [s]
+      real(wp), intent(in) :: rate, longest
       !> Whether the step comes to the end of the window's time
       logical, intent(in) :: ends
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: fraction, target, drive_gap, reach, inverse_step
+      real(wp) :: step, change, reach, target, drive_gap, way, swept, extension
       logical :: crosses, turns
-      type(derivatives_type) :: early, late
+      type(motion_rates_type) :: early, late
       integer :: term
 
       drive_gap = self%drive_displacement - self%displacement &
          & + self%drive_velocity * (self%time - self%drive_time)
-      call derivatives(self, drive_gap, inverse_mass, early)
-      call expand(self, early, inverse_mass, step, terms)
+      early = rates(self, system, drive_gap)
+      call expand(self, system, early, terms)
+      self%terms = terms
 
-      fraction = 1.0_wp
+      step = longest
       crosses = .false.
       turns = .false.
       target = 0.0_wp
-      reach = 0.0_wp
-      do term = 1, terms
-         reach = reach + abs(self%way(term))
+      change = 0.0_wp
+      do term = terms - 1, 1, -1
+         change = (change + abs(self%series(term))) * step
       end do
+      reach = (abs(self%series(0)) + change) * step
       if (.not. reach < min(window%upper - self%displacement, &
          & self%displacement - window%lower)) then
-         call first_end(self, window, terms, fraction, crosses, turns, target)
+         call first_end(self, window, terms, change, step, crosses, turns, target)
       end if
 
-      inverse_step = 1.0_wp / step
-      self%mean_velocity = self%mean_velocity &
-         & + integral(self%damper, terms - 1, fraction) * inverse_step
-      self%velocity = horner(self%pace, terms - 1, fraction) * inverse_step
+      way = integral(self%series, terms, step)
+      swept = second_integral(self%series, terms, step)
+      self%velocity = horner(self%series, terms, step)
       if (turns) self%velocity = 0.0_wp
       if (crosses) then
          self%displacement = target
       else
-         self%displacement = self%displacement + rise(self%way, terms, fraction)
+         self%displacement = self%displacement + way
       end if
-      if (ends .and. fraction >= 1.0_wp .and. .not. (crosses .or. turns)) then
+      if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
          self%time = window%end_time
       else
-         self%time = self%time + fraction * step
+         self%time = self%time + step
       end if
+      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+
+      extension = step * (drive_gap + 0.5_wp * self%drive_velocity * step) - swept
+      ! From the balance of momentum, M dV + M dW = the impulse of spring and contacts.
+      if (self%damping > 0.0_wp) then
+         self%mean_velocity = self%mean_velocity - (self%velocity - early%velocity) &
+            & + system%spring * extension - system%drag * way + system%inverse_mass * (step &
+            & * (self%law%offset - self%law%stiffness * self%start_displacement) &
+            & - self%law%stiffness * swept)
+      end if
+
       drive_gap = self%drive_displacement - self%displacement &
          & + self%drive_velocity * (self%time - self%drive_time)
-      call derivatives(self, drive_gap, inverse_mass, late)
+      late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
-      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
-      call add_losses(self, early, late, rate, fraction)
+      call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
+      call add_losses(self, early, late, rate, step)
    end subroutine move
 
-   !> Derivatives of the motion, from its equation.
-   pure subroutine derivatives(self, drive_gap, inverse_mass, motion)
+   !> Velocity and its derivatives, from the equation of motion.
+   pure function rates(self, system, drive_gap) result(motion)
       type(slider_rigid_type), intent(in) :: self
-      real(wp), intent(in) :: drive_gap, inverse_mass
-      type(derivatives_type), intent(out) :: motion
+      type(system_type), intent(in) :: system
+      !> How far the drive is ahead of the slider [m]
+      real(wp), intent(in) :: drive_gap
+      type(motion_rates_type) :: motion
 
-      motion%drive_gap = drive_gap
       motion%velocity = self%velocity
       motion%damper = self%damping * (self%velocity - self%mean_velocity)
-      motion%acceleration = inverse_mass * (self%stiffness * drive_gap - (self%law%stiffness &
-         & * self%displacement - self%law%offset) - self%law%drag * self%velocity) - motion%damper
+      motion%acceleration = system%spring * drive_gap - system%inverse_mass &
+         & * (self%law%stiffness * self%displacement - self%law%offset) &
+         & - system%drag * self%velocity - motion%damper
       motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
-      motion%jerk = inverse_mass * (self%stiffness * (self%drive_velocity - self%velocity) &
-         & - self%law%stiffness * self%velocity - self%law%drag * motion%acceleration) &
-         & - motion%damper_rate
-   end subroutine derivatives
+      motion%jerk = system%spring * self%drive_velocity - system%stiffness * self%velocity &
+         & - system%drag * motion%acceleration - motion%damper_rate
+   end function rates
 
-   !> Taylor coefficients of the motion.
-   pure subroutine expand(self, early, inverse_mass, step, terms)
+   !> Taylor coefficients of the velocity.
+   !>
+   !> Without its running mean, S40 with S41 is an equation of the third order for the velocity.
+   pure subroutine expand(self, system, early, terms)
       type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
       !> The motion at the start of the step
-      type(derivatives_type), intent(in) :: early
-      !> One over the slider's mass [1/kg], length of the step [s]
-      real(wp), intent(in) :: inverse_mass, step
+      type(motion_rates_type), intent(in) :: early
       integer, intent(in) :: terms
 
-      real(wp) :: stiffness, drag, rate, driving
+      real(wp) :: first, second, third, driving
       integer :: term
 
-      stiffness = (self%stiffness + self%law%stiffness) * inverse_mass * step**2
-      drag = self%law%drag * inverse_mass * step
-      rate = self%damping * step
-      driving = self%stiffness * self%drive_velocity * inverse_mass * step**3
-
-      self%unit = step
-      self%terms = terms
-      self%way(0) = self%displacement
-      self%pace(0) = early%velocity * step
-      self%way(1) = self%pace(0)
-      self%pace(1) = early%acceleration * step**2
-      self%way(2) = 0.5_wp * self%pace(1)
-      self%damper(0) = early%damper * step**2
-      do term = 1, terms - 2
-         self%damper(term) = (rate * inverse(term)) * (term * self%pace(term) - self%damper(term - 1))
-         self%pace(term + 1) = ((driving - stiffness * self%pace(term - 1)) * inverse(term) &
-            & - drag * self%pace(term) - self%damper(term)) * inverse(term + 1)
-         self%way(term + 2) = self%pace(term + 1) * inverse(term + 2)
+      first = 2.0_wp * self%damping + system%drag
+      second = system%stiffness + system%drag * self%damping
+      third = system%stiffness * self%damping
+      driving = self%damping * system%spring * self%drive_velocity
+      self%series(0) = early%velocity
+      self%series(1) = early%acceleration
+      self%series(2) = 0.5_wp * early%jerk
+      do term = 3, terms - 1
+         self%series(term) = inverse(term) * ((driving - third * self%series(term - 3)) &
+            & * (inverse(term - 1) * inverse(term - 2)) &
+            & - (second * inverse(term - 1)) * self%series(term - 2) - first * self%series(term - 1))
          driving = 0.0_wp
       end do
-      self%damper(terms - 1) = (rate * inverse(terms - 1)) &
-         & * ((terms - 1) * self%pace(terms - 1) - self%damper(terms - 2))
    end subroutine expand
 
    !> Shorten a step to the first place where the motion leaves the window or turns round.
-   subroutine first_end(self, window, terms, fraction, crosses, turns, target)
+   subroutine first_end(self, window, terms, change, step, crosses, turns, target)
       type(slider_rigid_type), intent(in) :: self
       type(window_type), intent(in) :: window
       integer, intent(in) :: terms
-      !> Part of the step that is made
-      real(wp), intent(inout) :: fraction
+      !> Bound on the change of the velocity in the whole step [m/s]
+      real(wp), intent(in) :: change
+      !> Length of the step [s]
+      real(wp), intent(inout) :: step
       !> Whether it ends at a displacement of the window, and which
       logical, intent(out) :: crosses
       real(wp), intent(out) :: target
       !> Whether it ends at a turning point
       logical, intent(out) :: turns
 
-      integer, parameter :: most_halvings = 100
-      real(wp) :: end_pace, sense, rate(0:most_terms)
-      integer :: halving, term
+      real(wp) :: sense, gap
 
       turns = .false.
-      sense = sign(1.0_wp, self%way(1))
-      if (.not. leads(self%pace, terms - 1, fraction)) then
-         do term = 0, terms - 2
-            rate(term) = (term + 1) * self%pace(term + 1)
-         end do
-         do halving = 1, most_halvings
-            if (leads(rate, terms - 2, fraction)) then
-               ! The acceleration keeps its sign, so there is at most one turning point.
-               end_pace = horner(self%pace, terms - 1, fraction)
-               if (self%pace(0) * end_pace < 0.0_wp) then
-                  fraction = arrival(self%pace, rate, terms - 1, -self%pace(0), fraction)
-                  turns = .true.
-               else
-                  sense = sign(1.0_wp, self%pace(0) + end_pace)
-               end if
-               exit
-            end if
-            ! At rest and in balance the jerk decides.
-            if (abs(self%pace(0)) + abs(self%pace(1)) <= 0.0_wp) then
-               sense = sign(1.0_wp, self%pace(2))
-               if (leads(rate(1:), terms - 3, fraction)) exit
-            end if
-            fraction = 0.5_wp * fraction
-            if (leads(self%pace, terms - 1, fraction)) exit
-         end do
-      end if
-
+      sense = sign(1.0_wp, self%series(0))
+      if (abs(self%series(0)) <= change) call next_turn(self%series, terms, step, turns, sense)
       target = merge(window%upper, window%lower, sense > 0.0_wp)
-      crosses = sense * (rise(self%way, terms, fraction) - (target - self%displacement)) &
-         & >= 0.0_wp
+      gap = target - self%displacement
+      crosses = sense * (integral(self%series, terms, step) - gap) >= 0.0_wp
       if (crosses) then
-         fraction = arrival(self%way, self%pace, terms, target - self%displacement, fraction)
+         step = crossing(self%series, terms, gap, step)
          turns = .false.
       end if
    end subroutine first_end
 
+   !> Shorten a step until the motion in it goes one way, to a turning point if there is one.
+   subroutine next_turn(series, terms, step, turns, sense)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: terms
+      real(wp), intent(inout) :: step
+      !> Whether the step ends at a turning point
+      logical, intent(out) :: turns
+      !> Direction of the motion, +1 or -1
+      real(wp), intent(out) :: sense
+
+      integer, parameter :: most_halvings = 100
+      real(wp) :: rate(0:most_terms - 1), end_velocity
+      integer :: halving, term
+
+      turns = .false.
+      sense = sign(1.0_wp, series(0))
+      do term = 0, terms - 2
+         rate(term) = (term + 1) * series(term + 1)
+      end do
+      do halving = 1, most_halvings
+         if (leads(series, terms, step)) exit
+         if (leads(rate, terms - 1, step)) then
+            ! The acceleration keeps its sign, so there is at most one turning point.
+            end_velocity = horner(series, terms, step)
+            if (series(0) * end_velocity < 0.0_wp) then
+               step = turning_point(series, rate, terms, step)
+               turns = .true.
+            else
+               sense = sign(1.0_wp, series(0) + end_velocity)
+            end if
+            exit
+         end if
+         if (abs(series(0)) + abs(series(1)) <= 0.0_wp) then
+            ! At rest and in balance the jerk decides.
+            sense = sign(1.0_wp, series(2))
+            if (leads(rate(1:), terms - 2, step)) exit
+         end if
+         step = 0.5_wp * step
+      end do
+   end subroutine next_turn
+
    !> Whether a series keeps the sign of its constant term, by the size of the terms after it.
-   pure function leads(series, terms, fraction)
-      real(wp), intent(in) :: series(0:), fraction
+   pure function leads(series, terms, time)
+      real(wp), intent(in) :: series(0:), time
       integer, intent(in) :: terms
       logical :: leads
 
@@ -298,135 +331,139 @@ contains
       integer :: term
 
       rest = 0.0_wp
-      do term = terms, 1, -1
-         rest = (rest + abs(series(term))) * fraction
+      do term = terms - 1, 1, -1
+         rest = (rest + abs(series(term))) * time
       end do
       leads = abs(series(0)) > rest
    end function leads
 
-   !> Where a monotone series has risen by a given amount, by Halley's method within a bracket.
-   pure function arrival(series, slope, terms, amount, farthest) result(place)
-      !> Coefficients of the series and of its derivative
-      real(wp), intent(in) :: series(0:), slope(0:)
+   !> Time at which a motion in one direction has come a given way, by Halley's method in a bracket.
+   pure function crossing(series, terms, way, longest) result(time)
+      !> Coefficients of the velocity
+      real(wp), intent(in) :: series(0:)
       integer, intent(in) :: terms
-      !> Amount, reached at the farthest place or before
-      real(wp), intent(in) :: amount, farthest
-      real(wp) :: place
+      !> Way, which is made at the longest time or before
+      real(wp), intent(in) :: way, longest
+      real(wp) :: time
 
       integer, parameter :: most_iterations = 100
       real(wp), parameter :: converged = 1.0e-5_wp
-      real(wp) :: lower, upper, excess, discriminant, rate, next
+      real(wp) :: lower, upper, excess, discriminant, velocity, change, next
       integer :: iteration
 
       lower = 0.0_wp
-      upper = farthest
-      place = farthest
-      discriminant = series(1)**2 + 4.0_wp * series(2) * amount
+      upper = longest
+      time = longest
+      discriminant = series(0)**2 + 2.0_wp * series(1) * way
       if (discriminant > 0.0_wp) then
-         place = min(2.0_wp * amount / (series(1) + sign(sqrt(discriminant), amount)), farthest)
+         time = min(2.0_wp * way / (series(0) + sign(sqrt(discriminant), way)), longest)
       end if
       do iteration = 1, most_iterations
-         excess = rise(series, terms, place) - amount
-         if (excess * amount >= 0.0_wp) then
-            upper = place
+         excess = integral(series, terms, time) - way
+         velocity = horner(series, terms, time)
+         if (excess * way >= 0.0_wp) then
+            upper = time
          else
-            lower = place
+            lower = time
          end if
-         rate = horner(slope, terms - 1, place)
          next = lower
-         if (abs(excess) < abs(rate) * (upper - lower)) then
-            next = excess / rate
-            next = place - next * (1.0_wp + next * (0.5_wp * slope(1) + slope(2) * place) / rate)
+         if (abs(excess) < abs(velocity) * longest) then
+            change = excess / velocity
+            next = time - change * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
          end if
          if (next > lower .and. next < upper) then
+            change = next - time
+            time = next
             ! Convergence is cubic: the next change would be lost in rounding.
-            if (abs(next - place) <= converged * next) then
-               place = next
-               exit
-            end if
-            place = next
+            if (abs(change) <= converged * next) exit
          else
             if (upper - lower <= spacing(upper) .or. abs(excess) <= 0.0_wp) exit
-            place = 0.5_wp * (lower + upper)
+            time = 0.5_wp * (lower + upper)
          end if
       end do
-   end function arrival
+   end function crossing
 
-   !> Add the work and the losses of a step to the energy balance: the integrals of K (X_d - X) v_d,
-   !> C V**2 and M eta_S (V - W) V.
-   subroutine add_losses(self, early, late, rate, fraction)
+   !> Time at which the velocity of a motion with one turning point is zero, by Newton's method in a
+   !> bracket.
+   pure function turning_point(series, rate, terms, longest) result(time)
+      !> Coefficients of the velocity and the acceleration
+      real(wp), intent(in) :: series(0:), rate(0:)
+      integer, intent(in) :: terms
+      !> Time after the turning point
+      real(wp), intent(in) :: longest
+      real(wp) :: time
+
+      integer, parameter :: most_iterations = 100
+      real(wp) :: lower, upper, velocity, next
+      integer :: iteration
+
+      lower = 0.0_wp
+      upper = longest
+      time = 0.5_wp * longest
+      do iteration = 1, most_iterations
+         velocity = horner(series, terms, time)
+         if (velocity * series(0) > 0.0_wp) then
+            lower = time
+         else
+            upper = time
+         end if
+         next = time - velocity / horner(rate, terms - 1, time)
+         if (.not. (next > lower .and. next < upper)) next = 0.5_wp * (lower + upper)
+         if (abs(next - time) <= epsilon(1.0_wp) * longest) exit
+         time = next
+      end do
+   end function turning_point
+
+   !> Add the losses of a step to the energy balance: the integrals of C V**2 and M eta_S (V - W) V.
+   subroutine add_losses(self, early, late, rate, step)
       type(slider_rigid_type), intent(inout) :: self
       !> The motion at both ends
-      type(derivatives_type), intent(in) :: early, late
-      !> Fastest rate of the system [1/s]
-      real(wp), intent(in) :: rate
-      !> Part of the step that was made
-      real(wp), intent(in) :: fraction
+      type(motion_rates_type), intent(in) :: early, late
+      !> Fastest rate of the system [1/s], length of the step [s]
+      real(wp), intent(in) :: rate, step
 
-      real(wp) :: step, extension, square, damped, pace, drive
-      integer :: node
+      real(wp) :: square, damped
 
-      step = fraction * self%unit
-      if (step * rate < step_of_ends) then
-         extension = between(step, early%drive_gap, late%drive_gap, &
-            & self%drive_velocity - early%velocity, self%drive_velocity - late%velocity, &
-            & -early%acceleration, -late%acceleration)
-         square = between(step, early%velocity**2, late%velocity**2, &
-            & 2.0_wp * early%velocity * early%acceleration, &
-            & 2.0_wp * late%velocity * late%acceleration, &
-            & 2.0_wp * (early%acceleration**2 + early%velocity * early%jerk), &
-            & 2.0_wp * (late%acceleration**2 + late%velocity * late%jerk))
-         damped = between(step, early%damper * early%velocity, late%damper * late%velocity, &
-            & damped_rate(early), damped_rate(late), &
-            & damped_curvature(self%damping, early), damped_curvature(self%damping, late))
+      if (rate * step < step_of_slopes) then
+         square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) + step * (1.0_wp / 6.0_wp) &
+            & * (early%velocity * early%acceleration - late%velocity * late%acceleration))
+         damped = step * (0.5_wp * (early%damper * early%velocity + late%damper * late%velocity) &
+            & + step * (1.0_wp / 12.0_wp) * (early%damper_rate * early%velocity &
+            & + early%damper * early%acceleration - late%damper_rate * late%velocity &
+            & - late%damper * late%acceleration))
+      else if (rate * step < middling_step) then
+         call integrate_losses(self, early%damper, step, point_4, weight_4, square, damped)
       else
-         drive = self%drive_velocity * step
-         extension = step * (early%drive_gap + 0.5_wp * drive) &
-            & - self%unit * (integral(self%way, self%terms, fraction) - fraction * self%way(0))
-         square = 0.0_wp
-         damped = 0.0_wp
-         do node = 1, size(point)
-            pace = horner(self%pace, self%terms - 1, point(node) * fraction)
-            square = square + weight(node) * pace**2
-            damped = damped + weight(node) * pace &
-               & * horner(self%damper, self%terms - 1, point(node) * fraction)
-         end do
-         square = square * fraction / self%unit
-         damped = damped * fraction / self%unit**2
+         call integrate_losses(self, early%damper, step, point_6, weight_6, square, damped)
       end if
-      call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
       call self%drag_loss%add(self%law%drag * square)
       call self%damping_loss%add(self%mass * damped)
    end subroutine add_losses
 
-   !> Integral of a function over a step from its values and derivatives at both ends.
-   pure function between(step, early, late, early_rate, late_rate, early_curvature, &
-      & late_curvature) result(value)
-      real(wp), intent(in) :: step, early, late, early_rate, late_rate
-      real(wp), intent(in) :: early_curvature, late_curvature
-      real(wp) :: value
+   !> Integrals of V**2 and eta_S (V - W) V over a step by a Gauss rule.
+   pure subroutine integrate_losses(self, damper, step, point, weight, square, damped)
+      type(slider_rigid_type), intent(in) :: self
+      !> eta_S (V - W) at the start [m/s2], length of the step [s]
+      real(wp), intent(in) :: damper, step
+      real(wp), intent(in), contiguous :: point(:), weight(:)
+      real(wp), intent(out) :: square, damped
 
-      value = step * (0.5_wp * (early + late) + step * (0.1_wp * (early_rate - late_rate) &
-         & + step * (early_curvature + late_curvature) / 120.0_wp))
-   end function between
+      real(wp) :: velocity, series(0:most_terms - 1)
+      integer :: node, term
 
-   !> Rate of eta_S (V - W) V.
-   pure function damped_rate(motion) result(rate)
-      type(derivatives_type), intent(in) :: motion
-      real(wp) :: rate
-
-      rate = motion%damper_rate * motion%velocity + motion%damper * motion%acceleration
-   end function damped_rate
-
-   !> Second derivative of eta_S (V - W) V.
-   pure function damped_curvature(damping, motion) result(curvature)
-      real(wp), intent(in) :: damping
-      type(derivatives_type), intent(in) :: motion
-      real(wp) :: curvature
-
-      curvature = damping * (motion%jerk - motion%damper_rate) * motion%velocity &
-         & + 2.0_wp * motion%damper_rate * motion%acceleration + motion%damper * motion%jerk
-   end function damped_curvature
+      series(0) = damper
+      do term = 1, self%terms - 1
+         series(term) = self%damping * (self%series(term) - series(term - 1) * inverse(term))
+      end do
+      square = 0.0_wp
+      damped = 0.0_wp
+      do node = 1, size(point)
+         velocity = horner(self%series, self%terms, point(node) * step)
+         square = square + step * weight(node) * velocity**2
+         damped = damped + step * weight(node) * velocity &
+            & * horner(series, self%terms, point(node) * step)
+      end do
+   end subroutine integrate_losses
 
    !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)
@@ -437,21 +474,15 @@ contains
       !> The motion
       type(motion_type) :: motion
 
-      real(wp) :: displacement, drive, fraction
-      integer :: term
+      real(wp) :: displacement, drive, step
 
-      fraction = (time - self%step_time) / self%unit
+      step = time - self%step_time
       drive = self%drive_at(time)
-      displacement = self%way(0) + rise(self%way, self%terms, fraction)
+      displacement = self%start_displacement + integral(self%series, self%terms, step)
       motion%time = time
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + displacement
-      motion%velocity = horner(self%pace, self%terms - 1, fraction) / self%unit
-      motion%acceleration = 0.0_wp
-      do term = self%terms - 1, 1, -1
-         motion%acceleration = motion%acceleration * fraction + term * self%pace(term)
-      end do
-      motion%acceleration = motion%acceleration / self%unit**2
+      motion%velocity = horner(self%series, self%terms, step)
       motion%spring_force = self%stiffness * (drive - displacement)
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity
@@ -479,46 +510,55 @@ contains
       call archive%exchange(self%mean_velocity)
    end subroutine exchange
 
-   !> Value of a series.
-   pure function horner(series, terms, place) result(value)
-      real(wp), intent(in) :: series(0:), place
+   !> Value of a series; even and odd terms apart, so that the two sums run side by side.
+   pure function horner(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
       integer, intent(in) :: terms
       real(wp) :: value
 
+      real(wp) :: even, odd, square
       integer :: term
 
-      value = series(terms)
-      do term = terms - 1, 0, -1
-         value = value * place + series(term)
+      square = time**2
+      even = 0.0_wp
+      odd = 0.0_wp
+      do term = 2 * ((terms - 1) / 2), 0, -2
+         even = even * square + series(term)
       end do
+      do term = 2 * (terms / 2) - 1, 1, -2
+         odd = odd * square + series(term)
+      end do
+      value = even + time * odd
    end function horner
 
-   !> Value of a series without its constant term.
-   pure function rise(series, terms, place) result(value)
-      real(wp), intent(in) :: series(0:), place
-      integer, intent(in) :: terms
-      real(wp) :: value
-
-      integer :: term
-
-      value = 0.0_wp
-      do term = terms, 1, -1
-         value = (value + series(term)) * place
-      end do
-   end function rise
-
    !> Integral of a series from zero.
-   pure function integral(series, terms, place) result(value)
-      real(wp), intent(in) :: series(0:), place
+   pure function integral(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
       integer, intent(in) :: terms
       real(wp) :: value
 
       integer :: term
+      real(wp) :: once(0:most_terms - 1)
 
-      value = 0.0_wp
-      do term = terms, 0, -1
-         value = (value + series(term) * inverse(term + 1)) * place
+      do term = 0, terms - 1
+         once(term) = series(term) * inverse(term + 1)
       end do
+      value = time * horner(once, terms, time)
    end function integral
+
+   !> Integral of the integral of a series from zero.
+   pure function second_integral(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: value
+
+      integer :: term
+      real(wp) :: twice(0:most_terms - 1)
+
+      do term = 0, terms - 1
+         twice(term) = series(term) * (inverse(term + 1) * inverse(term + 2))
+      end do
+      value = time**2 * horner(twice, terms, time)
+   end function second_integral
 
 end module mesoslip_slider_rigid

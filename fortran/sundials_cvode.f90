@@ -1,4 +1,4 @@
-!> SUNDIALS: the one place that knows its names, which version 7 changes.
+!> SUNDIALS, with the names of its version 7; for version 6 see sundials_6.f90.
 module mesoslip_sundials_cvode
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
    implicit none
@@ -7,7 +7,7 @@ module mesoslip_sundials_cvode
    public :: sundials_version
 
    interface
-      !> Version of the SUNDIALS library, of which SUNDIALS has no Fortran interface.
+      !> Version of the SUNDIALS library; its Fortran modules have no such function.
       function get_version(version, length) bind(c, name="SUNDIALSGetVersion") result(status)
          import :: c_char, c_int
          implicit none

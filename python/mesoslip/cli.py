@@ -28,13 +28,13 @@ app = typer.Typer(
 ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
 ]
-OutputArgument = Annotated[
-    Path, typer.Argument(help="Output of mesoslip run", metavar="OUT.nc")
-]
+OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip run", metavar="OUT.nc")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", help="Change one key, as in contacts.delay=1ms; may be repeated", metavar="KEY=VALUE"
+        "--set",
+        help="Change one key, as in contacts.delay=1ms; may be repeated",
+        metavar="KEY=VALUE",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
@@ -62,7 +62,9 @@ def run(
     config: ConfigArgument,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"),
+        typer.Option(
+            "-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"
+        ),
     ] = None,
     changes: SetOption = None,
     workers: Annotated[
@@ -133,7 +135,9 @@ def slips(
     if as_json:
         typer.echo(json.dumps({"slips": rows, "statistics": statistics}, indent=2))
         return
-    typer.echo("  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s   breaks")
+    typer.echo(
+        "  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s   breaks"
+    )
     for row in rows:
         typer.echo(
             f"{row['realization']:13d} {row['start_time']:10.4f} "
@@ -196,7 +200,13 @@ def _progress(quiet: bool) -> Iterator[Callable[[float], None]]:
         yield _plain_progress()
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (TextColumn("simulating"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

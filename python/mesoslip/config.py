@@ -98,12 +98,14 @@ class Drive(Table):
     """How the drive moves: one velocity, or stages one after another."""
 
     velocity: Velocity | None = None
-    stage: Annotated[tuple[Stage, ...], Field(min_length=1)] | None = None
+    stage: tuple[Stage, ...] | None = None
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.velocity is None) == (self.stage is None):
             raise _problem("velocity", "give either a velocity or [[drive.stage]] tables")
+        if self.stage is not None and not self.stage:
+            raise _problem("stage", "must have at least one stage")
         return self
 
 
@@ -142,7 +144,9 @@ class PrescribedSlider(Table):
 
 
 def _slider_kind(value: Any) -> Any:
-    return value.get("kind", "rigid") if isinstance(value, Mapping) else value.kind
+    if isinstance(value, Mapping):
+        return value.get("kind", "rigid")
+    return getattr(value, "kind", "rigid")
 
 
 Slider = Annotated[
@@ -204,7 +208,9 @@ class Contacts(Table):
         if self.drag_rate > 0:
             for key in ("area", "film_thickness", "film_density"):
                 if getattr(self, key) is None:
-                    raise _problem(key, "needed for the mass of the contacts, as drag_rate is given")
+                    raise _problem(
+                        key, "needed for the mass of the contacts, as drag_rate is given"
+                    )
         return self
 
     @model_validator(mode="after")
@@ -368,7 +374,11 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     together = min(config.run.realizations, os.cpu_count() or 1)
     for key, needed, value in (
-        ("contacts.count", BYTES_PER_CONTACT * config.contacts.count * together, config.contacts.count),
+        (
+            "contacts.count",
+            BYTES_PER_CONTACT * config.contacts.count * together,
+            config.contacts.count,
+        ),
         (
             "output.interval",
             BYTES_PER_SAMPLE * config.duration / interval * config.run.realizations,
@@ -411,8 +421,10 @@ def _problem_of(details: ErrorDetails, source: str) -> Problem:
         else:
             expected = context["expected"]
         not_yet = value in NOT_YET_VALUES.get(_dotted(place), ())
-        message = f"not available in this version; choose {expected}" if not_yet else (
-            f"must be {expected}"
+        message = (
+            f"not available in this version; choose {expected}"
+            if not_yet
+            else (f"must be {expected}")
         )
     elif kind == "value_error":
         message = str(context["error"])
@@ -479,9 +491,14 @@ def _parse_toml(text: str, source: str) -> dict[str, Any]:
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
     """Lay tables over others; of keys that exclude each other, the one laid over stays."""
-    changes_kind = table == "slider" and over.get("kind", base.get("kind")) != base.get("kind", "rigid")
+    changes_kind = table == "slider" and over.get("kind", base.get("kind")) != base.get(
+        "kind", "rigid"
+    )
     merged = {} if changes_kind and "kind" in over else dict(base)
-    for one, other in (*pairwise(EXCLUSIVE.get(table, ())), *pairwise(EXCLUSIVE.get(table, ())[::-1])):
+    for one, other in (
+        *pairwise(EXCLUSIVE.get(table, ())),
+        *pairwise(EXCLUSIVE.get(table, ())[::-1]),
+    ):
         if one in over:
             merged.pop(other, None)
     for key, value in over.items():

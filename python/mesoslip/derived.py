@@ -43,7 +43,12 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         yield "contact_mass", contacts.contact_mass, "kg", "mass of a contact, m = rho (A/N) h"
     if contacts.area is not None:
         area = contacts.area / contacts.count
-        yield "contact_spacing", math.sqrt(area), "m", "distance between neighbours, a = (A/N)^(1/2)"
+        yield (
+            "contact_spacing",
+            math.sqrt(area),
+            "m",
+            "distance between neighbours, a = (A/N)^(1/2)",
+        )
         yield "contact_radius", math.sqrt(area / math.pi), "m", "radius of a contact"
     yield (
         "threshold_acceptance",
@@ -68,7 +73,12 @@ def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
     yield "omega_s", omega_s, "1/s", "setup frequency, Omega_S = (K/M)^(1/2)"
     yield "setup_period", 2 * math.pi / omega_s, "s", "period of the setup, tau_S = 2 pi/Omega_S"
     yield "damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S"
-    yield "omega_l", omega_l, "1/s", "ringing frequency of the pinned slider, Omega_L = (Nk/M)^(1/2)"
+    yield (
+        "omega_l",
+        omega_l,
+        "1/s",
+        "ringing frequency of the pinned slider, Omega_L = (Nk/M)^(1/2)",
+    )
     yield "ringing_period", 2 * math.pi / omega_l, "s", "period of the ringing, 2 pi/Omega_L"
     film = contacts.count * contacts.contact_drag / slider.mass
     yield "film_drag_rate", film, "1/s", "drag of the whole molten film per slider mass, N m eta/M"

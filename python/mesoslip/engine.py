@@ -77,7 +77,9 @@ def slip_velocity(config: Config) -> float:
     if config.output.slip_velocity is not None:
         return config.output.slip_velocity
     omega_s = np.sqrt(config.slider.stiffness / config.slider.mass)
-    return float(SLIP_VELOCITY_RATIO * omega_s * config.contacts.static_force / config.slider.stiffness)
+    return float(
+        SLIP_VELOCITY_RATIO * omega_s * config.contacts.static_force / config.slider.stiffness
+    )
 
 
 @dataclass

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from mesoslip import plots, store
 from mesoslip.errors import ConfigError, FileError, Problem
@@ -35,9 +38,7 @@ def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
         axes.set_ylim(low, high + 0.6 * (high - low))
         inset = axes.inset_axes((0.4, 0.62, 0.57, 0.36))
         window = plots.slip_window(slip, before=0.5, after=9)
-        plots.draw_series(
-            inset, tree, "spring_force", window=window, time_unit=1e-3, color="black"
-        )
+        plots.draw_series(inset, tree, "spring_force", window=window, time_unit=1e-3, color="black")
         inset.set_xlabel(f"time after {window[0]:.3f} s (ms)", fontsize=7)
         inset.tick_params(labelsize=7)
     return figure
@@ -53,8 +54,12 @@ def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
         window = plots.slip_window(slip, before=0.1, after=0.8)
         for axes, name in ((velocity, "velocity"), (detached, "detached_contacts")):
             plots.draw_series(axes, tree, name, window=window, time_unit=1e-3, color="black")
-        plots.draw_series(force, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT)
-        plots.draw_series(force, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING)
+        plots.draw_series(
+            force, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT
+        )
+        plots.draw_series(
+            force, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING
+        )
         detached.set_xlabel(f"time after {window[0]:.4f} s (ms)")
         force.legend()
     velocity.set_ylabel("slider velocity (µm/s)")
@@ -65,30 +70,42 @@ def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
-def _stacked(trees: Sequence[xr.DataTree], label: Callable[[Config], str]) -> Figure:
-    """The spring force of several runs, one above the other."""
-    figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
-    panels = figure.subplots(len(trees), 1, sharex=True, squeeze=False)[:, 0]
-    for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
-        plots.draw_series(axes, tree, "spring_force", color="black")
-        axes.set_title(f"({letter}) {label(configuration(tree))}", loc="left")
-        axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
-        axes.set_ylabel("$F_d$ (µN)")
-    panels[-1].set_xlabel("time (s)")
-    panels[-1].set_xlim(0, max(tree["time"].max().item() for tree in trees))
-    return figure
+def _panels(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
+    return np.asarray(figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row"))
 
 
 def delays(trees: Sequence[xr.DataTree]) -> Figure:
-    """S22: the spring force for different values of the delay time."""
-    return _stacked(trees, lambda config: rf"$\tau_d$ = {config.contacts.delay * 1e3:g} ms")
+    """S22: the spring force for different values of the delay time, at first and in the end."""
+    figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
+    panels = _panels(figure, len(trees), 2)
+    span = 12.0
+    for letter, row, tree in zip("abcdefgh", panels, trees, strict=False):
+        end = tree["time"].max().item()
+        for axes, window in zip(row, ((0, span), (end - span, end)), strict=True):
+            plots.draw_series(axes, tree, "spring_force", window=window, color="black")
+            axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
+            axes.set_xlim(0, span)
+        delay = configuration(tree).contacts.delay
+        row[0].set_title(rf"({letter}) $\tau_d$ = {delay * 1e3:g} ms", loc="left")
+        row[0].set_ylabel("$F_d$ (µN)")
+        row[1].set_title(f"after {end - span:g} s", loc="left")
+    for axes in panels[-1]:
+        axes.set_xlabel("time (s)")
+    return figure
 
 
 def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
     """S23: the spring force for different dispersions of the thresholds."""
-    return _stacked(
-        trees, lambda config: rf"$\Delta f_s/f_s$ = {config.contacts.threshold.relative_width:g}"
-    )
+    figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
+    panels = _panels(figure, len(trees), 1)[:, 0]
+    for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
+        plots.draw_series(axes, tree, "spring_force", color="black")
+        width = configuration(tree).contacts.threshold.relative_width
+        axes.set_title(rf"({letter}) $\Delta f_s/f_s$ = {width:g}", loc="left")
+        axes.set_ylabel("$F_d$ (µN)")
+        axes.set_xlim(0, tree["time"].max().item())
+    panels[-1].set_xlabel("time (s)")
+    return figure
 
 
 def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
@@ -140,7 +157,9 @@ def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
     unknown = [name for name in names if name not in FIGURES]
     if unknown:
         known = ", ".join(FIGURES)
-        raise ConfigError([Problem("", name, f"no such figure; choose of {known}") for name in unknown])
+        raise ConfigError(
+            [Problem("", name, f"no such figure; choose of {known}") for name in unknown]
+        )
     missing = [
         path
         for name in names

@@ -135,7 +135,9 @@ def slip_traces(realizations: Sequence[Realization]) -> xr.Dataset:
     }
     data["slip"] = variable("slip", ("sample",), rows[:, -1].astype(np.int32))
     data["realization"] = variable("realization", ("sample",), owner)
-    data["detached_contacts"] = variable("detached_contacts", ("sample",), rows[:, 6].astype(np.int32))
+    data["detached_contacts"] = variable(
+        "detached_contacts", ("sample",), rows[:, 6].astype(np.int32)
+    )
     return xr.Dataset(data).set_coords(["realization", "slip", "time"])
 
 
@@ -194,7 +196,9 @@ def check_writable(path: Path) -> None:
         If the path is a directory, or its folder cannot be made or written to.
     """
     if path.is_dir():
-        raise FileError(f"{path}: is a directory; give the name of a file such as {path / 'out.nc'}")
+        raise FileError(
+            f"{path}: is a directory; give the name of a file such as {path / 'out.nc'}"
+        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = path.with_name(f".{path.name}.{os.getpid()}")

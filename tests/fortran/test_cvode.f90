@@ -1,7 +1,7 @@
 !> CVODE is there and right: a damped oscillator against its closed form.
 module oscillator
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
-   use fsundials_nvector_mod, only: FN_VGetArrayPointer, N_Vector
+   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector
    implicit none
    private
 
@@ -37,17 +37,17 @@ end module oscillator
 
 program test_cvode
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_funloc, c_int, c_loc, c_long, &
-      & c_null_ptr, c_ptr
+      & c_ptr
    use fcvode_mod, only: CV_ADAMS, CV_NORMAL, FCVode, FCVodeCreate, FCVodeFree, FCVodeGetDky, &
       & FCVodeInit, FCVodeSetMaxNumSteps, FCVodeSetNonlinearSolver, FCVodeSetUserData, &
       & FCVodeSStolerances
    use fnvector_serial_mod, only: FN_VMake_Serial
-   use fsundials_context_mod, only: FSUNContext_Create, FSUNContext_Free
-   use fsundials_nonlinearsolver_mod, only: FSUNNonlinSolFree, SUNNonlinearSolver
-   use fsundials_nvector_mod, only: FN_VDestroy, N_Vector
+   use fsundials_core_mod, only: FN_VDestroy, FSUNContext_Create, FSUNContext_Free, &
+      & FSUNNonlinSolFree, N_Vector, SUN_COMM_NULL, SUNNonlinearSolver
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
    use mesoslip_kinds, only: wp
    use mesoslip_sundials_cvode, only: sundials_version
+   use mesoslip_sundials_index, only: sunindextype
    use oscillator, only: oscillator_type, right_side
    use testing, only: check, check_close, finish
    implicit none
@@ -55,42 +55,53 @@ program test_cvode
    real(c_double), parameter :: end_time = 20.0_c_double
    type(oscillator_type), target :: parameters
    real(c_double), target :: values(2), middle(2)
-   real(c_double) :: time(1)
+   real(c_double) :: time(1), between
    type(N_Vector), pointer :: state, dense
    type(SUNNonlinearSolver), pointer :: solver
    type(c_ptr) :: context, memory
-   integer(c_int) :: status
 
    values = [1.0_c_double, 0.0_c_double]
-   status = FSUNContext_Create(c_null_ptr, context)
-   state => FN_VMake_Serial(2_c_long, values, context)
-   dense => FN_VMake_Serial(2_c_long, middle, context)
+   call succeed(FSUNContext_Create(SUN_COMM_NULL, context), "context")
+   state => FN_VMake_Serial(2_sunindextype, values, context)
+   dense => FN_VMake_Serial(2_sunindextype, middle, context)
    memory = FCVodeCreate(CV_ADAMS, context)
    call check(c_associated(memory), "CVODE is created")
-   status = FCVodeInit(memory, c_funloc(right_side), 0.0_c_double, state)
-   status = FCVodeSetUserData(memory, c_loc(parameters))
-   status = FCVodeSStolerances(memory, 1.0e-11_c_double, 1.0e-12_c_double)
-   status = FCVodeSetMaxNumSteps(memory, 100000_c_long)
+   call succeed(FCVodeInit(memory, c_funloc(right_side), 0.0_c_double, state), "problem")
+   call succeed(FCVodeSetUserData(memory, c_loc(parameters)), "user data")
+   call succeed(FCVodeSStolerances(memory, 1.0e-11_c_double, 1.0e-12_c_double), "tolerances")
+   call succeed(FCVodeSetMaxNumSteps(memory, 100000_c_long), "number of steps")
    solver => FSUNNonlinSol_FixedPoint(state, 0_c_int, context)
-   status = FCVodeSetNonlinearSolver(memory, solver)
+   call succeed(FCVodeSetNonlinearSolver(memory, solver), "nonlinear solver")
 
    time = 0.0_c_double
-   status = FCVode(memory, end_time, state, time, CV_NORMAL)
-   call check(status == 0, "CVODE integrates")
+   call succeed(FCVode(memory, end_time, state, time, CV_NORMAL), "integration")
+   call check_close(time(1), end_time, 0.0_wp, "the end is reached")
    call check_close(values(1), exact(end_time), 1.0e-8_wp, "displacement at the end")
-   status = FCVodeGetDky(memory, end_time - 1.0e-3_c_double, 0_c_int, dense)
-   call check(status == 0, "dense output")
-   call check_close(middle(1), exact(end_time - 1.0e-3_wp), 1.0e-8_wp, "displacement in between")
-   call check(index(sundials_version(), ".") > 0, "SUNDIALS tells its version")
+
+   between = end_time - 1.0e-3_c_double
+   call succeed(FCVodeGetDky(memory, between, 0_c_int, dense), "dense output")
+   call check_close(middle(1), exact(between), 1.0e-8_wp, "displacement in between")
+
+   call check(index(sundials_version(), ".") > 1, "SUNDIALS tells its version")
 
    call FCVodeFree(memory)
-   status = FSUNNonlinSolFree(solver)
+   call succeed(FSUNNonlinSolFree(solver), "end of the solver")
    call FN_VDestroy(state)
    call FN_VDestroy(dense)
-   status = FSUNContext_Free(context)
+   call succeed(FSUNContext_Free(context), "end of the context")
    call finish()
 
 contains
+
+   !> Check the status that SUNDIALS returned.
+   subroutine succeed(status, name)
+      !> 0 means success
+      integer(c_int), intent(in) :: status
+      !> What was done
+      character(len=*), intent(in) :: name
+
+      call check(status == 0, "status: " // name)
+   end subroutine succeed
 
    !> Closed form of the displacement.
    pure function exact(at) result(displacement)

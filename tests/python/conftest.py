@@ -1,0 +1,57 @@
+"""What the tests share."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mesoslip import Config
+
+ROOT = Path(__file__).parents[2]
+
+KLEIN = {
+    "run": {"duration": 12.0},
+    "drive": {"velocity": 1e-7},
+    "slider": {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2},
+    "contacts": {
+        "count": 4080,
+        "area": 1e-10,
+        "film_thickness": 3.5e-9,
+        "film_density": 956.0,
+        "static_force": 18e-6,
+        "stiffness": 2000.0,
+        "drag_rate": 2e11,
+        "delay": 5e-4,
+        "back_force_ratio": 0.1,
+        "threshold": {"law": "gaussian", "relative_width": 0.01},
+    },
+    "output": {"interval": 1e-3},
+}
+
+
+def klein_tables(**changes: Any) -> dict[str, Any]:
+    """Klein's case as tables, with changes; a double underscore separates tables from keys."""
+    tables = copy.deepcopy(KLEIN)
+    for path, value in changes.items():
+        *outer, key = path.split("__")
+        table = tables
+        for name in outer:
+            table = table.setdefault(name, {})
+        if value is None:
+            del table[key]
+        else:
+            table[key] = value
+    return tables
+
+
+@pytest.fixture
+def klein():
+    """Klein's case as a configuration, with changes."""
+
+    def configure(**changes: Any) -> Config:
+        return Config.from_dict(klein_tables(**changes))
+
+    return configure

@@ -1,0 +1,215 @@
+"""The command line: what it makes, and one clear message for every mistake."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import tomli_w
+import xarray as xr
+from conftest import ROOT, klein_tables
+
+import mesoslip
+from mesoslip.cli import main
+
+
+@pytest.fixture
+def short(tmp_path):
+    """A configuration that runs in no time, up to and beyond the first slip."""
+    path = tmp_path / "short.toml"
+    tables = klein_tables(contacts__count=50, run__duration=2.2, output__slip_interval=1e-3)
+    path.write_text(tomli_w.dumps(tables))
+    return path
+
+
+@pytest.fixture
+def command(monkeypatch, capfd):
+    """Run a command; returns exit status, standard output and standard error."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["mesoslip", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exit_:
+            main()
+        captured = capfd.readouterr()
+        assert "Traceback" not in captured.err
+        return exit_.value.code or 0, captured.out, captured.err
+
+    return call
+
+
+def test_run_writes_a_cf_file(short, tmp_path, command):
+    output = tmp_path / "deep" / "short.nc"
+    status, _, told = command("run", short, "-o", output, "--set", "run.realizations=2")
+    assert status == 0
+    assert str(output) in told
+    assert [path.name for path in output.parent.iterdir()] == ["short.nc"]
+    with xr.open_datatree(output) as tree:
+        tree = tree.load()
+    assert tree.sizes == {"realization": 2, "time": 2201}
+    for node in tree.subtree:
+        for name, variable in node.variables.items():
+            assert "units" in variable.attrs, name
+    assert tree.attrs["Conventions"].startswith("CF")
+    assert tree.attrs["seed"] == 1
+    for name in ("configuration", "program_version", "commit", "compiler", "library_versions"):
+        assert tree.attrs[name]
+    assert set(tree["slips"].to_dataset(inherit=False).variables) == {
+        "realization",
+        "start_time",
+        "end_time",
+        "force_before",
+        "force_after",
+        "force_drop",
+        "peak_velocity",
+        "contacts_broken",
+    }
+    in_memory = mesoslip.run(
+        {
+            **klein_tables(
+                contacts__count=50,
+                run__duration=2.2,
+                run__realizations=2,
+                output__slip_interval=1e-3,
+            )
+        }
+    )
+    for name in tree.data_vars:
+        if name != "kernel_seconds":
+            np.testing.assert_array_equal(tree[name].values, in_memory[name].values)
+
+
+def test_an_output_can_be_run_again(short, tmp_path, command):
+    first, second = tmp_path / "first.nc", tmp_path / "second.nc"
+    assert command("run", short, "-o", first, "--set", "contacts.delay=1ms")[0] == 0
+    assert command("run", first, "-o", second, "--quiet") == (0, "", "")
+    one, other = mesoslip.read(first), mesoslip.read(second)
+    np.testing.assert_array_equal(one["spring_force"].values, other["spring_force"].values)
+    assert one.attrs["configuration"] == other.attrs["configuration"]
+
+
+def test_info(command):
+    status, out, _ = command("info", ROOT / "runs" / "klein.toml", "--json")
+    assert status == 0
+    assert json.loads(out)["omega_s"] == pytest.approx(256.88, rel=1e-4)
+    status, out, _ = command("info", ROOT / "runs" / "klein.toml", "--set", "slider.mass=1kg")
+    assert "setup frequency" in out
+
+
+def test_slips(short, tmp_path, command):
+    output, table = tmp_path / "out.nc", tmp_path / "slips.csv"
+    command("run", short, "-o", output, "--quiet")
+    status, out, _ = command("slips", output, "--json", "--csv", table)
+    assert status == 0
+    catalogue = json.loads(out)
+    assert len(catalogue["slips"]) >= 1
+    with table.open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0][1] == "start_time [s]"
+    assert len(rows) == 1 + len(catalogue["slips"])
+    assert "slips" in command("slips", output)[1]
+    command("run", short, "-o", output, "--quiet", "--set", "run.duration=1s")
+    assert command("slips", output)[1].endswith("0 slips\n")
+    assert command("plot", output)[0] == 0
+
+
+def test_plot_and_figures(short, tmp_path, command):
+    output = tmp_path / "S20.nc"
+    command("run", short, "-o", output, "--quiet")
+    assert command("plot", output, "-o", tmp_path / "picture.pdf")[0] == 0
+    assert (tmp_path / "picture.pdf").read_bytes().startswith(b"%PDF")
+    assert command("figures", "S20", "--from", tmp_path, "-o", tmp_path / "figures")[0] == 0
+    assert (tmp_path / "figures" / "S20.png").stat().st_size > 10000
+
+
+def test_start_up_is_quick():
+    """No package that takes long is imported before it is needed."""
+    code = (
+        "import sys, mesoslip.cli, mesoslip.config, mesoslip.derived\n"
+        "slow = {'matplotlib', 'scipy', 'xarray', 'netCDF4', 'pint', 'rich'} & sys.modules.keys()\n"
+        "assert not slow, slow"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "none.toml"], ["none.toml", "no such file"]),
+        (["run", "."], ["directory"]),
+        (["run", "short.toml", "--set", "slider.stifness=1"], ["stifness", "stiffness"]),
+        (["run", "short.toml", "--set", "slider.mass=97 N"], ["slider.mass", "1.47 g"]),
+        (["run", "short.toml", "--set", "slider.mass=-1 g"], ["slider.mass", "greater than 0"]),
+        (["run", "short.toml", "--set", "slider.mass=nan"], ["slider.mass", "finite"]),
+        (["run", "short.toml", "--set", "contacts.count=0"], ["contacts.count"]),
+        (["run", "short.toml", "-o", "."], ["directory"]),
+        (["run", "short.toml", "-o", "short.toml/out.nc"], ["short.toml/out.nc", "written"]),
+        (["run", "broken.toml"], ["broken.toml", "line 2"]),
+        (["run", "short.toml", "--workers", "0"], ["--workers"]),
+        (["run", "short.toml", "--fast"], ["--fast"]),
+        (["runn", "short.toml"], ["runn"]),
+        (["run"], ["CONFIG"]),
+        (["info", "none.toml"], ["none.toml", "no such file"]),
+        (["plot", "truncated.nc"], ["truncated.nc", "netCDF"]),
+        (["plot", "short.toml"], ["short.toml", "netCDF"]),
+        (["plot", "other.nc"], ["other.nc", "not an output"]),
+        (["plot", "none.nc"], ["none.nc", "no such file"]),
+        (["plot", "good.nc", "-o", "picture.xyz"], ["picture.xyz", "xyz"]),
+        (["slips", "truncated.nc"], ["truncated.nc"]),
+        (["run", "truncated.nc"], ["truncated.nc"]),
+        (["slips", "good.nc", "--csv", "."], ["written"]),
+        (["figures", "S99"], ["S99", "S20"]),
+        (["figures", "S20"], ["out/S20.nc", "make"]),
+    ],
+)
+def test_mistakes(arguments, words, short, tmp_path, command, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken.toml").write_text("[run]\nduration = = 3\n")
+    xr.Dataset({"a": 1}).to_netcdf("other.nc")
+    command("run", "short.toml", "-o", "good.nc", "--quiet")
+    (tmp_path / "truncated.nc").write_bytes((tmp_path / "good.nc").read_bytes()[:20000])
+    before = sorted(tmp_path.rglob("*"))
+    status, out, told = command(*arguments)
+    assert status == 2
+    assert out == ""
+    for word in words:
+        assert word in told
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_ctrl_c_keeps_what_there_is(tmp_path):
+    """A usable partial file that says so, exit status 130, and nothing under the final name."""
+    output = tmp_path / "long.nc"
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "mesoslip",
+            "run",
+            str(ROOT / "runs" / "klein.toml"),
+            "-o",
+            str(output),
+            "--set",
+            "run.duration=3000 s",
+        ],
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        text=True,
+    )
+    time.sleep(4)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in told
+    assert "interrupted" in told
+    assert [path.name for path in tmp_path.iterdir()] == ["long.partial.nc"]
+    tree = mesoslip.read(tmp_path / "long.partial.nc")
+    assert tree.attrs["complete"] == "false"
+    assert tree["time"].values[-1] > 2
+    mesoslip.plot(tree, tmp_path / "partial.png")

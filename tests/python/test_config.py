@@ -1,0 +1,237 @@
+"""Configurations: what is accepted, what is refused, and with which words."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from conftest import ROOT, klein_tables
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mesoslip import Config, ConfigError, FileError
+from mesoslip.derived import derived_quantities
+from mesoslip.units import to_si
+
+
+def problems(tables) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        Config.from_dict(tables, source="case.toml")
+    assert caught.value.exit_status == 2
+    return [str(problem) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("slider__mass", "-1 g", ["slider.mass", "-1 g", "greater than 0"]),
+        ("slider__mass", "97 N", ["slider.mass", "97 N", "1.47 g", "kg"]),
+        ("slider__mass", "five", ["slider.mass", "five", "1.47 g"]),
+        ("slider__mass", float("nan"), ["slider.mass", "finite"]),
+        ("slider__mass", float("inf"), ["slider.mass", "finite"]),
+        ("slider__mass", "nan kg", ["slider.mass", "finite"]),
+        ("slider__mass", True, ["slider.mass", "1.47 g"]),
+        ("slider__mass", None, ["slider.mass", "missing"]),
+        ("slider__stiffness", 0, ["slider.stiffness", "greater than 0"]),
+        ("slider__damping_ratio", -0.1, ["slider.damping_ratio", "greater than or equal to 0"]),
+        ("slider__damping", 5.0, ["slider.damping", "not both"]),
+        ("slider__stifness", 97, ["slider.stifness", "unknown key", "'stiffness'"]),
+        ("slider__layers", 16, ["slider.layers", "not available in this version"]),
+        ("slider__kind", "layered", ["slider.kind", "not available", "rigid"]),
+        ("slider__kind", "bouncy", ["slider.kind", "bouncy", "rigid", "prescribed"]),
+        ("slider", 5, ["slider", "table"]),
+        ("run__engine", "me", ["run.engine", "not available", "eq"]),
+        ("run__duration", "0 s", ["run.duration", "greater than 0"]),
+        ("run__duration", None, ["run.duration", "needed"]),
+        ("run__realizations", 0, ["run.realizations", "greater than or equal to 1"]),
+        ("run__seed", -1, ["run.seed", "greater than or equal to 0"]),
+        ("drive__velocity", "3 s", ["drive.velocity", "um/s"]),
+        ("drive__velocity", None, ["drive.velocity", "either"]),
+        ("drive__force_rate", "1 uN/s", ["drive.force_rate", "not available in this version"]),
+        (
+            "drive",
+            {"stage": [{"duration": -1, "velocity": 0}]},
+            ["drive.stage[0].duration", "greater"],
+        ),
+        ("contacts__count", 0, ["contacts.count", "greater than or equal to 1"]),
+        ("contacts__count", 2.5, ["contacts.count", "integer"]),
+        ("contacts__count", 2_000_000_000, ["contacts.count", "GiB"]),
+        ("contacts__area", None, ["contacts.area", "drag_rate"]),
+        ("contacts__delay", "-1 ms", ["contacts.delay", "greater than or equal to 0"]),
+        ("contacts__back_force_ratio", 1.0, ["contacts.back_force_ratio", "less than 1"]),
+        ("contacts__coupling", "loose", ["contacts.coupling", "loose", "scaled"]),
+        ("contacts__reattach", "yes", ["contacts.reattach", "boolean"]),
+        ("contacts__ageing", {}, ["contacts.ageing", "not available in this version"]),
+        ("contacts__threshold__law", "cauchy", ["contacts.threshold.law", "gaussian"]),
+        ("contacts__threshold__relative_width", 0, ["relative_width", "greater than 0"]),
+        ("interaction", {"strength": 0.3}, ["interaction", "not available in this version"]),
+        ("output__interval", "20 s", ["output.interval", "duration"]),
+        ("output__interval", 1e-12, ["output.interval", "GiB"]),
+        ("output__slip_interval", 0.1, ["output.slip_interval", "interval"]),
+        ("outputs", {}, ["outputs", "unknown key", "'output'"]),
+    ],
+)
+def test_what_is_wrong_is_told(key, value, words):
+    tables = klein_tables(**{key: value})
+    (message,) = problems(tables)
+    assert message.startswith("case.toml: ")
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(("law", "width"), [("uniform", 0.6), ("exponential", 1.01)])
+def test_thresholds_are_not_negative(law, width):
+    (message,) = problems(klein_tables(contacts__threshold={"law": law, "relative_width": width}))
+    assert "relative_width" in message
+    assert law in message
+    edge = {"uniform": 1 / math.sqrt(3), "exponential": 1.0}[law]
+    Config.from_dict(
+        klein_tables(
+            contacts__threshold={"law": law, "relative_width": edge}, contacts__back_force_ratio=0.0
+        )
+    )
+
+
+def test_most_thresholds_are_above_the_back_force():
+    (message,) = problems(
+        klein_tables(
+            contacts__threshold={"law": "lognormal", "relative_width": 2.0},
+            contacts__back_force_ratio=0.5,
+        )
+    )
+    assert "only 0.465 of the thresholds are above the back force" in message
+
+
+def test_everything_wrong_is_told_at_once():
+    messages = problems(
+        klein_tables(slider__mass="-1 g", contacts__count=0, drive__velocity="1 N", outputs={})
+    )
+    assert len(messages) == 4
+
+
+@given(st.floats(1e-12, 1e12))
+def test_units_are_converted(value):
+    assert to_si(f"{value!r} uN", "N", "18 uN") == pytest.approx(value * 1e-6, rel=1e-12)
+    assert to_si(value, "N", "18 uN") == value
+
+
+@given(st.text(max_size=12))
+def test_no_text_breaks_the_parser(text):
+    try:
+        assert math.isfinite(to_si(text, "kg", "1.47 g"))
+    except ValueError as error:
+        assert "1.47 g" in str(error)
+
+
+def test_klein_file_is_kleins_case(klein):
+    config = Config.load(ROOT / "runs" / "klein.toml")
+    expected = klein(output__slip_interval=1e-5)
+    assert config.slider.damping_rate == expected.slider.damping_rate
+    for table in ("drive", "contacts", "slider"):
+        ours, theirs = config.to_dict()[table], expected.to_dict()[table]
+        assert ours.keys() == theirs.keys()
+        for name in ours.keys() - {"threshold", "kind", "coupling", "initial"}:
+            assert ours[name] == pytest.approx(theirs[name], rel=1e-12), name
+
+
+def test_round_trip(klein):
+    config = klein(title="A title", run__realizations=3)
+    assert Config.from_dict(config.to_dict()) == config
+    assert Config.from_toml(config.to_toml()) == config
+
+
+def test_every_run_in_the_tree_is_valid():
+    for path in (ROOT / "runs").glob("*.toml"):
+        Config.load(path)
+
+
+def test_overrides():
+    path = ROOT / "runs" / "klein.toml"
+    config = Config.load(
+        path,
+        [
+            "contacts.delay=1ms",
+            "contacts.threshold.law=weibull",
+            "slider.damping=3 1/s",
+            "run.seed=5",
+            "contacts.reattach=false",
+            "title = another",
+        ],
+    )
+    assert config.contacts.delay == 1e-3
+    assert config.contacts.threshold.law == "weibull"
+    assert config.slider.damping_rate == 3
+    assert config.run.seed == 5
+    assert config.contacts.reattach is False
+    assert config.title == "another"
+    with pytest.raises(ConfigError, match="did you mean 'delay'"):
+        Config.load(path, ["contacts.delays=1ms"])
+    with pytest.raises(ConfigError, match="must look like"):
+        Config.load(path, ["contacts.delay"])
+
+
+def test_a_base_is_laid_under(tmp_path):
+    (tmp_path / "base.toml").write_text((ROOT / "runs" / "klein.toml").read_text())
+    (tmp_path / "over.toml").write_text(
+        'base = "base.toml"\n[contacts]\ndelay = "2 ms"\n[slider]\ndamping = 7\n'
+        '[[drive.stage]]\nduration = 3\nvelocity = "1 um/s"\n'
+        '[[drive.stage]]\nduration = "1 s"\nvelocity = 0\n[run]\nduration = 10\n'
+    )
+    config = Config.load(tmp_path / "over.toml")
+    assert config.contacts.delay == 2e-3
+    assert config.contacts.count == 4080
+    assert config.slider.damping_rate == 7
+    # The last stage lasts until the end of the run.
+    assert config.drive_stages == ((3, 1e-6), (7, 0))
+    (tmp_path / "block.toml").write_text('base = "base.toml"\n[slider]\nkind = "prescribed"\n')
+    assert Config.load(tmp_path / "block.toml").slider.kind == "prescribed"
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(FileError, match="no such file"):
+        Config.load(tmp_path / "none.toml")
+    with pytest.raises(FileError, match="is a directory"):
+        Config.load(tmp_path)
+    broken = tmp_path / "broken.toml"
+    broken.write_text("[run]\nduration = \n")
+    with pytest.raises(ConfigError, match=r"not valid TOML.*line 2"):
+        Config.load(broken)
+    (tmp_path / "a.toml").write_text('base = "b.toml"')
+    (tmp_path / "b.toml").write_text('base = "a.toml"')
+    with pytest.raises(ConfigError, match="based on each other"):
+        Config.load(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("stages", "duration", "expected"),
+    [
+        ([(2.0, 1e-6), (3.0, 0.0)], None, ((2.0, 1e-6), (3.0, 0.0))),
+        ([(2.0, 1e-6), (3.0, 0.0)], 1.5, ((1.5, 1e-6),)),
+        ([(2.0, 1e-6), (3.0, 0.0)], 8.0, ((2.0, 1e-6), (6.0, 0.0))),
+    ],
+)
+def test_stages_and_duration(stages, duration, expected):
+    tables = klein_tables(
+        run__duration=duration,
+        drive={"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]},
+    )
+    assert Config.from_dict(tables).drive_stages == expected
+
+
+def test_derived_quantities_of_klein(klein):
+    """Model sections 1 and 7, the second column: what the source's own formulas give."""
+    derived = {name: one.value for name, one in derived_quantities(klein()).items()}
+    expected = {
+        "omega_s": 257,
+        "setup_period": 0.0245,
+        "omega_l": 1.17e3,
+        "D1": 2.10e-3,
+        "alpha": 14.2,
+        "K_star_estimate": 1.8e5,
+        "break_stretch": 9e-9,
+    }
+    for name, value in expected.items():
+        assert derived[name] == pytest.approx(value, rel=5e-3)
+    prescribed = derived_quantities(klein(slider={"kind": "prescribed"}))
+    assert "omega_s" not in prescribed
+    assert "alpha" not in derived_quantities(klein(drive__velocity=0.0))

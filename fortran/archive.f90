@@ -1,4 +1,4 @@
-!> State as plain arrays: each part of a simulation puts its numbers into an archive, or gets them back.
+!> State as plain arrays: each part of a simulation puts its numbers into an archive, or gets them.
 module mesoslip_archive
    use mesoslip_kinds, only: i8, wp
    use mesoslip_accumulator, only: accumulator_type

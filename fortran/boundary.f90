@@ -4,11 +4,11 @@
 
 !> Run the earthquake-like model for some advances of the slider.
 subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_ratio, coupling, &
-   & reattach, law, relative_width, initial, seed, realization, slider_kind, mass, spring, damping, &
-   & stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, quiet_time, &
-   & started, reals, integers, state_real, state_integer, record, detached, detached_contact, &
-   & trace_capacity, trace, slip_trace_capacity, slip_trace, slip_capacity, slips, most_advances, &
-   & rows, finished, time, breaks, advances, energy, status, message)
+   & reattach, law, relative_width, initial, seed, realization, slider_kind, mass, spring, &
+   & damping, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
+   & quiet_time, started, reals, integers, state_real, state_integer, record, detached, &
+   & detached_contact, trace_capacity, trace, slip_trace_capacity, slip_trace, slip_capacity, &
+   & slips, most_advances, rows, finished, time, breaks, advances, energy, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type, status_invalid

@@ -374,7 +374,8 @@ contains
       self%offset = accumulator_type()
       do contact = 1, self%parameters%count
          call self%stiffness%add(self%record(row_stiffness, contact))
-         call self%offset%add(self%record(row_stiffness, contact) * self%record(row_origin, contact))
+         call self%offset%add(self%record(row_stiffness, contact) &
+            & * self%record(row_origin, contact))
       end do
    end subroutine bear
 

@@ -1,12 +1,12 @@
-!> What is kept of a run: a trace at fixed intervals, a catalogue of slips, and finer traces of them.
+!> What is kept of a run: a trace at fixed intervals, a catalogue of slips, finer traces of them.
 !>
 !> Samples are taken from the motion between events, so how often one looks does not change a run.
 !>
-!> A slip starts where the spring force is greatest, that is where the slider becomes faster than the
-!> drive, if it goes on to exceed the drive's velocity by the slip velocity. It ends where the spring
-!> force is least, before the slider has been slow again for half a period of the setup. While the
-!> slider is still ringing, a new slip starts if the spring force has regained half its drop and most
-!> contacts are pinned.
+!> A slip starts where the spring force is greatest, that is where the slider becomes faster than
+!> the drive, if it goes on to exceed the drive's velocity by the slip velocity. It ends where the
+!> spring force is least, before the slider has been slow again for half a period of the setup.
+!> While the slider is still ringing, a new slip starts if the spring force has regained half its
+!> drop and most contacts are pinned.
 module mesoslip_recorder
    use mesoslip_kinds, only: i8, wp
    use mesoslip_archive, only: archive_type
@@ -337,7 +337,7 @@ contains
       end do
    end function pace
 
-   !> Greatest velocity, in a sense, during the last advance, which has one maximum; by golden section.
+   !> Greatest velocity, in a sense, during the last advance, by golden section.
    pure function fastest(slider, sense) result(velocity)
       class(slider_type), intent(in) :: slider
       real(wp), intent(in) :: sense

@@ -1,4 +1,4 @@
-!> The loop of a run: a slider moves under the law of its contacts until a contact breaks or attaches.
+!> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_simulation
    use mesoslip_kinds, only: i8, wp
    use mesoslip_errors, only: error_type, raise, status_stalled

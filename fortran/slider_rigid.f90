@@ -22,7 +22,7 @@ module mesoslip_slider_rigid
    integer :: i
    real(wp), parameter :: inverse(most_terms + 2) = [(1.0_wp / i, i=1, most_terms + 2)]
 
-   !> Gauss-Legendre points and weights on [0, 1], for the energy balance of middling and long steps.
+   !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
    real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
       & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
    real(wp), parameter :: weight_4(4) = [0.17392742256872692869_wp, 0.32607257743127307131_wp, &
@@ -125,7 +125,7 @@ contains
       end if
 
       if (.not. step > 0.0_wp) return
-      ! The number of terms is a constant in each call, for which the compiler makes a copy of its own.
+      ! The number of terms is a constant in each call: the compiler makes a copy for each.
       if (rate * step <= short_step) then
          call move(self, system, window, rate, step, ends, few_terms)
       else if (rate * step <= middling_step) then
@@ -246,7 +246,8 @@ contains
       do term = 3, terms - 1
          self%series(term) = inverse(term) * ((driving - third * self%series(term - 3)) &
             & * (inverse(term - 1) * inverse(term - 2)) &
-            & - (second * inverse(term - 1)) * self%series(term - 2) - first * self%series(term - 1))
+            & - (second * inverse(term - 1)) * self%series(term - 2) &
+            & - first * self%series(term - 1))
          driving = 0.0_wp
       end do
    end subroutine expand
@@ -369,7 +370,8 @@ contains
          next = lower
          if (abs(excess) < abs(velocity) * longest) then
             change = excess / velocity
-            next = time - change * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
+            next = time - change &
+               & * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
          end if
          if (next > lower .and. next < upper) then
             change = next - time
@@ -425,8 +427,9 @@ contains
       real(wp) :: square, damped
 
       if (rate * step < step_of_slopes) then
-         square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) + step * (1.0_wp / 6.0_wp) &
-            & * (early%velocity * early%acceleration - late%velocity * late%acceleration))
+         square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
+            & + step * (1.0_wp / 6.0_wp) * (early%velocity * early%acceleration &
+            & - late%velocity * late%acceleration))
          damped = step * (0.5_wp * (early%damper * early%velocity + late%damper * late%velocity) &
             & + step * (1.0_wp / 12.0_wp) * (early%damper_rate * early%velocity &
             & + early%damper * early%acceleration - late%damper_rate * late%velocity &

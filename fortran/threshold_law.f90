@@ -1,8 +1,8 @@
 !> Laws of the relative breaking threshold u = f_si/f_s of a contact.
 !>
 !> Each law has mean 1 and a given relative width (standard deviation over mean) before draws that
-!> could not attach, u <= minimum, are rejected. Rejecting is done by inversion: the law that is left
-!> is the same as that of drawing again, and one draw consumes one deviate.
+!> could not attach, u <= minimum, are rejected. Rejecting is done by inversion: the law that is
+!> left is the same as that of drawing again, and one draw consumes one deviate.
 module mesoslip_threshold_law
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type, raise, status_invalid
@@ -161,6 +161,8 @@ contains
       case (law_exponential)
          z = (threshold - self%location) / self%scale
          if (z >= 0.0_wp) density = exp(-z) / self%scale
+      case default
+         return
       end select
       density = density / self%acceptance
    end function density
@@ -198,6 +200,8 @@ contains
          if (threshold > 0.0_wp) survival = exp(-(threshold / self%scale)**self%shape)
       case (law_exponential)
          survival = min(1.0_wp, exp(-(threshold - self%location) / self%scale))
+      case default
+         return
       end select
    end function plain_survival
 
@@ -233,24 +237,36 @@ contains
       !> The deviate that is not exceeded with this probability
       real(wp) :: z
 
-      real(wp), parameter :: a(0:7) = [3.3871328727963666080e0_wp, 1.3314166789178437745e+2_wp, &
-         & 1.9715909503065514427e+3_wp, 1.3731693765509461125e+4_wp, 4.5921953931549871457e+4_wp, &
-         & 6.7265770927008700853e+4_wp, 3.3430575583588128105e+4_wp, 2.5090809287301226727e+3_wp]
-      real(wp), parameter :: b(7) = [4.2313330701600911252e+1_wp, 6.8718700749205790830e+2_wp, &
-         & 5.3941960214247511077e+3_wp, 2.1213794301586595867e+4_wp, 3.9307895800092710610e+4_wp, &
-         & 2.8729085735721942674e+4_wp, 5.2264952788528545610e+3_wp]
-      real(wp), parameter :: c(0:7) = [1.42343711074968357734e0_wp, 4.63033784615654529590e0_wp, &
-         & 5.76949722146069140550e0_wp, 3.64784832476320460504e0_wp, 1.27045825245236838258e0_wp, &
-         & 2.41780725177450611770e-1_wp, 2.27238449892691845833e-2_wp, 7.74545014278341407640e-4_wp]
-      real(wp), parameter :: d(7) = [2.05319162663775882187e0_wp, 1.67638483018380384940e0_wp, &
-         & 6.89767334985100004550e-1_wp, 1.48103976427480074590e-1_wp, 1.51986665636164571966e-2_wp, &
-         & 5.47593808499534494600e-4_wp, 1.05075007164441684324e-9_wp]
-      real(wp), parameter :: e(0:7) = [6.65790464350110377720e0_wp, 5.46378491116411436990e0_wp, &
-         & 1.78482653991729133580e0_wp, 2.96560571828504891230e-1_wp, 2.65321895265761230930e-2_wp, &
-         & 1.24266094738807843860e-3_wp, 2.71155556874348757815e-5_wp, 2.01033439929228813265e-7_wp]
-      real(wp), parameter :: f(7) = [5.99832206555887937690e-1_wp, 1.36929880922735805310e-1_wp, &
-         & 1.48753612908506148525e-2_wp, 7.86869131145613259100e-4_wp, 1.84631831751005468180e-5_wp, &
-         & 1.42151175831644588870e-7_wp, 2.04426310338993978564e-15_wp]
+      real(wp), parameter :: a(0:7) = [ &
+         & 3.3871328727963666080e0_wp, 1.3314166789178437745e+2_wp, &
+         & 1.9715909503065514427e+3_wp, 1.3731693765509461125e+4_wp, &
+         & 4.5921953931549871457e+4_wp, 6.7265770927008700853e+4_wp, &
+         & 3.3430575583588128105e+4_wp, 2.5090809287301226727e+3_wp]
+      real(wp), parameter :: b(7) = [ &
+         & 4.2313330701600911252e+1_wp, 6.8718700749205790830e+2_wp, &
+         & 5.3941960214247511077e+3_wp, 2.1213794301586595867e+4_wp, &
+         & 3.9307895800092710610e+4_wp, 2.8729085735721942674e+4_wp, &
+         & 5.2264952788528545610e+3_wp]
+      real(wp), parameter :: c(0:7) = [ &
+         & 1.42343711074968357734e0_wp, 4.63033784615654529590e0_wp, &
+         & 5.76949722146069140550e0_wp, 3.64784832476320460504e0_wp, &
+         & 1.27045825245236838258e0_wp, 2.41780725177450611770e-1_wp, &
+         & 2.27238449892691845833e-2_wp, 7.74545014278341407640e-4_wp]
+      real(wp), parameter :: d(7) = [ &
+         & 2.05319162663775882187e0_wp, 1.67638483018380384940e0_wp, &
+         & 6.89767334985100004550e-1_wp, 1.48103976427480074590e-1_wp, &
+         & 1.51986665636164571966e-2_wp, 5.47593808499534494600e-4_wp, &
+         & 1.05075007164441684324e-9_wp]
+      real(wp), parameter :: e(0:7) = [ &
+         & 6.65790464350110377720e0_wp, 5.46378491116411436990e0_wp, &
+         & 1.78482653991729133580e0_wp, 2.96560571828504891230e-1_wp, &
+         & 2.65321895265761230930e-2_wp, 1.24266094738807843860e-3_wp, &
+         & 2.71155556874348757815e-5_wp, 2.01033439929228813265e-7_wp]
+      real(wp), parameter :: f(7) = [ &
+         & 5.99832206555887937690e-1_wp, 1.36929880922735805310e-1_wp, &
+         & 1.48753612908506148525e-2_wp, 7.86869131145613259100e-4_wp, &
+         & 1.84631831751005468180e-5_wp, 1.42151175831644588870e-7_wp, &
+         & 2.04426310338993978564e-15_wp]
       real(wp) :: centred, r
 
       centred = probability - 0.5_wp

@@ -28,7 +28,7 @@ def slips(tree: xr.DataTree) -> xr.Dataset:
 
     The waiting time is that since the start of the slip before; NaN for the first of a realization.
     """
-    data = tree["slips"].to_dataset(inherit=False)
+    data = tree.children["slips"].to_dataset(inherit=False)
     slip_time = data["end_time"] - data["start_time"]
     waiting = np.diff(data["start_time"].values, prepend=np.nan)
     if data.sizes["slip"]:

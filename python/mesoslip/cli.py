@@ -136,12 +136,14 @@ def slips(
         typer.echo(json.dumps({"slips": rows, "statistics": statistics}, indent=2))
         return
     typer.echo(
-        "  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s   breaks"
+        "  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s"
+        "   breaks"
     )
     for row in rows:
         typer.echo(
             f"{row['realization']:13d} {row['start_time']:10.4f} "
-            f"{1e3 * (row['end_time'] - row['start_time']):13.3f} {1e6 * row['force_before']:11.4f} "
+            f"{1e3 * (row['end_time'] - row['start_time']):13.3f} "
+            f"{1e6 * row['force_before']:11.4f} "
             f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
             f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8d}"
         )
@@ -192,7 +194,7 @@ def figures(
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Callable[[float], None]]:
-    """A progress bar on a terminal, otherwise a line for each tenth; yields what takes the part done."""
+    """A progress bar on a terminal, otherwise a line for each tenth."""
     if quiet:
         yield lambda _: None
         return

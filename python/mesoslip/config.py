@@ -220,8 +220,8 @@ class Contacts(Table):
         if above < least:
             raise _problem(
                 "back_force_ratio",
-                f"only {above:.3g} of the thresholds are above the back force, at least {least} must "
-                "be: choose a lower back_force_ratio or a narrower threshold law",
+                f"only {above:.3g} of the thresholds are above the back force, at least {least} "
+                "must be: choose a lower back_force_ratio or a narrower threshold law",
             )
         return self
 
@@ -249,7 +249,7 @@ class Contacts(Table):
 
 
 class Output(Table):
-    """What is recorded. A prescribed slider has no slips, so ``slip_interval`` says nothing there."""
+    """What is recorded; a prescribed slider has no slips, whatever ``slip_interval``."""
 
     interval: Annotated[Time, Field(gt=0)] | None = None
     slip_interval: Annotated[Time, Field(gt=0)] | None = None
@@ -527,6 +527,8 @@ def _parse_override(text: str) -> dict[str, Any]:
         parsed = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         parsed = value
-    for part in reversed(key.split(".")):
-        parsed = {part: parsed}
-    return parsed
+    outer, _, last = key.rpartition(".")
+    tables = {last: parsed}
+    for part in reversed(outer.split(".") if outer else ()):
+        tables = {part: tables}
+    return tables

@@ -60,7 +60,7 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "K_star_estimate",
         contacts.stiffness * (1 - contacts.back_force_ratio) / width,
         "N/m",
-        "estimate of the stiffness above which sliding is smooth, K* ~ Nk (f_s - f_b)/Delta f_s (S48)",
+        "estimate of K*, above which sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48)",
     )
 
 

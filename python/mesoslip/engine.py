@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
+from mesoslip.config import RigidSlider
 from mesoslip.errors import RunError
 from mesoslip.threshold import LAWS
 
@@ -59,7 +60,7 @@ COUPLINGS = {"scaled": 1, "equal": 2}
 INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
 SLIDERS = {"rigid": 1, "prescribed": 2}
 
-# Part of the slip velocity scale, Omega_S F_s/K, that the slider must exceed the drive by in a slip.
+# In a slip the slider exceeds the drive's velocity by this part of the scale Omega_S F_s/K.
 SLIP_VELOCITY_RATIO = 0.02
 
 # Wall time of a segment, between two looks at progress and Ctrl-C [s].
@@ -71,15 +72,13 @@ SLIP_ROWS = 2_000
 
 
 def slip_velocity(config: Config) -> float:
-    """Velocity above the drive's beyond which a rigid slider slips [m/s]; 0 where there are no slips."""
-    if config.slider.kind != "rigid":
+    """Velocity above the drive's that makes a slip [m/s]; 0 for a slider without slips."""
+    if not isinstance(config.slider, RigidSlider):
         return 0.0
     if config.output.slip_velocity is not None:
         return config.output.slip_velocity
-    omega_s = np.sqrt(config.slider.stiffness / config.slider.mass)
-    return float(
-        SLIP_VELOCITY_RATIO * omega_s * config.contacts.static_force / config.slider.stiffness
-    )
+    scale = config.slider.omega_s * config.contacts.static_force / config.slider.stiffness
+    return SLIP_VELOCITY_RATIO * scale
 
 
 @dataclass
@@ -139,11 +138,12 @@ class Realization:
         number = rows[:, -1].astype(int)
         rows, number = rows[number < len(slips)], number[number < len(slips)]
         # Fast motion that came to nothing may have been sampled under the number of a later slip.
-        return rows[rows[:, 0] >= slips[number, 1]]
+        kept: Array = rows[rows[:, 0] >= slips[number, 1]]
+        return kept
 
     @property
     def energy_residual(self) -> float:
-        """What the energy balance lacks, relative to the work of the drive (or its largest term)."""
+        """What the energy balance lacks, relative to the work of the drive or its largest term."""
         scale = abs(self.energy[0]) or float(np.max(np.abs(self.energy)))
         return float(self.energy[-1] / scale) if scale else 0.0
 
@@ -157,9 +157,13 @@ class Realization:
         """
         config = self.config
         contacts, slider = config.contacts, config.slider
-        rigid = slider.kind == "rigid"
         stages = config.drive_stages
-        setup = np.sqrt(slider.stiffness / slider.mass) if rigid else 1.0
+        if isinstance(slider, RigidSlider):
+            mass, spring, damping = slider.mass, slider.stiffness, slider.damping_rate
+            quiet_time = np.pi / slider.omega_s
+        else:
+            mass = spring = quiet_time = 1.0
+            damping = 0.0
         if not self._started:
             self._allocate()
         start = time.perf_counter()
@@ -177,15 +181,15 @@ class Realization:
             seed=config.run.seed,
             realization=self.number,
             slider_kind=SLIDERS[slider.kind],
-            mass=slider.mass if rigid else 1.0,
-            spring=slider.stiffness if rigid else 1.0,
-            damping=slider.damping_rate if rigid else 0.0,
+            mass=mass,
+            spring=spring,
+            damping=damping,
             stage_end=np.cumsum([stage.duration for stage in stages]),
             stage_velocity=np.array([stage.velocity for stage in stages]),
             interval=config.output_interval,
             slip_interval=config.output.slip_interval or 0.0,
             slip_velocity=slip_velocity(config),
-            quiet_time=np.pi / setup,
+            quiet_time=quiet_time,
             started=int(self._started),
             state_real=self._state_real,
             state_integer=self._state_integer,
@@ -212,7 +216,7 @@ class Realization:
 
     @property
     def contacts(self) -> dict[str, Array]:
-        """The contacts now: origin [m], stiffness [N/m], 0 if detached, breaking stretch [m], renewals."""
+        """Origin [m], stiffness [N/m] (0 if detached), breaking stretch [m], renewals of each."""
         names = ("origin", "stiffness", "break_stretch", "renewals")
         return {name: self._record[row].copy() for row, name in enumerate(names)}
 

@@ -17,7 +17,7 @@ from mesoslip.errors import FileError
 
 Array = NDArray[np.float64]
 
-STYLE = {
+STYLE: Any = {
     "font.size": 8,
     "axes.titlesize": 8,
     "axes.labelsize": 8,
@@ -49,7 +49,7 @@ def series(tree: xr.DataTree, name: str, realization: int = 0) -> tuple[Array, A
     root = tree.to_dataset().isel(realization=realization)
     times, values = root["time"].values, root[name].values.astype(float)
     if "slip_traces" in tree.children:
-        fine = tree["slip_traces"].to_dataset(inherit=False)
+        fine = tree.children["slip_traces"].to_dataset(inherit=False)
         mine = fine["realization"].values == root["realization"].item()
         times = np.concatenate([times, fine["time"].values[mine]])
         values = np.concatenate([values, fine[name].values[mine].astype(float)])
@@ -92,7 +92,9 @@ def draw_series(
 def largest_slip(tree: xr.DataTree) -> xr.Dataset | None:
     """The slip with the greatest drop of the spring force; None if there is no slip."""
     all_slips = slips(tree)
-    mine = np.flatnonzero(all_slips["realization"].values == tree["realization"].values[0])
+    mine = np.flatnonzero(
+        all_slips["realization"].values == tree.to_dataset()["realization"].values[0]
+    )
     if mine.size == 0:
         return None
     drops = all_slips["force_drop"].values[mine]

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mesoslip import plots, store
-from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.config import Config
+from mesoslip.errors import ConfigError, FileError, Problem
 
 
 def configuration(tree: xr.DataTree) -> Config:
@@ -109,7 +109,7 @@ def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
 
 
 def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
-    """S28: the spring force for different viscosities of the lubricant, during the first slip too."""
+    """S28: the spring force for different viscosities of the film, and its first drop."""
     figure = Figure(figsize=(6.5, 3))
     whole, detail = figure.subplots(1, 2, width_ratios=[2, 1])
     for tree, style in zip(trees, ("-", "--", ":", "-."), strict=False):

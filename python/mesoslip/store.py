@@ -66,8 +66,8 @@ def build(
     -------
     xarray.DataTree
         Root: the trace, dimensions (realization, time), and figures for each realization. Groups:
-        ``slips`` (slip), ``slip_traces`` (sample), ``energy`` (realization). What an interrupted run
-        did not come to is NaN in the trace.
+        ``slips`` (slip), ``slip_traces`` (sample), ``energy`` (realization). What an interrupted
+        run did not come to is NaN in the trace.
     """
     traces = [one.trace for one in realizations]
     longest = max(traces, key=len)

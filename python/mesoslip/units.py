@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
 
 @cache
-def registry() -> UnitRegistry:
+def registry() -> UnitRegistry[float]:
     """The unit registry; made at first use, as that takes a while."""
     import pint
 
@@ -50,7 +50,7 @@ def _parse(text: str, unit: str, wanted: str) -> float:
     import pint
 
     try:
-        quantity = registry().Quantity(text)
+        quantity: Any = registry().Quantity(text)
     # What the parser raises for text that is no quantity is not specified.
     except Exception as error:
         raise ValueError(f"is not a quantity; {wanted}") from error

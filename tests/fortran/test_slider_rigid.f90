@@ -63,7 +63,8 @@ contains
       integer :: side
 
       do side = -1, 1, 2
-         call check(reaches(1.0_wp + 1.0e-9_wp, side) > 9.0_wp, "no crossing beyond the turning point")
+         call check(reaches(1.0_wp + 1.0e-9_wp, side) > 9.0_wp, &
+            & "no crossing beyond the turning point")
          call check_close(reaches(1.0_wp - 1.0e-9_wp, side), &
             & (acos(-1.0_wp) - acos(1.0_wp - 1.0e-9_wp)) / frequency, 1.0e-8_wp, &
             & "crossing right before the turning point")

@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import integrate, linalg, optimize, special, stats
-
 from mesoslip import Config, _core
+from scipy import integrate, linalg, optimize, special, stats
 
 
 def frozen_law(law: str, width: float):

@@ -10,13 +10,12 @@ import subprocess
 import sys
 import time
 
+import mesoslip
 import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables
-
-import mesoslip
 from mesoslip.cli import main
 
 
@@ -168,7 +167,8 @@ def test_start_up_is_quick():
         (["figures", "S20"], ["out/S20.nc", "make"]),
     ],
 )
-def test_mistakes(arguments, words, short, tmp_path, command, monkeypatch):
+@pytest.mark.usefixtures("short")
+def test_mistakes(arguments, words, tmp_path, command, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken.toml").write_text("[run]\nduration = = 3\n")
     xr.Dataset({"a": 1}).to_netcdf("other.nc")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import mesoslip
 import numpy as np
 import pytest
-from oracles import exact_events, fixed_step
-
-import mesoslip
 from mesoslip.engine import Realization
+from oracles import exact_events, fixed_step
 
 # Fast loading, so that a slip comes within some ten milliseconds.
 FAST = {

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import mesoslip
 import numpy as np
 import pytest
-
-import mesoslip
 
 OMEGA_S = np.sqrt(97 / 1.47e-3)
 

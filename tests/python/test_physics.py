@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import mesoslip
 import numpy as np
 import pytest
-from oracles import stationary_force
-
-import mesoslip
 from mesoslip.engine import ENERGY_COLUMNS, Realization
+from oracles import stationary_force
 
 LAWS = {"gaussian": 0.2, "uniform": 0.3, "lognormal": 0.5, "weibull": 0.5, "exponential": 0.8}
 PRESCRIBED = {"slider": {"kind": "prescribed"}, "output__interval": 1e-3}

@@ -103,7 +103,8 @@ class Realization:
         self._slip_traces: list[Array] = []
         self._slips: list[Array] = []
         self._started = False
-        self._segment = SEGMENT_ADVANCES
+        # Every segment orders the queue anew, which must cost little beside its advances.
+        self._segment = max(SEGMENT_ADVANCES, self.config.contacts.count)
 
     def _allocate(self) -> None:
         """Make the arrays of the state, and the buffers that a segment fills."""

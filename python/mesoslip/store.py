@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from mesoslip import _build, engine
+from mesoslip import _build, _core, engine
 from mesoslip.config import Config
 from mesoslip.errors import FileError
 
@@ -177,7 +177,7 @@ def attributes(
         "commit": _build.COMMIT,
         "compiler": _build.COMPILER,
         "library_versions": ", ".join(
-            [f"python {platform.python_version()}"]
+            [f"python {platform.python_version()}", f"SUNDIALS {_core.sundials().decode()}"]
             + [f"{name} {version(name)}" for name in ("numpy", "xarray", "netCDF4", "pydantic")]
         ),
         "break_count": sum(one.breaks for one in realizations),

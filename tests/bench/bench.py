@@ -1,0 +1,116 @@
+"""Cost of a contact event over the number of contacts, and against fixed-step models.
+
+Run by ``make bench``. Times of one run are to be compared with each other, not with other machines.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from fixed_step import numba_run, numpy_steps
+
+from mesoslip import Config
+from mesoslip.engine import Realization
+
+ROOT = Path(__file__).parents[2]
+KLEIN = ROOT / "runs" / "klein.toml"
+
+
+def finish(config: Config) -> Realization:
+    realization = Realization(config, 0)
+    while not realization.finished:
+        realization.advance()
+    return realization
+
+
+def cost_over_contacts() -> None:
+    """Nanoseconds for a break and the birth after it, in the slips of Klein's case."""
+    print("\nCost of a break and rebirth in Klein's case, slips included")
+    print("  contacts    breaks   ns/break   against 4080   bytes/contact")
+    reference = 0.0
+    for count in (100, 4080, 100_000, 1_000_000, 4_000_000):
+        config = Config.load(KLEIN, [f"contacts.count={count}", "output.slip_interval=1ms"])
+        realization = Realization(config, 0)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        # Loading up to the first breaks costs the same for any number of contacts.
+        while realization.breaks < count / 2 and not realization.finished:
+            realization.advance(20_000)
+        breaks, seconds = realization.breaks, realization.kernel_seconds
+        while realization.breaks < max(400_000, 3 * count) and not realization.finished:
+            realization.advance(2_000_000)
+        memory = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 / count
+        breaks = realization.breaks - breaks
+        cost = (realization.kernel_seconds - seconds) / breaks * 1e9
+        reference = cost if count == 4080 else reference
+        ratio = f"{cost / reference:14.2f}" if reference else " " * 14
+        room = f"{memory:15.0f}" if count >= 1_000_000 else " " * 15
+        print(f"{count:10d} {breaks:9d} {cost:10.0f} {ratio} {room}", flush=True)
+
+
+def prescribed_cost() -> None:
+    """The same without a slider to advance: the cost of the contacts alone."""
+    print("\nCost of a break and rebirth under the prescribed slider")
+    print("  contacts    breaks   ns/break")
+    for count in (4080, 1_000_000, 4_000_000):
+        tables = Config.load(KLEIN).to_dict()
+        tables["slider"] = {"kind": "prescribed"}
+        tables["contacts"] |= {"count": count, "initial": "steady"}
+        tables["run"]["duration"] = 0.0162 * max(1.0, 2e6 / count)
+        tables["drive"]["velocity"] = 1e-6
+        tables["output"] = {"interval": tables["run"]["duration"]}
+        realization = finish(Config.from_dict(tables))
+        cost = realization.kernel_seconds / realization.breaks * 1e9
+        print(f"{count:10d} {realization.breaks:9d} {cost:10.0f}", flush=True)
+
+
+def against_fixed_steps() -> None:
+    """A fixed-step model at the step that gives the first slip of Klein's case to 1 % of F_s."""
+    duration = 1.96
+    config = Config.load(KLEIN, [f"run.duration={duration}", "output.slip_interval=1ms"])
+    events = min((finish(config) for _ in range(3)), key=lambda one: one.kernel_seconds)
+    before, after = events.slips[0, 3], events.slips[0, 4]
+    static = config.contacts.static_force
+    print(f"\nKlein's case up to {duration} s, the end of the first slip, 4080 contacts")
+    print(f"  event-driven: {events.kernel_seconds:.4f} s, {events.breaks} breaks, ", end="")
+    print(f"spring force {before * 1e6:.3f} to {after * 1e6:.3f} uN")
+    step = 2e-4
+    while True:
+        highest, lowest, seconds = numba_run(config, step, duration)
+        error = max(abs(highest - before), abs(lowest - after)) / static
+        ratio = seconds / events.kernel_seconds
+        print(
+            f"  Numba, step {step * 1e6:6.2f} us: {seconds:8.3f} s, {ratio:8.1f} times as long, "
+            f"spring force {highest * 1e6:.3f} to {lowest * 1e6:.3f} uN, off by {error:.2%} of F_s",
+            flush=True,
+        )
+        if error < 0.01 or step < 5e-7:
+            break
+        step /= 2
+    steps = 1000
+    seconds = numpy_steps(config, step, steps) / steps * (duration / step)
+    print(
+        f"  NumPy, step {step * 1e6:6.2f} us: {seconds:8.1f} s, "
+        f"{seconds / events.kernel_seconds:8.1f} times as long (from {steps} steps)"
+    )
+
+
+def main() -> None:
+    np.seterr(all="raise")
+    whole = min((finish(Config.load(KLEIN)) for _ in range(3)), key=lambda one: one.kernel_seconds)
+    print(
+        f"Klein's case, 12 s with finer traces: {whole.kernel_seconds:.3f} s of kernel time, "
+        f"{whole.breaks} breaks, {whole.advances} advances, "
+        f"{whole.kernel_seconds / whole.breaks * 1e9:.0f} ns/break"
+    )
+    cost_over_contacts()
+    prescribed_cost()
+    against_fixed_steps()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+!> Whole runs under all run-time checks: energy, conservation, reversal, and a state put away and
+!> taken up again.
+program test_simulation
+   use mesoslip_archive, only: archive_type
+   use mesoslip_contact_ensemble, only: contact_parameters_type, coupling_equal, coupling_scaled, &
+      & detached_length, initial_relaxed, initial_steady, new_contact_ensemble
+   use mesoslip_contact_record, only: record_length, row_stiffness
+   use mesoslip_errors, only: error_type
+   use mesoslip_kinds, only: i8, wp
+   use mesoslip_recorder, only: recorder_parameters_type, slip_length, slip_trace_length, &
+      & trace_length
+   use mesoslip_simulation, only: energy_length, simulation_type
+   use mesoslip_slider_prescribed, only: slider_prescribed_type
+   use mesoslip_slider_rigid, only: slider_rigid_type
+   use mesoslip_threshold_law, only: law_exponential, law_gaussian, new_threshold_law
+   use testing, only: check, check_close, finish
+   implicit none
+
+   integer, parameter :: count = 200, rows = 30000, reals = 64, integers = 32
+   integer(i8), parameter :: forever = 1000000000_i8
+   real(wp), target :: record(record_length, count), detached(detached_length, count)
+   integer, target :: detached_contact(count)
+   real(wp), target :: trace(trace_length, rows), slip_trace(slip_trace_length, rows)
+   real(wp), target :: slips(slip_length, rows)
+
+   call closes("gaussian", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed, .true.)
+   call closes("exponential", law_exponential, 1.0_wp, coupling_equal, initial_steady, .true.)
+   call closes("prescribed", law_exponential, 1.0_wp, coupling_scaled, initial_steady, .false.)
+   call goes_on()
+   call finish()
+
+contains
+
+   !> Energy is balanced and contacts are conserved, forward, in a hold, and back.
+   subroutine closes(name, law, width, coupling, initial, rigid)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: law, coupling, initial
+      real(wp), intent(in) :: width
+      logical, intent(in) :: rigid
+
+      type(simulation_type) :: simulation
+      type(error_type), allocatable :: error
+      real(wp) :: energy(energy_length)
+
+      call build(simulation, law, width, coupling, rigid)
+      call simulation%start(initial)
+      call simulation%run(forever, error)
+      energy = simulation%energy_balance()
+      call check(.not. allocated(error) .and. simulation%finished, "a run ends: " // name)
+      call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, 1.0e-11_wp, &
+         & "energy balance: " // name)
+      call check(simulation%contacts%breaks > count, "contacts break: " // name)
+      call check(size(pack(record(row_stiffness, :), record(row_stiffness, :) > 0.0_wp)) &
+         & + simulation%contacts%detached_count == count, "contacts are conserved: " // name)
+      call check(simulation%slider%origin + simulation%slider%displacement < 0.0_wp, &
+         & "the slider comes back beyond its start: " // name)
+   end subroutine closes
+
+   !> A state that is put away after a few advances and taken up again goes on to the same numbers.
+   subroutine goes_on()
+      type(simulation_type) :: simulation, next
+      type(archive_type) :: archive
+      type(error_type), allocatable :: error
+      real(wp) :: whole(energy_length), pieces(energy_length)
+      integer :: segment
+
+      call build(simulation, law_gaussian, 0.1_wp, coupling_scaled, .true.)
+      call simulation%start(initial_relaxed)
+      call simulation%run(forever, error)
+      whole = simulation%energy_balance()
+
+      call build(simulation, law_gaussian, 0.1_wp, coupling_scaled, .true.)
+      call simulation%start(initial_relaxed)
+      do segment = 1, 100000
+         call simulation%run(37_i8, error)
+         archive%reals = spread(0.0_wp, 1, reals)
+         archive%integers = spread(0_i8, 1, integers)
+         archive = archive_type(reals=archive%reals, integers=archive%integers, saving=.true.)
+         call simulation%exchange(archive)
+         archive = archive_type(reals=archive%reals, integers=archive%integers)
+         call build(next, law_gaussian, 0.1_wp, coupling_scaled, .true.)
+         call next%exchange(archive)
+         simulation = next
+         if (simulation%finished) exit
+      end do
+      pieces = simulation%energy_balance()
+      call check(simulation%finished .and. segment > 10, "the segments come to the end")
+      call check(all(abs(pieces - whole) <= 0.0_wp), "a run in segments is the same to the bit")
+   end subroutine goes_on
+
+   !> Klein's case with few contacts and a fast drive that comes back.
+   subroutine build(simulation, law, width, coupling, rigid)
+      type(simulation_type), intent(out) :: simulation
+      integer, intent(in) :: law, coupling
+      real(wp), intent(in) :: width
+      logical, intent(in) :: rigid
+
+      type(contact_parameters_type) :: parameters
+      type(recorder_parameters_type) :: recorder
+      type(error_type), allocatable :: error
+
+      call new_threshold_law(parameters%law, law, width, 0.1_wp, error)
+      parameters%count = count
+      parameters%static_force = 18.0e-6_wp / count
+      parameters%stiffness = 2000.0_wp / count
+      parameters%drag = 6.7e-5_wp / count
+      parameters%delay = 5.0e-4_wp
+      parameters%back_force_ratio = 0.1_wp
+      parameters%coupling = coupling
+      parameters%seed = 1_i8
+      call new_contact_ensemble(simulation%contacts, parameters, record, detached, &
+         & detached_contact, error)
+      simulation%stage_end = [0.03_wp, 0.05_wp, 0.15_wp]
+      simulation%stage_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
+      recorder = recorder_parameters_type(interval=1.0e-4_wp, slip_interval=1.0e-4_wp, &
+         & duration=0.15_wp, contacts=count)
+      if (rigid) then
+         recorder%slip_velocity = 1.0e-6_wp
+         recorder%quiet_time = 0.012_wp
+         simulation%slider = slider_rigid_type(mass=1.47e-3_wp, stiffness=97.0_wp, &
+            & damping=51.4_wp)
+      else
+         simulation%slider = slider_prescribed_type()
+      end if
+      simulation%recorder%parameters = recorder
+      call simulation%recorder%attach(trace, slip_trace, slips)
+   end subroutine build
+
+end program test_simulation

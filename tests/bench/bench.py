@@ -13,7 +13,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fixed_step import numba_run, numpy_steps
-
 from mesoslip import Config
 from mesoslip.engine import Realization
 

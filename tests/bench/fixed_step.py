@@ -7,7 +7,6 @@ import time
 
 import numba
 import numpy as np
-
 from mesoslip import Config
 
 

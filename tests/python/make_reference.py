@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from conftest import klein_tables
-
 import mesoslip
+from conftest import klein_tables
 from mesoslip import store
 
 FOLDER = Path(__file__).parents[1] / "reference"

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import mesoslip
 import numpy as np
 import pytest
 from make_reference import CASES, FOLDER
-
-import mesoslip
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -33,10 +33,6 @@ module mesoslip_slider_rigid
    real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
       & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
       & 0.085662246189585172520_wp]
-   !> Up to this step, in units of the fastest rate, integrals from values and slopes at both ends
-   !> do: their error is (2 step)**4/720, of terms that are a small part of the balance.
-   real(wp), parameter :: step_of_slopes = 4.0e-3_wp
-
    !> Coefficients of the equation of motion, per mass of the slider.
    type :: system_type
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
@@ -127,21 +123,21 @@ contains
       if (.not. step > 0.0_wp) return
       ! The number of terms is a constant in each call: the compiler makes a copy for each.
       if (rate * step <= short_step) then
-         call move(self, system, window, rate, step, ends, few_terms)
+         call move(self, system, window, step, ends, few_terms)
       else if (rate * step <= middling_step) then
-         call move(self, system, window, rate, step, ends, some_terms)
+         call move(self, system, window, step, ends, some_terms)
       else
-         call move(self, system, window, rate, step, ends, most_terms)
+         call move(self, system, window, step, ends, most_terms)
       end if
    end subroutine advance
 
    !> Move for a step, or to the first end of the window or turning point within it.
-   subroutine move(self, system, window, rate, longest, ends, terms)
+   subroutine move(self, system, window, longest, ends, terms)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
-      !> The fastest rate of the system [1/s], length of the step [s]
-      real(wp), intent(in) :: rate, longest
+      !> Length of the step [s]
+      real(wp), intent(in) :: longest
       !> Whether the step comes to the end of the window's time
       logical, intent(in) :: ends
       !> Terms of the series
@@ -202,7 +198,7 @@ contains
       late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
       call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
-      call add_losses(self, early, late, rate, step)
+      call add_losses(self, early, late, step, terms)
    end subroutine move
 
    !> Velocity and its derivatives, from the equation of motion.
@@ -417,16 +413,20 @@ contains
    end function turning_point
 
    !> Add the losses of a step to the energy balance: the integrals of C V**2 and M eta_S (V - W) V.
-   subroutine add_losses(self, early, late, rate, step)
+   subroutine add_losses(self, early, late, step, terms)
       type(slider_rigid_type), intent(inout) :: self
       !> The motion at both ends
       type(motion_rates_type), intent(in) :: early, late
-      !> Fastest rate of the system [1/s], length of the step [s]
-      real(wp), intent(in) :: rate, step
+      !> Length of the step [s]
+      real(wp), intent(in) :: step
+      integer, intent(in) :: terms
 
       real(wp) :: square, damped
 
-      if (rate * step < step_of_slopes) then
+      select case (terms)
+      case (few_terms)
+         ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the fastest
+         ! rate, of terms that are a small part of the balance.
          square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
             & + step * (1.0_wp / 6.0_wp) * (early%velocity * early%acceleration &
             & - late%velocity * late%acceleration))
@@ -434,20 +434,21 @@ contains
             & + step * (1.0_wp / 12.0_wp) * (early%damper_rate * early%velocity &
             & + early%damper * early%acceleration - late%damper_rate * late%velocity &
             & - late%damper * late%acceleration))
-      else if (rate * step < middling_step) then
-         call integrate_losses(self, early%damper, step, point_4, weight_4, square, damped)
-      else
-         call integrate_losses(self, early%damper, step, point_6, weight_6, square, damped)
-      end if
+      case (some_terms)
+         call integrate_losses(self, early%damper, step, terms, point_4, weight_4, square, damped)
+      case default
+         call integrate_losses(self, early%damper, step, terms, point_6, weight_6, square, damped)
+      end select
       call self%drag_loss%add(self%law%drag * square)
       call self%damping_loss%add(self%mass * damped)
    end subroutine add_losses
 
    !> Integrals of V**2 and eta_S (V - W) V over a step by a Gauss rule.
-   pure subroutine integrate_losses(self, damper, step, point, weight, square, damped)
+   pure subroutine integrate_losses(self, damper, step, terms, point, weight, square, damped)
       type(slider_rigid_type), intent(in) :: self
       !> eta_S (V - W) at the start [m/s2], length of the step [s]
       real(wp), intent(in) :: damper, step
+      integer, intent(in) :: terms
       real(wp), intent(in), contiguous :: point(:), weight(:)
       real(wp), intent(out) :: square, damped
 
@@ -455,16 +456,16 @@ contains
       integer :: node, term
 
       series(0) = damper
-      do term = 1, self%terms - 1
+      do term = 1, terms - 1
          series(term) = self%damping * (self%series(term) - series(term - 1) * inverse(term))
       end do
       square = 0.0_wp
       damped = 0.0_wp
       do node = 1, size(point)
-         velocity = horner(self%series, self%terms, point(node) * step)
+         velocity = horner(self%series, terms, point(node) * step)
          square = square + step * weight(node) * velocity**2
          damped = damped + step * weight(node) * velocity &
-            & * horner(series, self%terms, point(node) * step)
+            & * horner(series, terms, point(node) * step)
       end do
    end subroutine integrate_losses
 
@@ -481,15 +482,33 @@ contains
 
       step = time - self%step_time
       drive = self%drive_at(time)
-      displacement = self%start_displacement + integral(self%series, self%terms, step)
+      ! As in advance, the number of terms is a constant in each call.
+      select case (self%terms)
+      case (few_terms)
+         call evaluate(self%series, few_terms, step, displacement, motion%velocity)
+      case (some_terms)
+         call evaluate(self%series, some_terms, step, displacement, motion%velocity)
+      case default
+         call evaluate(self%series, most_terms, step, displacement, motion%velocity)
+      end select
+      displacement = self%start_displacement + displacement
       motion%time = time
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + displacement
-      motion%velocity = horner(self%series, self%terms, step)
       motion%spring_force = self%stiffness * (drive - displacement)
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity
    end function observe
+
+   !> Way and velocity from the series of the velocity.
+   pure subroutine evaluate(series, terms, time, way, velocity)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp), intent(out) :: way, velocity
+
+      way = integral(series, terms, time)
+      velocity = horner(series, terms, time)
+   end subroutine evaluate
 
    !> Kinetic energy and that of the drive's spring.
    pure function energy(self)

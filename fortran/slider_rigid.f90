@@ -425,8 +425,8 @@ contains
 
       select case (terms)
       case (few_terms)
-         ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the fastest
-         ! rate, of terms that are a small part of the balance.
+         ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
+         ! fastest rate, of terms that are a small part of the balance.
          square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
             & + step * (1.0_wp / 6.0_wp) * (early%velocity * early%acceleration &
             & - late%velocity * late%acceleration))

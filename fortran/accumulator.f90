@@ -1,7 +1,7 @@
 !> Sums that do not drift: a running total kept in two doubles.
 !>
-!> An addition loses about 2**-105 of the total, so the total of 10**9 terms that come and go is
-!> right to the last bit of a double (T. J. Dekker, Numer. Math. 18 (1971) 224).
+!> The rounding error of each addition is kept and added up apart (A. Neumaier, Z. angew. Math.
+!> Mech. 54 (1974) 39), so the total of 10**9 terms that come and go is right to the last bit of a double.
 module mesoslip_accumulator
    use mesoslip_kinds, only: wp
    implicit none
@@ -11,13 +11,15 @@ module mesoslip_accumulator
 
    !> A running total, the unevaluated sum high + low.
    type :: accumulator_type
-      !> The total rounded to a double
+      !> The sum as additions of doubles give it
       real(wp) :: high = 0.0_wp
-      !> What the rounding left over
+      !> What their rounding left out
       real(wp) :: low = 0.0_wp
    contains
       !> Add one term
       procedure :: add
+      !> The total
+      procedure :: total
    end type accumulator_type
 
 contains
@@ -29,14 +31,22 @@ contains
       !> What to add
       real(wp), intent(in) :: term
 
-      real(wp) :: total, shadow, rest
+      real(wp) :: sum, shadow
 
-      total = self%high + term
-      shadow = total - self%high
-      rest = (self%high - (total - shadow)) + (term - shadow)
-      rest = rest + self%low
-      self%high = total + rest
-      self%low = rest - (self%high - total)
+      sum = self%high + term
+      shadow = sum - self%high
+      self%low = self%low + ((self%high - (sum - shadow)) + (term - shadow))
+      self%high = sum
    end subroutine add
+
+   !> The total, rounded to a double.
+   elemental function total(self)
+      !> The running total
+      class(accumulator_type), intent(in) :: self
+      !> Sum of all terms
+      real(wp) :: total
+
+      total = self%high + self%low
+   end function total
 
 end module mesoslip_accumulator

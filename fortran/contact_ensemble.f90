@@ -198,9 +198,9 @@ contains
       !> The law that holds until a contact breaks or attaches
       type(interface_law_type) :: law
 
-      law%stiffness = self%stiffness%high
-      law%offset = self%offset%high
-      law%drag = self%drag%high
+      law%stiffness = self%stiffness%total()
+      law%offset = self%offset%total()
+      law%drag = self%drag%total()
    end function law
 
    !> Displacements between which no contact breaks.
@@ -429,7 +429,7 @@ contains
          call total%add(0.5_wp * self%record(row_stiffness, contact) &
             & * (displacement - self%record(row_origin, contact))**2)
       end do
-      energy = total%high
+      energy = total%total()
    end function elastic_energy
 
    !> Put the state into an archive or take it out; the arrays of the caller are the rest of it.

@@ -164,13 +164,13 @@ contains
       !> Terms in the order of energy_length [J]
       real(wp) :: energy(energy_length)
 
-      energy(1) = self%slider%drive_work%high
+      energy(1) = self%slider%drive_work%total()
       energy(2) = self%slider%energy()
       energy(3) = self%contacts%elastic_energy(self%slider%displacement)
-      energy(4) = self%slider%damping_loss%high
-      energy(5) = self%slider%drag_loss%high
-      energy(6) = self%contacts%break_loss%high
-      energy(7) = self%contacts%birth_gain%high
+      energy(4) = self%slider%damping_loss%total()
+      energy(5) = self%slider%drag_loss%total()
+      energy(6) = self%contacts%break_loss%total()
+      energy(7) = self%contacts%birth_gain%total()
       energy(8) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
          & - energy(4) - energy(5) - energy(6) + energy(7)
    end function energy_balance

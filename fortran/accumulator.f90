@@ -1,7 +1,8 @@
 !> Sums that do not drift: a running total kept in two doubles.
 !>
 !> The rounding error of each addition is kept and added up apart (A. Neumaier, Z. angew. Math.
-!> Mech. 54 (1974) 39), so the total of 10**9 terms that come and go is right to the last bit of a double.
+!> Mech. 54 (1974) 39), so the total of 10**9 terms that come and go is right to the last bit of a
+!> double.
 module mesoslip_accumulator
    use mesoslip_kinds, only: wp
    implicit none

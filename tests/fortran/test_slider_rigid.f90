@@ -36,7 +36,8 @@ contains
          & / frequency), 1.0e-13_wp, "displacement of a free oscillator")
       call check_close(slider%velocity, drive_velocity * (1.0_wp - cos(frequency * time)), &
          & 1.0e-13_wp, "velocity of a free oscillator")
-      call check_close(slider%drive_work%total(), slider%energy(), 1.0e-12_wp, "energy is conserved")
+      call check_close(slider%drive_work%total(), slider%energy(), 1.0e-12_wp, &
+         & "energy is conserved")
    end subroutine oscillates
 
    !> A crossing is met to the bit in displacement, and to rounding in time.

@@ -97,13 +97,13 @@ def test_energy_balance_closes(klein, changes):
 
 def test_displacements_are_absolute(klein):
     """The kernel's origin moves along with the slider; what is recorded does not."""
-    tree = mesoslip.run(klein(drive__velocity=1e-6, run__duration=3.0))
+    tree = mesoslip.run(klein(drive__velocity=1e-6, run__duration=1.0))
     drive, displacement = tree["drive_displacement"].values[0], tree["displacement"].values[0]
     np.testing.assert_allclose(drive, 1e-6 * tree["time"].values, rtol=1e-12)
     np.testing.assert_allclose(
         tree["spring_force"].values[0], 97 * (drive - displacement), atol=1e-9 * 18e-6
     )
-    assert displacement[-1] > 200 * 9e-9
+    assert displacement[-1] > 64 * 9e-9
 
 
 def test_a_pinned_slider_follows_the_drive_by_its_stiffness(klein):

@@ -33,6 +33,7 @@ module mesoslip_slider_rigid
    real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
       & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
       & 0.085662246189585172520_wp]
+
    !> Coefficients of the equation of motion, per mass of the slider.
    type :: system_type
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]

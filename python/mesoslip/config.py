@@ -13,7 +13,6 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -490,17 +489,16 @@ def _parse_toml(text: str, source: str) -> dict[str, Any]:
 
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
-    """Lay tables over others; of keys that exclude each other, the one laid over stays."""
-    changes_kind = table == "slider" and over.get("kind", base.get("kind")) != base.get(
-        "kind", "rigid"
-    )
-    merged = {} if changes_kind and "kind" in over else dict(base)
-    for one, other in (
-        *pairwise(EXCLUSIVE.get(table, ())),
-        *pairwise(EXCLUSIVE.get(table, ())[::-1]),
-    ):
-        if one in over:
-            merged.pop(other, None)
+    """Lay tables over others.
+
+    Of keys that exclude each other the one laid over stays; another kind of slider starts anew.
+    """
+    merged = dict(base)
+    if table == "slider" and over.get("kind", base.get("kind")) != base.get("kind", "rigid"):
+        merged = {}
+    exclusive = EXCLUSIVE.get(table, ())
+    if any(key in over for key in exclusive):
+        merged = {key: value for key, value in merged.items() if key not in exclusive}
     for key, value in over.items():
         below = merged.get(key)
         if isinstance(value, Mapping) and isinstance(below, Mapping):

@@ -494,7 +494,8 @@ def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") ->
     Of keys that exclude each other the one laid over stays; another kind of slider starts anew.
     """
     merged = dict(base)
-    if table == "slider" and over.get("kind", base.get("kind")) != base.get("kind", "rigid"):
+    kind = base.get("kind", "rigid")
+    if table == "slider" and over.get("kind", kind) != kind:
         merged = {}
     exclusive = EXCLUSIVE.get(table, ())
     if any(key in over for key in exclusive):

@@ -204,7 +204,8 @@ class Realization:
         )
         seconds = time.perf_counter() - start
         self.kernel_seconds += seconds
-        if advances is None and seconds < 0.5 * SEGMENT_SECONDS:
+        # A segment may also end because a buffer is full; a longer one would be no use then.
+        if made - self.advances == self._segment and seconds < 0.5 * SEGMENT_SECONDS:
             self._segment *= 2
         self._started = True
         if status != 0:

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import mesoslip
 import numpy as np
@@ -196,13 +195,16 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
             "-o",
             str(output),
             "--set",
-            "run.duration=3000 s",
+            "run.duration=1000 s",
         ],
         stderr=subprocess.PIPE,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
         text=True,
     )
-    time.sleep(4)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "% after" in line:
+            break
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -190,6 +190,16 @@ def test_a_base_is_laid_under(tmp_path):
     assert Config.load(tmp_path / "block.toml").slider.kind == "prescribed"
 
 
+def test_a_base_need_not_name_the_default_kind(tmp_path):
+    text = (ROOT / "runs" / "klein.toml").read_text().replace('kind = "rigid"', "")
+    (tmp_path / "base.toml").write_text(text)
+    (tmp_path / "over.toml").write_text('base = "base.toml"\n[slider]\nmass = "3 g"\n')
+    slider = Config.load(tmp_path / "over.toml").slider
+    assert (slider.mass, slider.stiffness) == (3e-3, 97)
+    slider = Config.load(tmp_path / "base.toml", ["slider.mass=3 g"]).slider
+    assert (slider.mass, slider.stiffness) == (3e-3, 97)
+
+
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(FileError, match="no such file"):
         Config.load(tmp_path / "none.toml")

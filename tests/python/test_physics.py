@@ -5,6 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
+from mesoslip import engine
 from mesoslip.engine import ENERGY_COLUMNS, Realization
 from oracles import stationary_force
 
@@ -177,6 +178,19 @@ def test_results_do_not_depend_on_how_they_are_computed(klein):
     for name, term in zip(ENERGY_COLUMNS, piecewise.energy, strict=True):
         if name != "residual":
             assert single["energy"][name].values[0] == term
+
+
+def test_runs_of_very_many_segments(klein, monkeypatch):
+    """Segments that end because a buffer is full do not grow; there may be any number of them."""
+    monkeypatch.setattr(engine, "TRACE_ROWS", 2200)
+    monkeypatch.setattr(engine, "SEGMENT_ADVANCES", 2**61)
+    realization = Realization(klein(run__duration=0.5, output__interval=5e-5), 0)
+    segments = 0
+    while not realization.finished:
+        realization.advance()
+        segments += 1
+    assert segments > 5
+    assert len(realization.trace) == 10001
 
 
 def test_samples_do_not_change_a_run(klein):

@@ -234,3 +234,100 @@ subroutine sundials(version)
 
    version = sundials_version()
 end subroutine sundials
+
+!> Scales of the lives of contacts under a slider that moves forward, dimensionless.
+subroutine contact_scales(law, relative_width, coupling, back_force_ratio, newborn_width, &
+   & reattach, initial, scales, status, message)
+   !f2py threadsafe
+   use mesoslip_kinds, only: wp
+   use mesoslip_errors, only: error_type
+   use mesoslip_contact_lives, only: contact_lives_type, new_contact_lives
+   implicit none
+   !> Codes of threshold law, coupling and initial state; whether contacts attach again
+   integer, intent(in) :: law, coupling, initial, reattach
+   real(8), intent(in) :: relative_width, back_force_ratio
+   !> Standard deviation of the stretch of newborn contacts
+   real(8), intent(in) :: newborn_width
+   !> Shortest, longest and mean life of newborns; their stiffness and force at attaching; shortest
+   !> and longest life of a relaxed first generation; mean force of stationary sliding
+   real(8), intent(out) :: scales(8)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(contact_lives_type) :: lives
+   type(error_type), allocatable :: error
+
+   scales = 0.0_wp
+   status = 0
+   message = ""
+   call new_contact_lives(lives, law, relative_width, coupling, back_force_ratio, newborn_width, &
+      & reattach /= 0, initial, error)
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+      return
+   end if
+   scales = [lives%shortest, lives%longest, lives%mean_life, lives%newborn_stiffness, &
+      & lives%newborn_force, lives%first_shortest, lives%first_longest, lives%steady_force]
+end subroutine contact_scales
+
+!> Force curve of the master equation, dimensionless, on panels of the displacement.
+subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_width, &
+   & reattach, initial, start, width, panels, points, point, breaks, slope, force, stiffness, &
+   & pinned, mismatch, status, message)
+   !f2py threadsafe
+   use mesoslip_kinds, only: wp
+   use mesoslip_errors, only: error_type
+   use mesoslip_contact_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_renewal, only: renewal_solution_type, solve_renewal
+   implicit none
+   !> Codes of threshold law, coupling and initial state; whether contacts attach again
+   integer, intent(in) :: law, coupling, initial, reattach
+   real(8), intent(in) :: relative_width, back_force_ratio
+   !> Standard deviation of the stretch of newborn contacts
+   real(8), intent(in) :: newborn_width
+   !> Start of the first panel, at or below 0, and width of the panels
+   real(8), intent(in) :: start, width
+   !> Number of panels, and of points in each
+   integer, intent(in) :: panels, points
+   !> Points within a panel, from 0 to 1
+   real(8), intent(out) :: point(points)
+   !> Breaks over displacement, slope of the force, force, stiffness of the pinned contacts
+   real(8), intent(out) :: breaks(points, panels), slope(points, panels)
+   real(8), intent(out) :: force(points, panels), stiffness(points, panels)
+   !> Part of the contacts that is pinned, at the edges of the panels
+   real(8), intent(out) :: pinned(panels + 1)
+   !> Largest difference between two ways to the force
+   real(8), intent(out) :: mismatch
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(contact_lives_type) :: lives
+   type(renewal_solution_type) :: solution
+   type(error_type), allocatable :: error
+
+   point = 0.0_wp
+   breaks = 0.0_wp
+   slope = 0.0_wp
+   force = 0.0_wp
+   stiffness = 0.0_wp
+   pinned = 0.0_wp
+   mismatch = 0.0_wp
+   status = 0
+   message = ""
+   call new_contact_lives(lives, law, relative_width, coupling, back_force_ratio, newborn_width, &
+      & reattach /= 0, initial, error)
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+      return
+   end if
+   call solve_renewal(lives, start, width, panels, points, solution)
+   point = solution%point
+   breaks = solution%breaks
+   slope = solution%slope
+   force = solution%force
+   stiffness = solution%stiffness
+   pinned = solution%pinned
+   mismatch = solution%mismatch
+end subroutine force_curve

@@ -10,6 +10,7 @@ module mesoslip_contact_ensemble
    use mesoslip_random, only: uniform_pair
    use mesoslip_threshold_law, only: threshold_law_type
    use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_contact_mechanics, only: coupling_scaled, initial_steady, initial_uniform
    use mesoslip_contact_record, only: record_length, row_origin, row_stiffness, row_limit, &
       & row_renewal, ahead_coordinate, behind_coordinate
    use mesoslip_contact_queue, only: contact_queue_type, new_contact_queue
@@ -18,20 +19,6 @@ module mesoslip_contact_ensemble
 
    public :: contact_ensemble_type, contact_parameters_type, new_contact_ensemble
    public :: detached_length
-   public :: coupling_scaled, coupling_equal
-   public :: initial_relaxed, initial_steady, initial_uniform
-
-   !> k_i = k u^(1/2), m_i = m u
-   integer, parameter :: coupling_scaled = 1
-   !> k_i = k, m_i = m
-   integer, parameter :: coupling_equal = 2
-
-   !> All stretches are zero
-   integer, parameter :: initial_relaxed = 1
-   !> The stationary state of slow sliding
-   integer, parameter :: initial_steady = 2
-   !> Stretches are uniform between zero and the breaking stretch
-   integer, parameter :: initial_uniform = 3
 
    !> Numbers kept for a detached contact
    integer, parameter :: detached_length = 3

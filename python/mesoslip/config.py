@@ -255,6 +255,16 @@ class Output(Table):
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
 
 
+class Curve(Table):
+    """The force curve of the master equation, for ``mesoslip curve``."""
+
+    length: Annotated[Length, Field(gt=0)] | None = None
+    tolerance: Annotated[Number, Field(ge=1e-14, lt=1)] = 1e-10
+    newborn_width: Annotated[Length, Field(ge=0)] = 0.0
+    drive_displacement: Length | None = None
+    density_at: tuple[Annotated[Length, Field(ge=0)], ...] = ()
+
+
 class DriveStage(NamedTuple):
     """A stage of the drive as it is run."""
 
@@ -271,6 +281,12 @@ class Config(Table):
     slider: Slider
     contacts: Contacts
     output: Output = Output()
+    curve: Curve = Curve()
+
+    @property
+    def curve_length(self) -> float:
+        """Length of the force curve [m]; twenty mean breaking stretches unless given."""
+        return self.curve.length or 20 * self.contacts.static_force / self.contacts.stiffness
 
     @property
     def duration(self) -> float:
@@ -450,6 +466,7 @@ def _known_keys(place: list[Any], details: ErrorDetails) -> list[str]:
         "slider": PrescribedSlider if "prescribed" in details["loc"] else RigidSlider,
         "contacts": Contacts,
         "output": Output,
+        "curve": Curve,
         "threshold": Threshold,
         "stage": Stage,
     }

@@ -32,6 +32,15 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
     }
 
 
+def loading_rate(config: Config) -> float | None:
+    """D1 = v_d √(KM)/F_s (S46), of the first stage that moves; None if there is none or no spring."""
+    slider = config.slider
+    velocity = next((abs(one.velocity) for one in config.drive_stages if one.velocity), 0.0)
+    if velocity == 0 or not isinstance(slider, RigidSlider):
+        return None
+    return velocity * math.sqrt(slider.stiffness * slider.mass) / config.contacts.static_force
+
+
 def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
     contacts = config.contacts
     width = contacts.threshold.relative_width

@@ -48,6 +48,30 @@ VARIABLES = {
     "drag_loss": ("J", "energy lost to the drag of detached contacts"),
     "break_loss": ("J", "elastic energy lost by breaking contacts"),
     "birth_gain": ("J", "elastic energy of contacts at their attaching"),
+    "slope": ("N m-1", "derivative of the contact force by the displacement"),
+    "contact_stiffness": ("N m-1", "stiffness of the pinned contacts"),
+    "break_rate": ("m-1", "breaks of a contact over displacement"),
+    "potential": ("J", "effective potential of the slider"),
+    "curvature": ("N m-2", "second derivative of the contact force by the displacement"),
+    "third_derivative": ("N m-3", "third derivative of the contact force by the displacement"),
+    "D0": ("1", "contact force at the onset of slip over the static force"),
+    "D2": ("1", "second-order coefficient of the onset of slip, Eq. S46"),
+    "D3": ("1", "third-order coefficient of the onset of slip, Eq. S46"),
+    "stretch": ("m", "stretch of a contact"),
+    "stretch_density": ("m-1", "density of stretches, without contacts that have not broken yet"),
+    "unbroken_part": ("1", "part of the contacts that bear the stretch of a relaxed start"),
+    "density_displacement": ("m", "displacement of the slider"),
+}
+
+
+# What the output of each command holds.
+SUMMARIES = {
+    "run": "A slider pulled over contacts with random breaking thresholds, simulated with the "
+    "earthquake-like model of multicontact friction or its master equation",
+    "curve": "Force of infinitely many contacts with random breaking thresholds under a slider "
+    "that moves forward slowly, from the master equation of multicontact friction",
+    "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
+    "contacts that break one after another and for a film that melts at once",
 }
 
 
@@ -157,22 +181,31 @@ def attributes(
     config: Config, realizations: Sequence[Realization], *, complete: bool, wall_seconds: float
 ) -> dict[str, Any]:
     """Attributes of an output: what was run, by what, and how it went."""
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    program = f"mesoslip {version('mesoslip')}"
     reached = min(one.time for one in realizations)
-    return {
-        "Conventions": "CF-1.11, ACDD-1.3",
-        "title": config.title or "Stick-slip of a multicontact interface",
-        "summary": "A slider pulled over contacts with random breaking thresholds, simulated with "
-        "the earthquake-like model of multicontact friction",
-        "keywords": "friction, stick-slip, multicontact interface, earthquake-like model",
-        "source": program,
-        "history": f"{now} {program}: run",
-        "date_created": now,
-        "configuration": config.to_toml(),
+    return program_attributes(config, "run") | {
         "seed": config.run.seed,
         "complete": "true" if complete else "false",
         "comment": "" if complete else f"interrupted; every realization came to {reached:.6g} s",
+        "break_count": sum(one.breaks for one in realizations),
+        "advance_count": sum(one.advances for one in realizations),
+        "energy_residual": max((one.energy_residual for one in realizations), key=abs),
+        "wall_seconds": wall_seconds,
+    }
+
+
+def program_attributes(config: Config, command: str) -> dict[str, Any]:
+    """Attributes of every output: what was computed, by what."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    program = f"mesoslip {version('mesoslip')}"
+    return {
+        "Conventions": "CF-1.11, ACDD-1.3",
+        "title": config.title or "Stick-slip of a multicontact interface",
+        "summary": SUMMARIES[command],
+        "keywords": "friction, stick-slip, multicontact interface, earthquake-like model",
+        "source": program,
+        "history": f"{now} {program}: {command}",
+        "date_created": now,
+        "configuration": config.to_toml(),
         "program_version": version("mesoslip"),
         "commit": _build.COMMIT,
         "compiler": _build.COMPILER,
@@ -180,10 +213,6 @@ def attributes(
             [f"python {platform.python_version()}", f"SUNDIALS {_core.sundials().decode()}"]
             + [f"{name} {version(name)}" for name in ("numpy", "xarray", "netCDF4", "pydantic")]
         ),
-        "break_count": sum(one.breaks for one in realizations),
-        "advance_count": sum(one.advances for one in realizations),
-        "energy_residual": max((one.energy_residual for one in realizations), key=abs),
-        "wall_seconds": wall_seconds,
     }
 
 

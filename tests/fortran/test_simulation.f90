@@ -2,8 +2,10 @@
 !> taken up again.
 program test_simulation
    use mesoslip_archive, only: archive_type
-   use mesoslip_contact_ensemble, only: contact_parameters_type, coupling_equal, coupling_scaled, &
-      & detached_length, initial_relaxed, initial_steady, new_contact_ensemble
+   use mesoslip_contact_ensemble, only: contact_parameters_type, detached_length, &
+      & new_contact_ensemble
+   use mesoslip_contact_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
+      & initial_steady
    use mesoslip_contact_record, only: record_length, row_stiffness
    use mesoslip_errors, only: error_type
    use mesoslip_kinds, only: i8, wp

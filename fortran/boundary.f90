@@ -2,24 +2,29 @@
 !
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
 
-!> Run the earthquake-like model for some advances of the slider.
-subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_ratio, coupling, &
+!> Run N contacts, or infinitely many, for some advances of the slider.
+subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, coupling, &
    & reattach, law, relative_width, initial, seed, realization, slider_kind, mass, spring, &
    & damping, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
-   & quiet_time, started, reals, integers, state_real, state_integer, record, detached, &
-   & detached_contact, trace_capacity, trace, slip_trace_capacity, slip_trace, slip_capacity, &
-   & slips, most_advances, rows, finished, time, breaks, advances, energy, status, message)
+   & quiet_time, started, reals, integers, state_real, state_integer, records, record, detached, &
+   & detached_contact, resolution, populations, population, packets, packet, trace_capacity, trace, &
+   & slip_trace_capacity, slip_trace, slip_capacity, slips, most_advances, rows, finished, full, &
+   & time, breaks, advances, energy, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
-   use mesoslip_errors, only: error_type, status_invalid
+   use mesoslip_errors, only: error_type, raise, status_invalid
    use mesoslip_archive, only: archive_type
    use mesoslip_threshold_law, only: new_threshold_law
-   use mesoslip_contact_ensemble, only: contact_parameters_type, new_contact_ensemble
+   use mesoslip_contact_ensemble, only: contact_ensemble_type, new_contact_ensemble
+   use mesoslip_contact_populations, only: contact_populations_type, new_contact_populations
+   use mesoslip_contacts, only: contact_parameters_type
    use mesoslip_slider_prescribed, only: slider_prescribed_type
    use mesoslip_slider_rigid, only: slider_rigid_type
    use mesoslip_recorder, only: recorder_parameters_type
    use mesoslip_simulation, only: simulation_type
    implicit none
+   !> 1 for N contacts, 2 for infinitely many
+   integer, intent(in) :: engine
    !> Number of contacts, mean threshold, stiffness and drag of one, delay, backward force
    integer, intent(in) :: count
    real(8), intent(in) :: static_force, stiffness, drag, delay, back_force_ratio
@@ -42,8 +47,14 @@ subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_
    integer, intent(in) :: reals, integers
    real(8), intent(inout) :: state_real(reals)
    integer(8), intent(inout) :: state_integer(integers)
-   real(8), intent(inout), target :: record(4, count), detached(3, count)
-   integer, intent(inout), target :: detached_contact(count)
+   !> Contacts, for engine 1: as many records as contacts
+   integer, intent(in) :: records
+   real(8), intent(inout), target :: record(4, records), detached(3, records)
+   integer, intent(inout), target :: detached_contact(records)
+   !> Populations and packets of detached contacts, for engine 2, and their resolution
+   real(8), intent(in) :: resolution
+   integer, intent(in) :: populations, packets
+   real(8), intent(inout), target :: population(populations, 12), packet(4, packets)
    !> Arrays to record into
    integer, intent(in) :: trace_capacity, slip_trace_capacity, slip_capacity
    real(8), intent(inout), target :: trace(7, trace_capacity)
@@ -53,17 +64,20 @@ subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_
    integer(8), intent(in) :: most_advances
    !> Rows of trace, slip_trace and slips that were filled
    integer, intent(out) :: rows(3)
-   !> Whether the run is over, and the time it has come to
-   integer, intent(out) :: finished
+   !> Whether the run is over, or has no room for more populations; the time it has come to
+   integer, intent(out) :: finished, full
    real(8), intent(out) :: time
    !> Terms of the energy balance; breaks and advances so far
-   real(8), intent(out) :: energy(8)
-   integer(8), intent(out) :: breaks, advances
+   real(8), intent(out) :: energy(8), breaks
+   integer(8), intent(out) :: advances
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
+   integer, parameter :: engine_contacts = 1, engine_master_equation = 2
    integer, parameter :: kind_rigid = 1, kind_prescribed = 2
    type(simulation_type) :: simulation
+   type(contact_ensemble_type), allocatable :: ensemble
+   type(contact_populations_type), allocatable :: all
    type(contact_parameters_type) :: parameters
    type(recorder_parameters_type) :: recorder_parameters
    type(archive_type) :: archive
@@ -71,8 +85,9 @@ subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_
 
    rows = 0
    finished = 0
+   full = 0
    time = 0.0_wp
-   breaks = 0
+   breaks = 0.0_wp
    advances = 0
    energy = 0.0_wp
    status = 0
@@ -94,8 +109,18 @@ subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_
    parameters%reattach = reattach /= 0
    parameters%seed = seed
    parameters%realization = realization
-   call new_contact_ensemble(simulation%contacts, parameters, record, detached, detached_contact, &
-      & error)
+   select case (engine)
+   case (engine_contacts)
+      allocate (ensemble)
+      call new_contact_ensemble(ensemble, parameters, record, detached, detached_contact, error)
+      call move_alloc(ensemble, simulation%contacts)
+   case (engine_master_equation)
+      allocate (all)
+      call new_contact_populations(all, parameters, resolution, population, packet, error)
+      call move_alloc(all, simulation%contacts)
+   case default
+      call raise(error, status_invalid, "unknown engine")
+   end select
    if (allocated(error)) then
       status = error%status
       message = error%message
@@ -143,13 +168,14 @@ subroutine run_contacts(count, static_force, stiffness, drag, delay, back_force_
    advances = simulation%advances
    energy = simulation%energy_balance()
    if (simulation%finished) finished = 1
+   if (.not. simulation%contacts%has_room()) full = 1
    rows = [simulation%recorder%trace_count, simulation%recorder%slip_trace_count, &
       & simulation%recorder%slip_count]
    archive = archive_type(reals=state_real, integers=state_integer, saving=.true.)
    call simulation%exchange(archive)
    state_real = archive%reals
    state_integer = archive%integers
-end subroutine run_contacts
+end subroutine run_segment
 
 !> Sizes of the state of a run.
 subroutine state_sizes(reals, integers)

@@ -8,8 +8,8 @@ module mesoslip_contact_ensemble
    use mesoslip_accumulator, only: accumulator_type
    use mesoslip_archive, only: archive_type
    use mesoslip_random, only: uniform_pair
-   use mesoslip_threshold_law, only: threshold_law_type
-   use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_contacts, only: contact_parameters_type, contacts_type
    use mesoslip_contact_mechanics, only: coupling_scaled, initial_steady, initial_uniform
    use mesoslip_contact_record, only: record_length, row_origin, row_stiffness, row_limit, &
       & row_renewal, ahead_coordinate, behind_coordinate
@@ -17,7 +17,7 @@ module mesoslip_contact_ensemble
    implicit none
    private
 
-   public :: contact_ensemble_type, contact_parameters_type, new_contact_ensemble
+   public :: contact_ensemble_type, new_contact_ensemble
    public :: detached_length
 
    !> Numbers kept for a detached contact
@@ -32,74 +32,33 @@ module mesoslip_contact_ensemble
    !> A probability too small to meet among the keys of a ring of buckets.
    real(wp), parameter :: rare = 1.0e-4_wp
 
-   !> What the contacts are made of.
-   type :: contact_parameters_type
-      !> Number of contacts N
-      integer :: count = 0
-      !> Mean static threshold f_s [N]
-      real(wp) :: static_force = 0.0_wp
-      !> Mean stiffness k [N/m]
-      real(wp) :: stiffness = 0.0_wp
-      !> Drag of a contact of mean mass, m eta [N s/m]
-      real(wp) :: drag = 0.0_wp
-      !> Delay between detaching and attaching [s]
-      real(wp) :: delay = 0.0_wp
-      !> Backward force over mean static threshold, f_b/f_s
-      real(wp) :: back_force_ratio = 0.0_wp
-      !> One of the coupling_ codes
-      integer :: coupling = coupling_scaled
-      !> Whether a broken contact attaches again
-      logical :: reattach = .true.
-      !> Law of the relative thresholds
-      type(threshold_law_type) :: law
-      !> Key of the random numbers
-      integer(i8) :: seed = 0, realization = 0
-   end type contact_parameters_type
-
    !> An ensemble of contacts.
-   type :: contact_ensemble_type
-      !> What the contacts are made of
-      type(contact_parameters_type) :: parameters
-      !> Number of contacts that are detached
-      integer :: detached_count = 0
-      !> Breaks so far
-      integer(i8) :: breaks = 0
+   type, extends(contacts_type) :: contact_ensemble_type
       !> Time at which the next contact attaches; huge when there is none [s]
       real(wp) :: next_attachment = huge(1.0_wp)
-      !> Elastic energy lost by breaking, and gained by attaching under back force [J]
-      type(accumulator_type) :: break_loss, birth_gain
       !> Bound on the coordinates at which contacts break on the way back [m]
       real(wp) :: behind = -huge(1.0_wp)
       !> Direction of motion for which the queue is kept, +1 or -1
       real(wp) :: direction = 1.0_wp
 
       type(accumulator_type), private :: stiffness, offset, drag
-      !> First place of the ring of detached contacts
-      integer, private :: first_detached = 0
+      !> Number of contacts that are detached, and their first place in the ring
+      integer, private :: waiting = 0, first_detached = 0
       type(contact_queue_type), private :: queue
       real(wp), pointer, contiguous, private :: record(:, :) => null()
       real(wp), pointer, contiguous, private :: detached(:, :) => null()
       integer, pointer, contiguous, private :: detached_contact(:) => null()
    contains
-      !> Draw all contacts
       procedure :: initialize
-      !> Contact force as a law
       procedure :: law
-      !> Displacements between which no contact breaks
-      procedure :: limits
-      !> Break all contacts that are due
-      procedure :: break_due
-      !> Attach all contacts that are due
-      procedure :: attach_due
-      !> Move the origin of displacements
+      procedure :: offer
+      procedure :: respond
+      procedure :: has_room
       procedure :: shift_origin
-      !> Elastic energy of the pinned contacts
       procedure :: elastic_energy
-      !> Put the state into an archive or take it out
       procedure :: exchange
-      !> Order the queue anew, from the records
       procedure :: rebuild
-      procedure, private :: bear, break_first, attach_first, face, farthest_behind
+      procedure, private :: bear, break_due, break_first, attach_first, face, farthest_behind
    end type contact_ensemble_type
 
 contains
@@ -190,32 +149,48 @@ contains
       law%drag = self%drag%total()
    end function law
 
-   !> Displacements between which no contact breaks.
-   pure subroutine limits(self, upper, lower)
+   !> Contact force as a law, which holds until a contact breaks or attaches.
+   subroutine offer(self, pose, law, window)
       !> The ensemble
-      class(contact_ensemble_type), intent(in) :: self
-      !> Least displacement above the slider's at which one may break [m]
-      real(wp), intent(out) :: upper
-      !> Greatest displacement below the slider's at which one may break [m]
-      real(wp), intent(out) :: lower
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds; a contact may break at its lower end if the motion is forward
+      type(window_type), intent(out) :: window
 
+      law%stiffness = self%stiffness%total()
+      law%offset = self%offset%total()
+      law%drag = self%drag%total()
+      window%end_time = self%next_attachment
       if (self%direction > 0.0_wp) then
-         upper = self%queue%first_key
-         lower = self%behind
+         window%upper = self%queue%first_key
+         window%lower = self%behind
       else
-         upper = -self%behind
-         lower = -self%queue%first_key
+         window%upper = -self%behind
+         window%lower = -self%queue%first_key
       end if
-   end subroutine limits
+   end subroutine offer
+
+   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
+   subroutine respond(self, before, after)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      call self%break_due(after%displacement, after%time)
+      do while (self%next_attachment <= after%time)
+         call self%attach_first(after%displacement, after%sense)
+      end do
+      self%detached_count = real(self%waiting, wp)
+   end subroutine respond
 
    !> Break all contacts that are due.
    subroutine break_due(self, displacement, time)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
-      !> Time [s]
-      real(wp), intent(in) :: time
+      real(wp), intent(in) :: displacement, time
 
       if (self%direction * displacement <= self%behind) then
          ! The bound may be that of a contact which has broken since.
@@ -227,21 +202,15 @@ contains
       end do
    end subroutine break_due
 
-   !> Attach all contacts that are due, in the order in which they broke.
-   subroutine attach_due(self, displacement, time, sense)
+   !> Whether there is room for one more step: the arrays have a place for each contact.
+   pure function has_room(self)
       !> The ensemble
-      class(contact_ensemble_type), intent(inout) :: self
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
-      !> Time [s]
-      real(wp), intent(in) :: time
-      !> Sign of the last velocity of the slider that was not zero, +1 or -1
-      real(wp), intent(in) :: sense
+      class(contact_ensemble_type), intent(in) :: self
+      !> Always
+      logical :: has_room
 
-      do while (self%next_attachment <= time)
-         call self%attach_first(displacement, sense)
-      end do
-   end subroutine attach_due
+      has_room = size(self%record, 2) >= self%parameters%count
+   end function has_room
 
    !> Break the first contact of the queue.
    subroutine break_first(self, displacement, time)
@@ -270,19 +239,19 @@ contains
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
       end if
-      self%breaks = self%breaks + 1
+      self%breaks = self%breaks + 1.0_wp
 
       ! The next threshold is drawn now, while the contact's record is at hand.
       call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
          & int(renewal, i8), 0_i8, uniform)
-      place = self%first_detached + self%detached_count
+      place = self%first_detached + self%waiting
       if (place >= self%parameters%count) place = place - self%parameters%count
-      self%detached_count = self%detached_count + 1
+      self%waiting = self%waiting + 1
       self%detached_contact(place + 1) = contact
       self%detached(row_due, place + 1) = time + self%parameters%delay
       self%detached(row_drag, place + 1) = drag
       self%detached(row_threshold, place + 1) = self%parameters%law%quantile(uniform(1))
-      if (self%detached_count == 1 .and. self%parameters%reattach) then
+      if (self%waiting == 1 .and. self%parameters%reattach) then
          self%next_attachment = self%detached(row_due, place + 1)
       end if
    end subroutine break_first
@@ -302,11 +271,11 @@ contains
       origin = displacement - sense * back_force / stiffness
 
       call self%drag%add(-self%detached(row_drag, place))
-      self%detached_count = self%detached_count - 1
+      self%waiting = self%waiting - 1
       self%first_detached = place
       if (place == self%parameters%count) self%first_detached = 0
       self%next_attachment = huge(1.0_wp)
-      if (self%detached_count > 0) then
+      if (self%waiting > 0) then
          self%next_attachment = self%detached(row_due, self%first_detached + 1)
       else
          self%drag = accumulator_type()
@@ -426,10 +395,11 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%detached_count)
+      call archive%exchange(self%waiting)
       call archive%exchange(self%first_detached)
       call archive%exchange(self%next_attachment)
       call archive%exchange(self%breaks)
+      call archive%exchange(self%detached_count)
       call archive%exchange(self%break_loss)
       call archive%exchange(self%birth_gain)
       call archive%exchange(self%behind)

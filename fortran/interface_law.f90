@@ -1,10 +1,10 @@
-!> What contacts offer a slider: a linear law of the contact force, and where it ends.
+!> What contacts offer a slider, a linear law of the contact force, and what they learn of it.
 module mesoslip_interface_law
    use mesoslip_kinds, only: wp
    implicit none
    private
 
-   public :: interface_law_type, window_type
+   public :: interface_law_type, pose_type, window_type
 
    !> Force of the contacts on the slider, F = stiffness x - offset + drag v.
    type :: interface_law_type
@@ -25,5 +25,13 @@ module mesoslip_interface_law
       !> Time at which the law ends [s]
       real(wp) :: end_time = huge(1.0_wp)
    end type window_type
+
+   !> Where a slider is.
+   type :: pose_type
+      !> Time [s], displacement [m], velocity [m/s], acceleration [m/s2]
+      real(wp) :: time = 0.0_wp, displacement = 0.0_wp, velocity = 0.0_wp, acceleration = 0.0_wp
+      !> Sign of the last velocity that was not zero, +1 or -1
+      real(wp) :: sense = 1.0_wp
+   end type pose_type
 
 end module mesoslip_interface_law

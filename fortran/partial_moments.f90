@@ -126,16 +126,16 @@ contains
    end function above
 
    !> Moments above a threshold by Hermite's interpolation.
-   pure function interpolate(self, threshold) result(moment)
+   pure subroutine interpolate(self, threshold, moment)
       !> The moments
       class(partial_moments_type), intent(in) :: self
       !> Relative threshold U
       real(wp), intent(in) :: threshold
       !> E[u^a; u > U] of each exponent, shape (orders)
-      real(wp) :: moment(size(self%exponent))
+      real(wp), intent(out), contiguous :: moment(:)
 
-      real(wp) :: place, t, s
-      integer :: cell
+      real(wp) :: place, t, s, weight(4)
+      integer :: cell, order
 
       if (threshold <= self%least) then
          moment = self%table(1, :, 1)
@@ -146,11 +146,14 @@ contains
          cell = min(int(place), cells - 1)
          t = place - cell
          s = 1.0_wp - t
-         moment = s**2 * ((1.0_wp + 2.0_wp * t) * self%table(1, :, cell + 1) &
-            & + t * self%table(2, :, cell + 1)) &
-            & + t**2 * ((1.0_wp + 2.0_wp * s) * self%table(1, :, cell + 2) &
-            & - s * self%table(2, :, cell + 2))
+         weight = [s**2 * (1.0_wp + 2.0_wp * t), s**2 * t, t**2 * (1.0_wp + 2.0_wp * s), -s * t**2]
+         do order = 1, size(moment)
+            moment(order) = weight(1) * self%table(1, order, cell + 1) &
+               & + weight(2) * self%table(2, order, cell + 1) &
+               & + weight(3) * self%table(1, order, cell + 2) &
+               & + weight(4) * self%table(2, order, cell + 2)
+         end do
       end if
-   end function interpolate
+   end subroutine interpolate
 
 end module mesoslip_partial_moments

@@ -72,7 +72,7 @@ module mesoslip_recorder
       real(wp), private :: sense = 1.0_wp, last_excess = 0.0_wp, last_fast = 0.0_wp
       real(wp), private :: start_time = 0.0_wp, end_time = 0.0_wp, force_before = 0.0_wp
       real(wp), private :: force_after = 0.0_wp, peak_velocity = 0.0_wp, last_acceleration = 0.0_wp
-      integer(i8), private :: breaks_before = 0, breaks_after = 0
+      real(wp), private :: breaks_before = 0.0_wp, breaks_after = 0.0_wp
       logical, private :: has_least = .false.
 
       real(wp), pointer, contiguous, private :: trace(:, :) => null()
@@ -129,9 +129,9 @@ contains
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
       !> Detached contacts during the advance
-      integer, intent(in) :: detached
+      real(wp), intent(in) :: detached
       !> Breaks before and during the advance
-      integer(i8), intent(in) :: breaks
+      real(wp), intent(in) :: breaks
 
       real(wp) :: excess, start_excess
 
@@ -168,7 +168,7 @@ contains
    subroutine take_samples(self, slider, detached)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
-      integer, intent(in) :: detached
+      real(wp), intent(in) :: detached
 
       do while (self%next_sample <= slider%time)
          self%trace_count = self%trace_count + 1
@@ -186,7 +186,7 @@ contains
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
       real(wp), intent(in) :: start_excess
-      integer(i8), intent(in) :: breaks
+      real(wp), intent(in) :: breaks
 
       type(motion_type) :: motion
 
@@ -210,8 +210,8 @@ contains
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
       real(wp), intent(in) :: start_excess, excess
-      integer, intent(in) :: detached
-      integer(i8), intent(in) :: breaks
+      real(wp), intent(in) :: detached
+      real(wp), intent(in) :: breaks
 
       type(motion_type) :: motion
 
@@ -242,7 +242,7 @@ contains
          motion = pace(slider)
          if (self%sense * (motion%spring_force - self%force_after) &
             & >= 0.5_wp * self%sense * (self%force_before - self%force_after) &
-            & .and. 2 * detached < self%parameters%contacts) then
+            & .and. 2.0_wp * detached < self%parameters%contacts) then
             call self%close_slip(motion, breaks)
             call self%begin_fast(slider, start_excess, breaks)
          end if
@@ -254,7 +254,7 @@ contains
       class(recorder_type), intent(inout) :: self
       !> Motion at the time of closing, the end of a slip without a least spring force
       type(motion_type), intent(in) :: motion
-      integer(i8), intent(in) :: breaks
+      real(wp), intent(in) :: breaks
 
       if (.not. self%has_least) then
          self%end_time = motion%time
@@ -264,7 +264,7 @@ contains
       self%slip_count = self%slip_count + 1
       self%slips(:, self%slip_count) = [real(self%slip, wp), self%start_time, self%end_time, &
          & self%force_before, self%force_after, self%sense * self%peak_velocity, &
-         & real(self%breaks_after - self%breaks_before, wp)]
+         & self%breaks_after - self%breaks_before]
       self%slip = self%slip + 1
       self%kept_count = self%slip_trace_count
    end subroutine close_slip
@@ -276,7 +276,7 @@ contains
       !> The slider at the end of the run
       class(slider_type), intent(in) :: slider
       !> Breaks in the run
-      integer(i8), intent(in) :: breaks
+      real(wp), intent(in) :: breaks
 
       if (self%phase == phase_slip .and. self%has_least) then
          call self%close_slip(slider%observe(slider%time), breaks)
@@ -290,7 +290,7 @@ contains
    subroutine take_slip_samples(self, slider, detached)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
-      integer, intent(in) :: detached
+      real(wp), intent(in) :: detached
 
       do while (self%next_slip_sample <= slider%time)
          self%slip_trace_count = self%slip_trace_count + 1
@@ -306,11 +306,11 @@ contains
    !> A sample of the trace.
    pure function sample(motion, detached)
       type(motion_type), intent(in) :: motion
-      integer, intent(in) :: detached
+      real(wp), intent(in) :: detached
       real(wp) :: sample(trace_length)
 
       sample = [motion%time, motion%drive_displacement, motion%displacement, motion%velocity, &
-         & motion%spring_force, motion%contact_force, real(detached, wp)]
+         & motion%spring_force, motion%contact_force, detached]
    end function sample
 
    !> Motion where the velocity passed that of the drive during the last advance.

@@ -3,8 +3,8 @@ module mesoslip_simulation
    use mesoslip_kinds, only: i8, wp
    use mesoslip_errors, only: error_type, raise, status_stalled
    use mesoslip_archive, only: archive_type
-   use mesoslip_interface_law, only: window_type
-   use mesoslip_contact_ensemble, only: contact_ensemble_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_contacts, only: contacts_type
    use mesoslip_slider, only: slider_type
    use mesoslip_recorder, only: recorder_type, most_samples_in_step
    implicit none
@@ -27,7 +27,7 @@ module mesoslip_simulation
       !> The slider
       class(slider_type), allocatable :: slider
       !> The contacts
-      type(contact_ensemble_type) :: contacts
+      class(contacts_type), allocatable :: contacts
       !> The recorder
       type(recorder_type) :: recorder
       !> Ends of the stages of the drive, shape (number of stages) [s]
@@ -68,10 +68,10 @@ contains
       if (abs(self%stage_velocity(1)) > 0.0_wp) then
          self%slider%sense = sign(1.0_wp, self%stage_velocity(1))
       end if
-      call self%contacts%break_due(self%slider%displacement, self%slider%time)
+      call self%contacts%respond(self%slider%pose(), self%slider%pose())
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
-      call self%recorder%record(self%slider, 0, 0_i8)
+      call self%recorder%record(self%slider, 0.0_wp, 0.0_wp)
    end subroutine start
 
    !> Go on for some advances, or until the recorder is full, or until the end.
@@ -89,7 +89,8 @@ contains
 
       idle = 0
       do advance = 1, most_advances
-         if (self%finished .or. .not. self%recorder%has_room()) exit
+         if (self%finished) exit
+         if (.not. (self%recorder%has_room() .and. self%contacts%has_room())) exit
          time = self%slider%time
          displacement = self%slider%displacement
          call self%advance()
@@ -111,23 +112,25 @@ contains
    subroutine advance(self)
       class(simulation_type), intent(inout) :: self
 
+      type(pose_type) :: before
+      type(interface_law_type) :: law
       type(window_type) :: window
       real(wp) :: sampling
 
-      call self%contacts%limits(window%upper, window%lower)
+      before = self%slider%pose()
+      call self%contacts%offer(before, law, window)
       sampling = self%recorder%parameters%interval
       if (self%recorder%parameters%slip_interval > 0.0_wp) then
          sampling = min(sampling, self%recorder%parameters%slip_interval)
       end if
-      window%end_time = min(self%contacts%next_attachment, self%stage_end(self%stage), &
+      window%end_time = min(window%end_time, self%stage_end(self%stage), &
          & self%slider%time + 0.5_wp * most_samples_in_step * sampling)
 
-      call self%slider%advance(self%contacts%law(), window)
+      call self%slider%advance(law, window)
       self%advances = self%advances + 1
       call self%recorder%record(self%slider, self%contacts%detached_count, self%contacts%breaks)
 
-      call self%contacts%break_due(self%slider%displacement, self%slider%time)
-      call self%contacts%attach_due(self%slider%displacement, self%slider%time, self%slider%sense)
+      call self%contacts%respond(before, self%slider%pose())
 
       if (self%slider%time >= self%stage_end(self%stage)) then
          if (self%stage == size(self%stage_end)) then

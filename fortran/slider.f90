@@ -6,7 +6,7 @@ module mesoslip_slider
    use mesoslip_kinds, only: wp
    use mesoslip_accumulator, only: accumulator_type
    use mesoslip_archive, only: archive_type
-   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    implicit none
    private
 
@@ -55,6 +55,8 @@ module mesoslip_slider
       procedure(observe_interface), deferred :: observe
       !> Kinetic energy and that of the drive's spring
       procedure(energy_interface), deferred :: energy
+      !> Where it is
+      procedure :: pose
       !> Give the drive another velocity
       procedure :: drive
       !> Where the drive is at a time
@@ -113,6 +115,16 @@ module mesoslip_slider
    end interface
 
 contains
+
+   !> Where the slider is.
+   pure function pose(self)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Where it is
+      type(pose_type) :: pose
+
+      pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, self%sense)
+   end function pose
 
    !> Give the drive another velocity.
    subroutine drive(self, velocity)

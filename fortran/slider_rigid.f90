@@ -106,7 +106,7 @@ contains
       system%stiffness = (self%stiffness + law%stiffness) * system%inverse_mass
       system%drag = law%drag * system%inverse_mass
       system%spring = self%stiffness * system%inverse_mass
-      rate = sqrt(system%stiffness) + system%drag + 2.0_wp * self%damping
+      rate = sqrt(abs(system%stiffness)) + system%drag + 2.0_wp * self%damping
       step = window%end_time - self%time
       ends = step * rate <= longest_step
       if (.not. ends) step = longest_step / rate

@@ -45,7 +45,7 @@ NOT_YET_KEYS = {
     "drive": ("force_rate",),
     "": ("interaction",),
 }
-NOT_YET_VALUES = {"run.engine": ("me",), "slider.kind": ("layered", "quasistatic")}
+NOT_YET_VALUES = {"slider.kind": ("layered", "quasistatic")}
 
 # Keys that exclude each other: laid over a base, one replaces the other.
 EXCLUSIVE = {"drive": ("velocity", "stage"), "slider": ("damping", "damping_ratio")}
@@ -80,10 +80,11 @@ def _problem(key: str, message: str) -> PydanticCustomError:
 class Run(Table):
     """What is computed, for how long, and with which random numbers."""
 
-    engine: Literal["eq"] = "eq"
+    engine: Literal["eq", "me"] = "eq"
     duration: Annotated[Time, Field(gt=0)] | None = None
     realizations: Annotated[StrictInt, Field(ge=1, lt=2**31)] = 1
     seed: Annotated[StrictInt, Field(ge=0, lt=2**63)] = 1
+    resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
 
 
 class Stage(Table):

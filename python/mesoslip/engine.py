@@ -1,4 +1,4 @@
-"""The earthquake-like engine: one realization after another, or side by side on threads.
+"""The engines, earthquake-like and master equation: realizations, side by side on threads.
 
 The kernel's whole state is plain arrays held here, so a realization can stop after any segment
 and go on; its numbers do not depend on where segments end, or on what runs beside it.
@@ -56,6 +56,7 @@ ENERGY_COLUMNS = (
     "residual",
 )
 
+ENGINES = {"eq": 1, "me": 2}
 COUPLINGS = {"scaled": 1, "equal": 2}
 INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
 SLIDERS = {"rigid": 1, "prescribed": 2}
@@ -69,6 +70,11 @@ SEGMENT_ADVANCES = 100_000
 # Rows of the buffers that a segment fills; each must hold the most samples of one advance twice.
 TRACE_ROWS = 20_000
 SLIP_ROWS = 2_000
+# Numbers kept for a population of the master equation, and for a packet of detached contacts.
+POPULATION_COLUMNS = 12
+PACKET_ROWS = 4
+# Populations and packets at first; there is room for more when they are needed.
+POPULATIONS = 4096
 
 
 def slip_velocity(config: Config) -> float:
@@ -83,7 +89,7 @@ def slip_velocity(config: Config) -> float:
 
 @dataclass
 class Realization:
-    """One run of the earthquake-like model, advanced in segments.
+    """One run of an engine, advanced in segments.
 
     ``trace`` has shape (samples, 7) with the columns `TRACE_COLUMNS`, ``slips`` (slips, 7) with
     `SLIP_COLUMNS`, ``slip_trace`` (samples, 8): a trace and the number of the slip.
@@ -93,7 +99,7 @@ class Realization:
     number: int
     time: float = 0.0
     finished: bool = False
-    breaks: int = 0
+    breaks: float = 0.0
     advances: int = 0
     kernel_seconds: float = 0.0
     energy: Array = field(default_factory=lambda: np.full(len(ENERGY_COLUMNS), np.nan))
@@ -104,25 +110,43 @@ class Realization:
         self._slips: list[Array] = []
         self._started = False
         # Every segment orders the queue anew, which must cost little beside its advances.
-        self._segment = max(SEGMENT_ADVANCES, self.config.contacts.count)
+        self._is_exact = self.config.run.engine == "eq"
+        self._segment = SEGMENT_ADVANCES
+        if self._is_exact:
+            self._segment = max(SEGMENT_ADVANCES, self.config.contacts.count)
 
     def _allocate(self) -> None:
         """Make the arrays of the state, and the buffers that a segment fills."""
-        count = self.config.contacts.count
+        count = self.config.contacts.count if self._is_exact else 1
+        populations = 1 if self._is_exact else POPULATIONS
+        if self.config.contacts.initial != "relaxed" and not self._is_exact:
+            width = self.config.contacts.threshold.relative_width
+            populations = max(populations, int(8 / (self.config.run.resolution * width)))
         reals, integers = _core.state_sizes()
         self._state_real = np.zeros(reals)
         self._state_integer = np.zeros(integers, dtype=np.int64)
         self._record = np.zeros((4, count), order="F")
         self._detached = np.zeros((3, count), order="F")
         self._detached_contact = np.zeros(count, dtype=np.int32)
+        self._population = np.zeros((populations, POPULATION_COLUMNS), order="F")
+        self._packet = np.zeros((PACKET_ROWS, populations), order="F")
         self._trace = np.empty((len(TRACE_COLUMNS), TRACE_ROWS), order="F")
         self._slip_trace = np.empty((len(TRACE_COLUMNS) + 1, TRACE_ROWS), order="F")
         self._slip = np.empty((len(SLIP_COLUMNS), SLIP_ROWS), order="F")
 
+    def _make_room(self) -> None:
+        """Double the arrays of the master equation's state."""
+        population, packet = self._population, self._packet
+        count = len(population)
+        self._population = np.zeros((2 * count, POPULATION_COLUMNS), order="F")
+        self._population[:count] = population
+        self._packet = np.zeros((PACKET_ROWS, 2 * count), order="F")
+        self._packet[:, :count] = packet
+
     def release(self) -> None:
         """Give back the memory of the state, of a realization that will not go on."""
         del self._record, self._detached, self._detached_contact
-        del self._trace, self._slip_trace, self._slip
+        del self._trace, self._slip_trace, self._slip, self._population, self._packet
 
     @property
     def trace(self) -> Array:
@@ -167,8 +191,11 @@ class Realization:
             damping = 0.0
         if not self._started:
             self._allocate()
+        segment = advances or self._segment
         start = time.perf_counter()
-        rows, finished, now, breaks, made, energy, status, message = _core.run_contacts(
+        rows, finished, full, now, breaks, made, energy, status, message = _core.run_segment(
+            engine=ENGINES[config.run.engine],
+            count=contacts.count,
             static_force=contacts.contact_static_force,
             stiffness=contacts.contact_stiffness,
             drag=contacts.contact_drag,
@@ -197,15 +224,18 @@ class Realization:
             record=self._record,
             detached=self._detached,
             detached_contact=self._detached_contact,
+            resolution=config.run.resolution,
+            population=self._population,
+            packet=self._packet,
             trace=self._trace,
             slip_trace=self._slip_trace,
             slips=self._slip,
-            most_advances=advances or self._segment,
+            most_advances=segment,
         )
         seconds = time.perf_counter() - start
         self.kernel_seconds += seconds
         # A segment may also end because a buffer is full; a longer one would be no use then.
-        if made - self.advances == self._segment and seconds < 0.5 * SEGMENT_SECONDS:
+        if made - self.advances == segment == self._segment and seconds < 0.5 * SEGMENT_SECONDS:
             self._segment *= 2
         self._started = True
         if status != 0:
@@ -213,12 +243,14 @@ class Realization:
         self._traces.append(self._trace[:, : rows[0]].T.copy())
         self._slip_traces.append(self._slip_trace[:, : rows[1]].T.copy())
         self._slips.append(self._slip[:, : rows[2]].T.copy())
+        if full:
+            self._make_room()
         self.finished = bool(finished)
         self.time, self.breaks, self.advances, self.energy = now, breaks, made, energy
 
     @property
     def contacts(self) -> dict[str, Array]:
-        """Origin [m], stiffness [N/m] (0 if detached), breaking stretch [m], renewals of each."""
+        """Of N contacts: origin [m], stiffness [N/m] (0 if detached), breaking stretch [m], renewals of each."""
         names = ("origin", "stiffness", "break_stretch", "renewals")
         return {name: self._record[row].copy() for row, name in enumerate(names)}
 

@@ -357,3 +357,45 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    pinned = solution%pinned
    mismatch = solution%mismatch
 end subroutine force_curve
+
+!> Onset of slip, dimensionless, by Eq. S46 or S47.
+subroutine onset(equation, coefficients, damping, drag, end_displacement, interval, tolerance, &
+   & capacity, samples, length, ended, status, message)
+   !f2py threadsafe
+   use mesoslip_kinds, only: wp
+   use mesoslip_errors, only: error_type
+   use mesoslip_onset, only: integrate_onset, onset_type
+   implicit none
+   !> 1 for S46, 2 for S47
+   integer, intent(in) :: equation
+   !> D0 to D3; eta_S/Omega_S, eta/Omega_S; displacement at which S46 ends
+   real(8), intent(in) :: coefficients(4), damping, drag, end_displacement
+   !> Interval of samples, and relative tolerance of the integration
+   real(8), intent(in) :: interval, tolerance
+   !> Samples of time, displacement, velocity and its running mean, and how many were filled
+   integer, intent(in) :: capacity
+   real(8), intent(inout) :: samples(4, capacity)
+   integer, intent(out) :: length
+   !> Whether the equation came to its end
+   integer, intent(out) :: ended
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(onset_type), target :: equations
+   type(error_type), allocatable :: error
+   logical :: is_over
+
+   status = 0
+   message = ""
+   equations%equation = equation
+   equations%D = coefficients
+   equations%damping = damping
+   equations%drag = drag
+   equations%end_displacement = end_displacement
+   call integrate_onset(equations, interval, tolerance, samples, length, is_over, error)
+   ended = merge(1, 0, is_over .and. .not. allocated(error))
+   if (allocated(error)) then
+      status = error%status
+      message = error%message
+   end if
+end subroutine onset

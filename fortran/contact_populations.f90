@@ -108,7 +108,7 @@ module mesoslip_contact_populations
       procedure :: elastic_energy
       procedure :: exchange
       procedure :: rebuild
-      procedure, private :: add_population, set_limits, bear, try, break_tried
+      procedure, private :: add_population, bear, try, break_tried
       procedure, private :: expect, attach_due
    end type contact_populations_type
 
@@ -217,26 +217,24 @@ contains
          population(place, row_law) = real(law, wp)
          population(place, row_broken) = max(broken, self%moments(law)%least)
          population(place, row_moments + 1:) = weight * moments
-         call self%set_limits(place)
-      end associate
-   end subroutine add_population
-
-   !> Set the displacements at which contacts of a population break.
-   subroutine set_limits(self, place)
-      class(contact_populations_type), intent(inout) :: self
-      integer, intent(in) :: place
-
-      associate (population => self%population, coupling => self%parameters%coupling)
-         population(place, row_ahead) = population(place, row_origin) + self%stretch &
-            & * breaking_distance(coupling, population(place, row_force), &
-            & population(place, row_broken))
-         population(place, row_behind) = population(place, row_origin) - self%stretch &
-            & * breaking_distance(coupling, -population(place, row_force), &
-            & population(place, row_broken))
+         population(place, row_ahead) = next_break(self, place, 1.0_wp)
+         population(place, row_behind) = next_break(self, place, -1.0_wp)
          self%ahead = min(self%ahead, population(place, row_ahead))
          self%behind = max(self%behind, population(place, row_behind))
       end associate
-   end subroutine set_limits
+   end subroutine add_population
+
+   !> Displacement at which contacts of a population break next in a direction.
+   pure function next_break(self, place, sense) result(displacement)
+      class(contact_populations_type), intent(in) :: self
+      integer, intent(in) :: place
+      real(wp), intent(in) :: sense
+      real(wp) :: displacement
+
+      displacement = self%population(place, row_origin) + sense * self%stretch &
+         & * breaking_distance(self%parameters%coupling, &
+         & sense * self%population(place, row_force), self%population(place, row_broken))
+   end function next_break
 
    !> Sum stiffness and offset anew, and find what breaks next.
    subroutine bear(self)
@@ -430,7 +428,15 @@ contains
             population(place, row_moments + 1:) = self%trial_moments(:, trial)
             population(place, row_broken) = self%trial_broken(trial)
             if (population(place, row_moments + number) > 0.0_wp) then
-               call self%set_limits(place)
+               if (self%trial_sense > 0.0_wp) then
+                  population(place, row_ahead) = self%trial_end
+                  population(place, row_behind) = next_break(self, place, -1.0_wp)
+               else
+                  population(place, row_behind) = self%trial_end
+                  population(place, row_ahead) = next_break(self, place, 1.0_wp)
+               end if
+               self%ahead = min(self%ahead, population(place, row_ahead))
+               self%behind = max(self%behind, population(place, row_behind))
             else
                population(place, :) = population(self%count, :)
                self%count = self%count - 1

@@ -4,7 +4,7 @@ module mesoslip_errors
    private
 
    public :: error_type, raise
-   public :: status_ok, status_invalid, status_memory, status_stalled
+   public :: status_ok, status_invalid, status_memory, status_stalled, status_failed
 
    !> Nothing went wrong.
    integer, parameter :: status_ok = 0
@@ -14,6 +14,8 @@ module mesoslip_errors
    integer, parameter :: status_memory = 2
    !> The motion makes no progress in time.
    integer, parameter :: status_stalled = 3
+   !> An integrator gave up.
+   integer, parameter :: status_failed = 4
 
    !> What went wrong, and a sentence about it for the user.
    type :: error_type

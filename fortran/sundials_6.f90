@@ -4,12 +4,15 @@
 module fsundials_core_mod
    use, intrinsic :: iso_c_binding, only: c_int, c_null_ptr, c_ptr
    use fsundials_context_mod, only: create_context => FSUNContext_Create, FSUNContext_Free
+   use fsundials_linearsolver_mod, only: FSUNLinSolFree, SUNLinearSolver
+   use fsundials_matrix_mod, only: FSUNMatDestroy, SUNMatrix
    use fsundials_nonlinearsolver_mod, only: FSUNNonlinSolFree, SUNNonlinearSolver
    use fsundials_nvector_mod, only: FN_VDestroy, FN_VGetArrayPointer, N_Vector
    implicit none
    private
 
    public :: FSUNContext_Create, FSUNContext_Free, SUN_COMM_NULL
+   public :: FSUNLinSolFree, SUNLinearSolver, FSUNMatDestroy, SUNMatrix
    public :: FSUNNonlinSolFree, SUNNonlinearSolver
    public :: FN_VDestroy, FN_VGetArrayPointer, N_Vector
 

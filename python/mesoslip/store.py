@@ -61,6 +61,12 @@ VARIABLES = {
     "stretch_density": ("m-1", "density of stretches, without contacts that have not broken yet"),
     "unbroken_part": ("1", "part of the contacts that bear the stretch of a relaxed start"),
     "density_displacement": ("m", "displacement of the slider"),
+    "onset_time": ("1", "time since the onset of slip times the setup frequency"),
+    "onset_displacement": ("1", "displacement since the onset times the spring over static force"),
+    "onset_velocity": ("1", "derivative of the displacement since the onset by the time"),
+    "onset_mean_velocity": ("1", "running mean of that velocity"),
+    "relative_force_drop": ("1", "change of the spring force since the onset over static force"),
+    "asymptote": ("1", "change of the spring force at short times over static force"),
 }
 
 

@@ -1,0 +1,66 @@
+!> Messages of SUNDIALS version 7, collected instead of printed.
+module mesoslip_sundials_messages
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_loc, &
+      & c_null_char, c_ptr
+   implicit none
+   private
+
+   public :: message_type, collect_messages
+
+   !> The last message.
+   type :: message_type
+      !> Its text, blank for none
+      character(len=160) :: text = ""
+   end type message_type
+
+   interface
+      !> Give a context a function for its messages.
+      function push_handler(context, handler, user_data) &
+         & bind(c, name="SUNContext_PushErrHandler") result(status)
+         import :: c_funptr, c_int, c_ptr
+         implicit none
+         !> The context
+         type(c_ptr), value :: context
+         !> The function, and what it gets
+         type(c_funptr), value :: handler
+         type(c_ptr), value :: user_data
+         !> 0 means success
+         integer(c_int) :: status
+      end function push_handler
+   end interface
+
+contains
+
+   !> Have the messages of an integrator collected.
+   subroutine collect_messages(context, memory, message)
+      !> Context and memory of the integrator
+      type(c_ptr), intent(in) :: context, memory
+      !> Where they go
+      type(message_type), intent(inout), target :: message
+
+      integer(c_int) :: status
+
+      associate (unused => memory)
+      end associate
+      status = push_handler(context, c_funloc(handle), c_loc(message))
+      if (status /= 0) message%text = "messages of CVODE cannot be collected"
+   end subroutine collect_messages
+
+   !> Keep a message.
+   subroutine handle(line, function_name, file_name, text, code, user_data, context) bind(c)
+      integer(c_int), value :: line, code
+      character(kind=c_char), intent(in) :: function_name(*), file_name(*), text(*)
+      type(c_ptr), value :: user_data, context
+
+      type(message_type), pointer :: message
+      integer :: place
+
+      call c_f_pointer(user_data, message)
+      message%text = ""
+      do place = 1, len(message%text)
+         if (text(place) == c_null_char) exit
+         message%text(place:place) = text(place)
+      end do
+   end subroutine handle
+
+end module mesoslip_sundials_messages

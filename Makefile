@@ -17,7 +17,9 @@ SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard python/mesoslip/*.py python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
-FIGURE_OUTPUTS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml))
+# Figures need the outputs of runs, but for S18, and two of other commands.
+FIGURE_RUNS := $(filter-out out/S18.nc,$(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml)))
+FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc out/S19a.onset.nc out/S19b.onset.nc
 
 # meson and meson-python find ninja here.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
@@ -80,11 +82,19 @@ clean: ## Remove the environment, what was built, and outputs
 out/%.nc: runs/%.toml | $(INSTALLED)
 	$(MESOSLIP) run $< -o $@
 
+out/%.curve.nc: runs/%.toml | $(INSTALLED)
+	$(MESOSLIP) curve $< -o $@
+
+out/%.onset.nc: runs/%.toml | $(INSTALLED)
+	$(MESOSLIP) onset $< -o $@
+
 out/%.png: out/%.nc | $(INSTALLED)
 	$(MESOSLIP) plot $< -o $@
 
 # The runs of the source's figures are variations of Klein's.
 $(FIGURE_OUTPUTS): runs/klein.toml
+out/S19a-me.nc: runs/S19a.toml
+out/S19b-me.nc: runs/S19b.toml
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)

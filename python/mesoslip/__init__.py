@@ -13,19 +13,23 @@ from typing import TYPE_CHECKING, Any
 from mesoslip.errors import ConfigError, FileError, MesoslipError, RunError
 
 if TYPE_CHECKING:
-    from mesoslip.api import figures, info, plot, read, run, slips
+    from mesoslip.api import curve, figures, info, onset, plot, read, run, slips
     from mesoslip.config import Config
+    from mesoslip.force_curve import ForceCurve
     from mesoslip.threshold import ThresholdLaw
 
 __all__ = [
     "Config",
     "ConfigError",
     "FileError",
+    "ForceCurve",
     "MesoslipError",
     "RunError",
     "ThresholdLaw",
+    "curve",
     "figures",
     "info",
+    "onset",
     "plot",
     "read",
     "run",
@@ -35,9 +39,12 @@ __all__ = [
 # What takes long to import is imported when it is asked for.
 _LAZY = {
     "Config": "config",
+    "ForceCurve": "force_curve",
     "ThresholdLaw": "threshold",
+    "curve": "api",
     "figures": "api",
     "info": "api",
+    "onset": "api",
     "plot": "api",
     "read": "api",
     "run": "api",

@@ -83,6 +83,39 @@ def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
     return derived_quantities(as_config(config))
 
 
+def curve(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
+    """The force curve of the master equation, and its instability.
+
+    Returns
+    -------
+    xarray.DataTree
+        See `mesoslip.ForceCurve.to_tree`; attributes such as ``K_star``, ``X_c``, ``D0`` in SI.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong.
+    """
+    from mesoslip.force_curve import ForceCurve
+
+    return ForceCurve(as_config(config)).to_tree()
+
+
+def onset(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
+    """The onset of slip by Eqs. S46 and S47, see `mesoslip.slip_onset.onset_of_slip`.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong, or its slider has no onset of slip.
+    RunError
+        If an integration fails.
+    """
+    from mesoslip.slip_onset import onset_of_slip
+
+    return onset_of_slip(as_config(config))
+
+
 def read(path: PathLike) -> xr.DataTree:
     """Read an output into memory.
 
@@ -95,7 +128,7 @@ def read(path: PathLike) -> xr.DataTree:
 
 
 def _as_tree(output: PathLike | xr.DataTree) -> xr.DataTree:
-    return output if isinstance(output, xr.DataTree) else read(output)
+    return output if isinstance(output, xr.DataTree) else store.read_run(Path(output))
 
 
 def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
@@ -104,7 +137,10 @@ def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
 
 
 def plot(output: PathLike | xr.DataTree, figure: PathLike) -> None:
-    """Draw an output: spring force with one slip in an inset, velocity, detached contacts.
+    """Draw an output of any command.
+
+    Of a run: spring force with one slip in an inset, velocity, detached contacts; of a force curve:
+    the force and its slope; of an onset of slip: the drop of the spring force.
 
     Raises
     ------
@@ -113,7 +149,8 @@ def plot(output: PathLike | xr.DataTree, figure: PathLike) -> None:
     """
     from mesoslip import plots
 
-    plots.save(plots.overview(_as_tree(output)), Path(figure))
+    tree = output if isinstance(output, xr.DataTree) else read(output)
+    plots.save(plots.draw(tree), Path(figure))
 
 
 def figures(

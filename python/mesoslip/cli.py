@@ -28,7 +28,7 @@ app = typer.Typer(
 ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
 ]
-OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip run", metavar="OUT.nc")]
+OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metavar="OUT.nc")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -89,7 +89,7 @@ def run(
     store.write(tree, path)
     if not quiet:
         typer.echo(
-            f"{path}: {tree.attrs['break_count']} breaks, {tree['slips'].sizes['slip']} slips, "
+            f"{path}: {tree.attrs['break_count']:.0f} breaks, {tree['slips'].sizes['slip']} slips, "
             f"energy balance to {abs(tree.attrs['energy_residual']):.0e}, "
             f"{tree.attrs['wall_seconds']:.2f} s",
             err=True,
@@ -113,8 +113,80 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         typer.echo(json.dumps({name: one.value for name, one in quantities.items()}, indent=2))
         return
     for name, one in quantities.items():
-        unit = "" if one.unit == "1" else f" {one.unit}"
-        typer.echo(f"{name:22} {f'{one.value:.6g}{unit}':20} {one.meaning}")
+        _show(name, one.value, one.unit, one.meaning)
+
+
+def _show(name: str, value: float | bool | None, unit: str, meaning: str) -> None:
+    """A line for a quantity."""
+    if isinstance(value, bool) or value is None:
+        shown = {True: "yes", False: "no", None: "none"}[value]
+    else:
+        shown = f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
+    typer.echo(f"{name:22} {shown:20} {meaning}")
+
+
+@app.command()
+def curve(
+    config: ConfigArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the curve to a file", metavar="OUT.nc"),
+    ] = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Force curve of the master equation, and its elastic instability."""
+    from mesoslip import api, store
+    from mesoslip.force_curve import SUMMARY, ForceCurve
+
+    checked = api.as_config(config, changes or ())
+    if output is not None:
+        store.check_writable(output)
+    force_curve = ForceCurve(checked)
+    if output is not None:
+        store.write(force_curve.to_tree(), output)
+    summary = force_curve.summary()
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+    else:
+        for name, value in summary.items():
+            _show(name, value, *SUMMARY[name])
+    if force_curve.error > checked.curve.tolerance:
+        typer.echo(
+            f"the force has {force_curve.digits} digits; more would take too much work, as its "
+            "law is not smooth, or too narrow for this length (curve.length, curve.tolerance)",
+            err=True,
+        )
+
+
+@app.command()
+def onset(
+    config: ConfigArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the solutions to a file", metavar="OUT.nc"),
+    ] = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
+    from mesoslip import api, store
+    from mesoslip.slip_onset import SUMMARY
+
+    checked = api.as_config(config, changes or ())
+    if output is not None:
+        store.check_writable(output)
+    tree = api.onset(checked)
+    if output is not None:
+        store.write(tree, output)
+    summary = {name: tree.attrs[name] for name in SUMMARY if name in tree.attrs}
+    summary["stable"] = tree.attrs["stable"] == "true"
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+        return
+    for name, value in summary.items():
+        _show(name, value, *SUMMARY[name])
+    typer.echo(tree.attrs["comment"])
 
 
 @app.command()
@@ -128,7 +200,7 @@ def slips(
     """Show the catalogue of slips, with statistics."""
     from mesoslip import catalogue, store
 
-    tree = store.read(output)
+    tree = store.read_run(output)
     if table is not None:
         catalogue.write_csv(tree, table)
     rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
@@ -145,7 +217,7 @@ def slips(
             f"{1e3 * (row['end_time'] - row['start_time']):13.3f} "
             f"{1e6 * row['force_before']:11.4f} "
             f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
-            f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8d}"
+            f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8.0f}"
         )
     typer.echo(f"{len(rows)} slips")
     for name, values in statistics.items():
@@ -169,7 +241,7 @@ def plot(
     from mesoslip import plots, store
 
     path = figure or output.with_suffix(".png")
-    plots.save(plots.overview(store.read(output)), path)
+    plots.save(plots.draw(store.read(output)), path)
     typer.echo(str(path), err=True)
 
 

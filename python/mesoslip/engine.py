@@ -246,7 +246,8 @@ class Realization:
         if full:
             self._make_room()
         self.finished = bool(finished)
-        self.time, self.breaks, self.advances, self.energy = now, breaks, made, energy
+        self.time, self.advances, self.energy = now, made, energy
+        self.breaks = int(breaks) if self._is_exact else breaks
 
     @property
     def contacts(self) -> dict[str, Array]:

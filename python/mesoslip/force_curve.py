@@ -40,6 +40,28 @@ FIRST_WIDTH = 0.7
 MOST_WORK = 2e9
 
 
+# Units and meanings of what a curve is summed up in.
+SUMMARY = {
+    "K_star": ("N/m", "greatest -F'(X), K*: sliding is smooth with a stiffer spring"),
+    "K_star_displacement": ("m", "where that is"),
+    "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
+    "stable": ("1", "whether sliding is smooth with the configured spring"),
+    "X_c": ("m", "displacement at which the slider becomes unstable, lowest F'(X) = -K"),
+    "F_c": ("N", "force there"),
+    "F_peak": ("N", "greatest force"),
+    "X_peak": ("m", "where that is"),
+    "F_steady": ("N", "force of stationary slow sliding"),
+    "D0": ("1", "F(X_c)/F_s"),
+    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
+    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
+    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
+    "error": ("1", "estimated error of the force over F_s"),
+    "slope_error": ("1", "estimated error of its slope over Nk"),
+    "digits": ("1", "digits of the force that are certain"),
+    "conservation_error": ("1", "largest error of the number of contacts, relative"),
+}
+
+
 class Scales(NamedTuple):
     """Scales of the lives of contacts: displacements over f_s/k, forces over f_s."""
 
@@ -281,7 +303,8 @@ class ForceCurve:
 
     def _extreme(self, function: Callable[[Array], Array], place: int) -> tuple[float, float]:
         """Place and value of the minimum of a function next to one of the samples."""
-        low, high = self.samples[max(place - 1, 0)], self.samples[min(place + 1, -1 % len(self.samples))]
+        low = self.samples[max(place - 1, 0)]
+        high = self.samples[min(place + 1, len(self.samples) - 1)]
         scale = self._stretch
         found = optimize.minimize_scalar(
             lambda x: float(function(x * scale)),

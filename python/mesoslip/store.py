@@ -127,12 +127,16 @@ def build(
         },
         attrs=attributes(config, realizations, complete=complete, wall_seconds=wall_seconds),
     )
-    if complete:
+    if complete and config.run.engine == "eq":
         root["detached_contacts"] = root["detached_contacts"].astype(np.int32)
 
     groups = {"slips": slip_catalogue(realizations), "energy": energy_balance(realizations)}
     if config.output.slip_interval is not None and engine.slip_velocity(config) > 0:
         groups["slip_traces"] = slip_traces(realizations)
+    if config.run.engine == "eq":
+        for group, name in (("slips", "contacts_broken"), ("slip_traces", "detached_contacts")):
+            if group in groups:
+                groups[group][name] = groups[group][name].astype(np.int64)
     return xr.DataTree(root, children={name: xr.DataTree(data) for name, data in groups.items()})
 
 
@@ -148,9 +152,7 @@ def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
         {"realization": variable("realization", ("slip",), owner)}
         | {name: variable(name, ("slip",), values[name]) for name in order}
         | {
-            "contacts_broken": variable(
-                "contacts_broken", ("slip",), values["contacts_broken"].astype(np.int64)
-            )
+            "contacts_broken": variable("contacts_broken", ("slip",), values["contacts_broken"])
         }
     ).set_coords("realization")
 
@@ -165,9 +167,6 @@ def slip_traces(realizations: Sequence[Realization]) -> xr.Dataset:
     }
     data["slip"] = variable("slip", ("sample",), rows[:, -1].astype(np.int32))
     data["realization"] = variable("realization", ("sample",), owner)
-    data["detached_contacts"] = variable(
-        "detached_contacts", ("sample",), rows[:, 6].astype(np.int32)
-    )
     return xr.Dataset(data).set_coords(["realization", "slip", "time"])
 
 
@@ -270,7 +269,7 @@ def write(tree: xr.DataTree, path: Path) -> None:
 
 
 def read(path: str | Path) -> xr.DataTree:
-    """Read an output into memory.
+    """Read an output of any command into memory.
 
     Raises
     ------
@@ -287,7 +286,15 @@ def read(path: str | Path) -> xr.DataTree:
             tree = tree.load()
     except (OSError, ValueError, RuntimeError) as error:
         raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
-    if "configuration" not in tree.attrs or "spring_force" not in tree.data_vars:
+    if "configuration" not in tree.attrs:
+        raise FileError(f"{path}: not an output of mesoslip")
+    return tree
+
+
+def read_run(path: str | Path) -> xr.DataTree:
+    """Read an output of ``mesoslip run`` into memory; see `read`."""
+    tree = read(path)
+    if "spring_force" not in tree.data_vars:
         raise FileError(f"{path}: not an output of mesoslip run")
     return tree
 

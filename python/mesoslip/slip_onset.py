@@ -26,6 +26,24 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Units and meanings of what the onset is summed up in.
+SUMMARY = {
+    "stable": ("1", "whether sliding is smooth, so that there is no onset of slip"),
+    "K_star": ("N/m", "spring constant above which it is"),
+    "X_c": ("m", "displacement at the onset"),
+    "D0": ("1", "F(X_c)/F_s"),
+    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
+    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
+    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
+    "alpha": ("1", "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; 2.21 in the source"),
+    "slip_time_sequential": ("s", "slip time of sequential breaking"),
+    "B": ("1", "(D0 - eta D1/Omega_S)/2: the spring force drops by B tau^2 F_s as the film melts"),
+    "beta": ("1", "B^(-1/2), slip time of instant melting times Omega_S"),
+    "slip_time_melting": ("s", "slip time of instant melting"),
+    "expansion_end": ("1", "x at which S46 no longer describes the contacts"),
+    "expansion_end_time": ("1", "tau at which it comes there"),
+}
+
 EQUATIONS = {"sequential": 1, "melting": 2}
 # S46 describes the contacts as long as its force is off by less than this part of F_s.
 EXPANSION_ERROR = 0.02
@@ -136,7 +154,7 @@ def end_of_expansion(curve: ForceCurve) -> float:
     return float(optimize.brentq(excess, low, float(x[place])))
 
 
-def onset(config: Config) -> xr.DataTree:
+def onset_of_slip(config: Config) -> xr.DataTree:
     """The onset of slip of a configuration, from the force curve of its master equation.
 
     Returns
@@ -166,6 +184,7 @@ def onset(config: Config) -> xr.DataTree:
     }
     attributes["stable"] = str(curve.stable).lower()
     if not curve.critical_points:
+        attributes["comment"] = "sliding is smooth, as F' is above -K everywhere: there is no onset"
         return xr.DataTree(xr.Dataset(attrs=attributes))
 
     omega = slider.omega_s

@@ -3,13 +3,13 @@
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
 
 !> Run N contacts, or infinitely many, for some advances of the slider.
-subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, coupling, &
-   & reattach, law, relative_width, initial, seed, realization, slider_kind, mass, spring, &
-   & damping, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
+subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, &
+   & coupling, reattach, law, relative_width, initial, seed, realization, slider_kind, mass, &
+   & spring, damping, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
    & quiet_time, started, reals, integers, state_real, state_integer, records, record, detached, &
-   & detached_contact, resolution, populations, population, packets, packet, trace_capacity, trace, &
-   & slip_trace_capacity, slip_trace, slip_capacity, slips, most_advances, rows, finished, full, &
-   & time, breaks, advances, energy, status, message)
+   & detached_contact, resolution, populations, population, packets, packet, trace_capacity, &
+   & trace, slip_trace_capacity, slip_trace, slip_capacity, slips, most_advances, rows, finished, &
+   & full, time, breaks, detached_count, advances, energy, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type, raise, status_invalid
@@ -67,8 +67,8 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    !> Whether the run is over, or has no room for more populations; the time it has come to
    integer, intent(out) :: finished, full
    real(8), intent(out) :: time
-   !> Terms of the energy balance; breaks and advances so far
-   real(8), intent(out) :: energy(8), breaks
+   !> Terms of the energy balance; breaks and advances so far, contacts that are detached
+   real(8), intent(out) :: energy(8), breaks, detached_count
    integer(8), intent(out) :: advances
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -88,6 +88,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    full = 0
    time = 0.0_wp
    breaks = 0.0_wp
+   detached_count = 0.0_wp
    advances = 0
    energy = 0.0_wp
    status = 0
@@ -165,6 +166,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
 
    time = simulation%slider%time
    breaks = simulation%contacts%breaks
+   detached_count = simulation%contacts%detached_count
    advances = simulation%advances
    energy = simulation%energy_balance()
    if (simulation%finished) finished = 1
@@ -275,8 +277,8 @@ subroutine contact_scales(law, relative_width, coupling, back_force_ratio, newbo
    !> Standard deviation of the stretch of newborn contacts
    real(8), intent(in) :: newborn_width
    !> Shortest, longest and mean life of newborns; their stiffness and force at attaching; shortest
-   !> and longest life of a relaxed first generation; mean force of stationary sliding
-   real(8), intent(out) :: scales(8)
+   !> and longest life of a relaxed first generation; mean force of stationary sliding; mean mass
+   real(8), intent(out) :: scales(9)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
@@ -294,13 +296,14 @@ subroutine contact_scales(law, relative_width, coupling, back_force_ratio, newbo
       return
    end if
    scales = [lives%shortest, lives%longest, lives%mean_life, lives%newborn_stiffness, &
-      & lives%newborn_force, lives%first_shortest, lives%first_longest, lives%steady_force]
+      & lives%newborn_force, lives%first_shortest, lives%first_longest, &
+      & lives%steady_force, lives%mean_mass]
 end subroutine contact_scales
 
 !> Force curve of the master equation, dimensionless, on panels of the displacement.
 subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_width, &
    & reattach, initial, start, width, panels, points, point, breaks, slope, force, stiffness, &
-   & pinned, mismatch, status, message)
+   & pinned_part, mismatch, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type
@@ -322,7 +325,7 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    real(8), intent(out) :: breaks(points, panels), slope(points, panels)
    real(8), intent(out) :: force(points, panels), stiffness(points, panels)
    !> Part of the contacts that is pinned, at the edges of the panels
-   real(8), intent(out) :: pinned(panels + 1)
+   real(8), intent(out) :: pinned_part(panels + 1)
    !> Largest difference between two ways to the force
    real(8), intent(out) :: mismatch
    integer, intent(out) :: status
@@ -337,8 +340,8 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    slope = 0.0_wp
    force = 0.0_wp
    stiffness = 0.0_wp
-   pinned = 0.0_wp
    mismatch = 0.0_wp
+   pinned_part = 0.0_wp
    status = 0
    message = ""
    call new_contact_lives(lives, law, relative_width, coupling, back_force_ratio, newborn_width, &
@@ -354,7 +357,7 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    slope = solution%slope
    force = solution%force
    stiffness = solution%stiffness
-   pinned = solution%pinned
+   pinned_part = solution%pinned
    mismatch = solution%mismatch
 end subroutine force_curve
 

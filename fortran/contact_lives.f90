@@ -43,8 +43,8 @@ module mesoslip_contact_lives
       real(wp) :: first_shortest = 0.0_wp, first_longest = 0.0_wp
       !> Mean life of newborns, their stiffness and force at attaching
       real(wp) :: mean_life = 0.0_wp, newborn_stiffness = 0.0_wp, newborn_force = 0.0_wp
-      !> Mean force of stationary sliding
-      real(wp) :: steady_force = 0.0_wp
+      !> Mean force of stationary sliding, and mean mass of contacts
+      real(wp) :: steady_force = 0.0_wp, mean_mass = 1.0_wp
 
       type(partial_moments_type), private :: moments
       !> Longest and shortest lives of contacts that attach with no spread
@@ -128,6 +128,7 @@ contains
          self%mean_life = all(one) - back_force
          stretching = 0.5_wp * (all(two) - back_force**2)
       else
+         self%mean_mass = all(one)
          self%mean_life = all(half) - back_force * all(minus_half)
          stretching = 0.5_wp * (all(three_halves) - back_force**2 * all(minus_half))
       end if

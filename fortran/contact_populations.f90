@@ -3,8 +3,8 @@
 !> A population is what attached within one step. It is labelled by its origin, so that nothing is
 !> advected, and remembers below which threshold its contacts have broken: the greatest force that
 !> it has borne, in either direction. A step of the slider is so short that its populations are
-!> points of a smooth density of origins. Over a step the contact force is a line with the change and
-!> the work of the true force, which is known in advance, so the steps are of second order.
+!> points of a smooth density of origins. Over a step the contact force is a line that
+!> does the work of the true force, which is known in advance, so the steps are of second order.
 !>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contact_populations
@@ -68,9 +68,8 @@ module mesoslip_contact_populations
       integer, private :: first = 1, last = 0
       !> Part of the first one that is attached again
       real(wp), private :: attached_part = 0.0_wp
-      !> Attached again so far; mass of the detached contacts
-      real(wp), private :: attached = 0.0_wp
-      type(accumulator_type), private :: detached_mass
+      !> Number and mass of the detached contacts
+      type(accumulator_type), private :: detached_number, detached_mass
       !> Bounds on the displacements at which contacts break next, forward and backward [m]
       real(wp), private :: ahead = huge(1.0_wp), behind = -huge(1.0_wp)
       !> Total stiffness [N/m] and stiffness times origin less force at attaching [N]
@@ -82,9 +81,8 @@ module mesoslip_contact_populations
       integer, private :: trials = 0
       integer, allocatable, private :: trial_population(:)
       real(wp), allocatable, private :: trial_broken(:), trial_moments(:, :)
-      !> Breaks then, and their mass; force that is lost, and work that need not be done for it
-      real(wp), private :: trial_breaks = 0.0_wp, trial_mass = 0.0_wp
-      real(wp), private :: trial_force = 0.0_wp, trial_work = 0.0_wp
+      !> Breaks then, and their mass; work that need not be done for them [J]
+      real(wp), private :: trial_breaks = 0.0_wp, trial_mass = 0.0_wp, trial_work = 0.0_wp
       !> Where the next population breaks [m]
       real(wp), private :: trial_next = 0.0_wp
 
@@ -280,7 +278,7 @@ contains
       !> Where it holds
       type(window_type), intent(out) :: window
 
-      real(wp) :: sense, duration, births, mass, way, rise, back_force, slack
+      real(wp) :: sense, duration, births, mass, way, mean_force, slack
       logical :: breaks
 
       sense = pose%sense
@@ -304,40 +302,51 @@ contains
       window%upper = self%ahead
       window%lower = self%behind
       if (breaks .or. births > 0.0_wp) then
-         ! Steps in which something happens go one way: they end where the slider turns round.
+         window%upper = min(window%upper, pose%displacement + self%step)
+         window%lower = max(window%lower, pose%displacement - self%step)
+      end if
+      if (breaks) then
+         ! Contacts break one way: the step ends where the slider turns round.
          if (sense > 0.0_wp) then
             window%upper = pose%displacement + self%step
-            if (.not. breaks) window%upper = min(window%upper, self%ahead)
             window%lower = pose%displacement
             if (.not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
          else
             window%lower = pose%displacement - self%step
-            if (.not. breaks) window%lower = max(window%lower, self%behind)
             window%upper = pose%displacement
             if (.not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
          end if
       end if
 
+      ! What an observer sees in the step is its middle.
+      self%detached_count = self%detached_number%total() + 0.5_wp * (self%trial_breaks - births)
       law = self%law()
       law%drag = law%drag + 0.5_wp * self%parameters%drag * (self%trial_mass - mass)
-      if (breaks) then
-         ! A line that ends at the right force and does the right work.
-         law%stiffness = law%stiffness - self%trial_force / self%step
-         law%offset = law%offset - self%trial_force / self%step * pose%displacement &
-            & + sense * (self%trial_work / self%step - 0.5_wp * self%trial_force)
-      end if
+      ! Lines that do the right work in the step, and start from the force there is: it does not
+      ! depend on the direction in which the slider goes on.
+      if (breaks) call add_slope(-2.0_wp * self%trial_work / self%step**2)
       if (births > 0.0_wp) then
          way = min(self%step, abs(pose%velocity) * min(duration, window%end_time - pose%time))
-         back_force = self%parameters%static_force * self%parameters%back_force_ratio
-         rise = births * (back_force + 0.5_wp * self%newborn_stiffness * way)
-         law%offset = law%offset - sense * births &
-            & * (0.5_wp * back_force + self%newborn_stiffness * way / 6.0_wp)
-         ! The force of what attaches rises over the way that the slider makes, if it makes one.
+         mean_force = births * (0.5_wp * self%parameters%static_force &
+            & * self%parameters%back_force_ratio + self%newborn_stiffness * way / 6.0_wp)
          if (way > 0.5_wp * self%step) then
-            law%stiffness = law%stiffness + rise / way
-            law%offset = law%offset + rise / way * pose%displacement + 0.5_wp * sense * rise
+            call add_slope(2.0_wp * mean_force / way)
+         else
+            ! Near a turning point the sign of their force is open.
+            law%offset = law%offset - sense * mean_force * (2.0_wp * way / self%step)
          end if
       end if
+
+   contains
+
+      !> Have the force change with the way that the slider makes in the step.
+      subroutine add_slope(slope)
+         real(wp), intent(in) :: slope
+
+         law%stiffness = law%stiffness + slope
+         law%offset = law%offset + slope * pose%displacement
+      end subroutine add_slope
+
    end subroutine offer
 
    !> Time in which the slider will move by a distance; huge if it does not.
@@ -369,7 +378,6 @@ contains
       self%trial_sense = sense
       self%trial_breaks = 0.0_wp
       self%trial_mass = 0.0_wp
-      self%trial_force = 0.0_wp
       self%trial_work = 0.0_wp
       do place = 1, self%count
          if (sense * (self%population(place, row) - displacement) >= 0.0_wp) then
@@ -390,11 +398,9 @@ contains
          self%trial_moments(:, self%trials) = moments
          self%trial_breaks = self%trial_breaks + loss(number)
          self%trial_mass = self%trial_mass + loss(massive)
-         self%trial_force = self%trial_force + loss(stiff) * distance + loss(number) * force
          self%trial_work = self%trial_work + 0.5_wp * (loss(stiff) * distance**2 &
             & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 - loss(lost))
       end do
-      self%trial_force = self%trial_force * self%parameters%static_force
       self%trial_work = self%trial_work * self%parameters%static_force * self%stretch
       self%trial_next = sense * next
       if (self%trials == 0) then
@@ -444,6 +450,7 @@ contains
          end do
       end associate
       self%breaks = self%breaks + self%trial_breaks
+      call self%detached_number%add(self%trial_breaks)
       call self%detached_mass%add(self%trial_mass)
       if (self%count == 0) then
          self%stiffness = accumulator_type()
@@ -484,7 +491,7 @@ contains
          end if
       end if
       if (self%first <= self%last) call self%attach_due(before, after)
-      self%detached_count = self%breaks - self%attached
+      self%detached_count = self%detached_number%total()
    end subroutine respond
 
    !> Times at which a packet attaches, from its first contact that has not yet to its last.
@@ -581,7 +588,7 @@ contains
       end if
       if (.not. births > 0.0_wp) return
 
-      self%attached = self%attached + births
+      call self%detached_number%add(-births)
       call self%birth_gain%add(births * self%newborn_energy)
       call self%add_population(moment / births, &
          & after%sense * self%parameters%back_force_ratio, births, 1, 0.0_wp)
@@ -633,7 +640,7 @@ contains
          all(:, row_ahead) = all(:, row_ahead) - shift
          all(:, row_behind) = all(:, row_behind) - shift
       end associate
-      call self%rebuild(displacement)
+      call self%bear()
    end subroutine shift_origin
 
    !> Elastic energy of the pinned contacts.
@@ -675,7 +682,7 @@ contains
       call archive%exchange(self%break_loss)
       call archive%exchange(self%birth_gain)
       call archive%exchange(self%attached_part)
-      call archive%exchange(self%attached)
+      call archive%exchange(self%detached_number)
       call archive%exchange(self%detached_mass)
       call archive%exchange(self%ahead)
       call archive%exchange(self%behind)
@@ -683,14 +690,14 @@ contains
       call archive%exchange(self%offset)
    end subroutine exchange
 
-   !> Sum anew what the populations bear.
+   !> Nothing is derived from the state: all of it is in the archive and the caller's arrays.
    subroutine rebuild(self, displacement)
       !> The populations
       class(contact_populations_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
-      if (abs(displacement) < huge(1.0_wp)) call self%bear()
+      self%trials = 0
    end subroutine rebuild
 
 end module mesoslip_contact_populations

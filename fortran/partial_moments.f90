@@ -13,12 +13,19 @@ module mesoslip_partial_moments
    !> Probability that a threshold is outside of the table, on either side
    real(wp), parameter :: outside = 1.0e-17_wp
 
-   !> Partial moments of some orders. The table is uniform in u, or in log u for laws on u > 0.
+   !> Coordinates in which a table is uniform: u, its root for laws that come close to 0, where
+   !> moments may be singular, and its logarithm for laws that do so themselves
+   integer, parameter :: linear = 1, root = 2, logarithmic = 3
+   !> Least threshold of laws that do not come close to 0
+   real(wp), parameter :: close = 0.1_wp
+
+   !> Partial moments of some orders.
    type :: partial_moments_type
       !> Thresholds at or below do not occur, nor do those above
       real(wp) :: least = 0.0_wp, greatest = 0.0_wp
       type(threshold_law_type), private :: law
-      logical, private :: logarithmic = .false.
+      !> In which coordinate the table is uniform
+      integer, private :: coordinates = linear
       real(wp), private :: first = 0.0_wp, step = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
       !> Exponents, shape (orders)
@@ -51,7 +58,11 @@ contains
       self%exponent = exponent
       self%least = law%quantile(1.0_wp - epsilon(1.0_wp))
       self%greatest = law%quantile(outside)
-      self%logarithmic = law%kind == law_lognormal .or. law%kind == law_weibull
+      if (law%kind == law_lognormal .or. law%kind == law_weibull) then
+         self%coordinates = logarithmic
+      else if (self%least < close) then
+         self%coordinates = root
+      end if
       self%first = self%coordinate(self%least)
       self%step = (self%coordinate(self%greatest) - self%first) / cells
       call gauss_legendre(self%point, self%weight)
@@ -80,7 +91,8 @@ contains
       real(wp) :: coordinate
 
       coordinate = threshold
-      if (self%logarithmic) coordinate = log(threshold)
+      if (self%coordinates == root) coordinate = sqrt(threshold)
+      if (self%coordinates == logarithmic) coordinate = log(threshold)
    end function coordinate
 
    !> Density of each moment over the coordinate of the table.
@@ -92,9 +104,11 @@ contains
       real(wp) :: threshold
 
       threshold = coordinate
-      if (self%logarithmic) threshold = exp(coordinate)
+      if (self%coordinates == root) threshold = coordinate**2
+      if (self%coordinates == logarithmic) threshold = exp(coordinate)
       density = self%law%density(threshold) * threshold**self%exponent
-      if (self%logarithmic) density = density * threshold
+      if (self%coordinates == root) density = density * 2.0_wp * coordinate
+      if (self%coordinates == logarithmic) density = density * threshold
    end function density
 
    !> Moments above a threshold.

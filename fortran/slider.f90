@@ -56,11 +56,11 @@ module mesoslip_slider
       !> Kinetic energy and that of the drive's spring
       procedure(energy_interface), deferred :: energy
       !> Where it is
-      procedure :: pose
+      procedure, non_overridable :: pose
       !> Give the drive another velocity
-      procedure :: drive
+      procedure, non_overridable :: drive
       !> Where the drive is at a time
-      procedure :: drive_at
+      procedure, non_overridable :: drive_at
       !> Move the origin of displacements
       procedure :: shift_origin
       !> Put the state into an archive or take it out

@@ -167,8 +167,8 @@ contains
 
       if (status >= 0) return
       write (code, "(i0)") status
-      call raise(error, status_failed, "CVODE failed (" // what // ", code " // trim(code) // "): " &
-         & // trim(self%message%text))
+      call raise(error, status_failed, "CVODE failed (" // what // ", code " // trim(code) &
+         & // "): " // trim(self%message%text))
       call self%close()
    end subroutine expect
 

@@ -387,12 +387,27 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
     if finer is not None and finer > interval:
         yield "output.slip_interval", f"must not exceed the interval, {interval:g} s", finer
 
+    if config.run.engine == "me" and config.run.realizations > 1:
+        yield (
+            "run.realizations",
+            'must be 1 with engine "me", which leaves nothing to chance',
+            config.run.realizations,
+        )
+    stretch = config.contacts.static_force / config.contacts.stiffness
+    if config.curve.newborn_width > 0.25 * stretch:
+        yield (
+            "curve.newborn_width",
+            "must be a narrow spread, at most a quarter of the mean breaking stretch, "
+            f"{0.25 * stretch:.3g} m",
+            config.curve.newborn_width,
+        )
+
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     together = min(config.run.realizations, os.cpu_count() or 1)
     for key, needed, value in (
         (
             "contacts.count",
-            BYTES_PER_CONTACT * config.contacts.count * together,
+            BYTES_PER_CONTACT * config.contacts.count * together * (config.run.engine == "eq"),
             config.contacts.count,
         ),
         (

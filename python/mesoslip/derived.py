@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mesoslip.config import Config, RigidSlider
+from mesoslip.contact_lives import scales
 
 
 @dataclass(frozen=True)
@@ -32,10 +33,15 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
     }
 
 
+def _drive_speed(config: Config) -> float:
+    """Speed of the first stage of the drive that moves [m/s]; 0 if none does."""
+    return next((abs(one.velocity) for one in config.drive_stages if one.velocity), 0.0)
+
+
 def loading_rate(config: Config) -> float | None:
-    """D1 = v_d √(KM)/F_s (S46), of the first stage that moves; None if there is none or no spring."""
+    """D1 = v_d √(KM)/F_s (S46) of the first stage that moves; None without one, or a spring."""
     slider = config.slider
-    velocity = next((abs(one.velocity) for one in config.drive_stages if one.velocity), 0.0)
+    velocity = _drive_speed(config)
     if velocity == 0 or not isinstance(slider, RigidSlider):
         return None
     return velocity * math.sqrt(slider.stiffness * slider.mass) / config.contacts.static_force
@@ -71,6 +77,27 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "N/m",
         "estimate of K*, above which sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48)",
     )
+    lives = scales(config)
+    yield (
+        "mean_life",
+        lives.mean_life * static / stiffness,
+        "m",
+        "mean displacement from attaching to breaking, <x_s - x_b>",
+    )
+    if contacts.reattach:
+        steady = lives.steady_force * contacts.static_force
+        yield "F_steady", steady, "N", "force of stationary slow sliding"
+        speed = _drive_speed(config)
+        if speed > 0:
+            life = lives.mean_life * static / stiffness
+            dragged = lives.mean_mass * contacts.contact_drag * contacts.count
+            force = steady * life + dragged * speed**2 * contacts.delay
+            yield (
+                "F_steady_drive",
+                force / (life + speed * contacts.delay),
+                "N",
+                "force of stationary sliding at the drive's velocity, with delay and drag",
+            )
 
 
 def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
@@ -94,18 +121,25 @@ def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
     velocity_scale = omega_s * contacts.static_force / slider.stiffness
     yield "slip_velocity_scale", velocity_scale, "m/s", "velocity of a slip, Omega_S F_s/K"
 
-    velocity = next((abs(one.velocity) for one in config.drive_stages if one.velocity), 0.0)
-    if velocity == 0:
+    d_1 = loading_rate(config)
+    if d_1 is None:
         return
+    velocity = _drive_speed(config)
     loading = contacts.static_force / slider.stiffness / velocity
     yield "loading_time", loading, "s", "time in which the spring alone loads to F_s, F_s/(K v_d)"
-    d_1 = velocity * math.sqrt(slider.stiffness * slider.mass) / contacts.static_force
     yield "D1", d_1, "1", "v_d (K M)^(1/2)/F_s (S46)"
     alpha = (6 / d_1) ** (1 / 3)
-    yield "alpha", alpha, "1", "slip time of sequential breaking times Omega_S, (6/D1)^(1/3)"
+    yield (
+        "alpha",
+        alpha,
+        "1",
+        "slip time of sequential breaking times Omega_S, (6/D1)^(1/3); the source says 2.21 of "
+        "Klein's case, for which this is 14.2",
+    )
     yield "slip_time_sequential", alpha / omega_s, "s", "slip time of sequential breaking"
     # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
     start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s
+    yield "B", start / 2, "1", "(D0 - eta D1/Omega_S)/2, the film melting at once, D0 ~ 1 - delta"
     if start > 0:
         beta = math.sqrt(2 / start)
         yield (

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mesoslip import _core
 from mesoslip.config import RigidSlider
+from mesoslip.contact_lives import COUPLINGS, INITIAL_STATES
 from mesoslip.errors import RunError
 from mesoslip.threshold import LAWS
 
@@ -57,8 +58,6 @@ ENERGY_COLUMNS = (
 )
 
 ENGINES = {"eq": 1, "me": 2}
-COUPLINGS = {"scaled": 1, "equal": 2}
-INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
 SLIDERS = {"rigid": 1, "prescribed": 2}
 
 # In a slip the slider exceeds the drive's velocity by this part of the scale Omega_S F_s/K.
@@ -100,6 +99,7 @@ class Realization:
     time: float = 0.0
     finished: bool = False
     breaks: float = 0.0
+    detached: float = 0.0
     advances: int = 0
     kernel_seconds: float = 0.0
     energy: Array = field(default_factory=lambda: np.full(len(ENERGY_COLUMNS), np.nan))
@@ -193,7 +193,7 @@ class Realization:
             self._allocate()
         segment = advances or self._segment
         start = time.perf_counter()
-        rows, finished, full, now, breaks, made, energy, status, message = _core.run_segment(
+        results = _core.run_segment(
             engine=ENGINES[config.run.engine],
             count=contacts.count,
             static_force=contacts.contact_static_force,
@@ -233,6 +233,7 @@ class Realization:
             most_advances=segment,
         )
         seconds = time.perf_counter() - start
+        rows, finished, full, now, breaks, detached, made, energy, status, message = results
         self.kernel_seconds += seconds
         # A segment may also end because a buffer is full; a longer one would be no use then.
         if made - self.advances == segment == self._segment and seconds < 0.5 * SEGMENT_SECONDS:
@@ -248,10 +249,12 @@ class Realization:
         self.finished = bool(finished)
         self.time, self.advances, self.energy = now, made, energy
         self.breaks = int(breaks) if self._is_exact else breaks
+        self.detached = detached
 
     @property
     def contacts(self) -> dict[str, Array]:
-        """Of N contacts: origin [m], stiffness [N/m] (0 if detached), breaking stretch [m], renewals of each."""
+        """Of each of N contacts: origin [m], stiffness [N/m], 0 if it is detached, breaking stretch
+        [m], number of renewals."""
         names = ("origin", "stiffness", "break_stretch", "renewals")
         return {name: self._record[row].copy() for row, name in enumerate(names)}
 

@@ -21,11 +21,10 @@ from scipy import optimize, special
 from scipy.interpolate import BPoly
 
 from mesoslip import _core
+from mesoslip.contact_lives import checked, law_arguments, scales
 from mesoslip.derived import loading_rate
-from mesoslip.engine import COUPLINGS, INITIAL_STATES
-from mesoslip.errors import RunError
 from mesoslip.store import program_attributes, variable
-from mesoslip.threshold import LAWS, ThresholdLaw
+from mesoslip.threshold import ThresholdLaw
 
 if TYPE_CHECKING:
     from mesoslip.config import Config
@@ -60,45 +59,6 @@ SUMMARY = {
     "digits": ("1", "digits of the force that are certain"),
     "conservation_error": ("1", "largest error of the number of contacts, relative"),
 }
-
-
-class Scales(NamedTuple):
-    """Scales of the lives of contacts: displacements over f_s/k, forces over f_s."""
-
-    shortest: float
-    longest: float
-    mean_life: float
-    newborn_stiffness: float
-    newborn_force: float
-    first_shortest: float
-    first_longest: float
-    steady_force: float
-
-
-def _law_arguments(config: Config, newborn_width: float = 0.0) -> tuple[Any, ...]:
-    contacts = config.contacts
-    return (
-        LAWS[contacts.threshold.law],
-        contacts.threshold.relative_width,
-        COUPLINGS[contacts.coupling],
-        contacts.back_force_ratio,
-        newborn_width * contacts.stiffness / contacts.static_force,
-        int(contacts.reattach),
-        INITIAL_STATES[contacts.initial],
-    )
-
-
-def _checked(results: tuple[Any, ...]) -> tuple[Any, ...]:
-    *values, status, message = results
-    if status != 0:
-        raise RunError(message.decode().strip())
-    return tuple(values)
-
-
-def scales(config: Config, newborn_width: float = 0.0) -> Scales:
-    """Scales of the lives of a configuration's contacts; ``newborn_width`` in m."""
-    (values,) = _checked(_core.contact_scales(*_law_arguments(config, newborn_width)))
-    return Scales(*(float(value) for value in values))
 
 
 class CriticalPoint(NamedTuple):
@@ -140,14 +100,17 @@ def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
 
 
 def _solve(arguments: tuple[Any, ...], start: float, width: float, panels: int) -> _Solution:
-    point, breaks, slope, force, stiffness, pinned, mismatch = _checked(
+    point, breaks, slope, force, stiffness, pinned, mismatch = checked(
         _core.force_curve(*arguments, start, width, panels, POINTS)
     )
-    edges = start + width * np.arange(panels + 1)
+    edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
     return _Solution(
         edges,
         point,
-        *(_polynomials(edges, point, values) for values in (force, slope, stiffness, breaks)),
+        force=_polynomials(edges, point, force),
+        slope=_polynomials(edges, point, slope),
+        stiffness=_polynomials(edges, point, stiffness),
+        breaks=_polynomials(edges, point, breaks),
         conservation_error=float(np.max(np.abs(pinned - 1))),
         mismatch=float(mismatch),
     )
@@ -190,7 +153,7 @@ class ForceCurve:
         self._refine()
 
     def _refine(self) -> None:
-        arguments = _law_arguments(self.config, self.newborn_width)
+        arguments = law_arguments(self.config, self.newborn_width)
         length = self.length / self._stretch
         start, width = self._first_panels(length)
         coarse = None
@@ -278,9 +241,7 @@ class ForceCurve:
         x = np.asarray(displacement, dtype=float)
         work = self._work_of_contacts
         values: Array = 0.5 * self._spring * (drive_displacement - x) ** 2
-        values += (
-            self._force_unit * self._stretch * (work(x / self._stretch) - work(0.0))
-        )
+        values += self._force_unit * self._stretch * (work(x / self._stretch) - work(0.0))
         return values
 
     @cached_property
@@ -405,7 +366,8 @@ class ForceCurve:
         node, weight = np.polynomial.legendre.leggauss(100)
         # As a function of the normal deviate of the same probability no law has narrow features.
         low, high = (
-            special.ndtri(np.clip(law.survival(limit), 1e-17, 1 - 1e-16)) for limit in (upper, lower)
+            special.ndtri(np.clip(law.survival(limit), 1e-17, 1 - 1e-16))
+            for limit in (upper, lower)
         )
         z = low[..., None] + (high - low)[..., None] * (node + 1) / 2
         values = function(law.quantile(special.ndtr(z))) * np.exp(-0.5 * z**2)
@@ -421,7 +383,7 @@ class ForceCurve:
         width = self.newborn_width / self._stretch
         node, weight = np.zeros(1), np.ones(1)
         if width > 0:
-            node, weight = special.roots_hermitenorm(64)
+            node, weight = special.roots_hermitenorm(32)
             weight = weight / math.sqrt(2 * math.pi)
         lowest = np.maximum(self._threshold_of(np.maximum(x, 0.0)), law.minimum)
         total, acceptance = np.zeros_like(x), 0.0
@@ -439,14 +401,13 @@ class ForceCurve:
                     for edge in (gap, gap - moved)
                 )
                 lower = np.maximum(np.where(gap > 0, lower, np.inf), lowest)
-                density = self._average_between(
-                    law,
-                    lower,
-                    np.maximum(lower, upper),
-                    lambda u, gap=gap: np.nan_to_num(
-                        breaks(moved - gap[:, None] + back / np.sqrt(u))
-                    ),
-                )
+
+                def attached(threshold: Array, gap: Array = gap) -> Array:
+                    place = moved - gap[:, None] + back / np.sqrt(threshold)
+                    rate: Array = np.nan_to_num(breaks(place))
+                    return rate
+
+                density = self._average_between(law, lower, np.maximum(lower, upper), attached)
                 root = 0.5 * (shift + math.sqrt(shift**2 + 4 * back))
                 acceptance += part * float(law.survival(root**2 if root > 0 else 0.0))
             total += part * density
@@ -517,7 +478,8 @@ class ForceCurve:
         """Q(x; X) at the displacements that the configuration asks for."""
         width = self.newborn_width / self._stretch
         back = self.config.contacts.back_force_ratio
-        x = self._stretch * np.linspace(min(0.0, back - 6 * width), self.scales.longest + back, 2001)
+        least, most = min(0.0, back - 6 * width), self.scales.longest + back
+        x = self._stretch * np.linspace(least, most, 2001)
         at = np.array(self.config.curve.density_at)
         densities, atoms = zip(*(self.stretch_density(x, one) for one in at), strict=True)
         dimensions = ("density_displacement", "stretch")

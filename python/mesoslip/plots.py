@@ -148,15 +148,16 @@ def force_curve(tree: xr.DataTree) -> Figure:
     config = Config.from_toml(tree.attrs["configuration"])
     contacts = config.contacts
     unit = contacts.static_force / contacts.stiffness
-    x = tree["displacement"].values / unit
+    data = tree.to_dataset()
+    x: Array = data["displacement"].values / unit
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.5, 4.2))
         force, slope = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
-        force.plot(x, tree["contact_force"].values / contacts.static_force, color="black")
+        force.plot(x, data["contact_force"].values / contacts.static_force, color="black")
         steady = tree.attrs["F_steady"] / contacts.static_force
         force.axhline(steady, color="tab:blue", linestyle=":", label="stationary sliding")
         force.set_ylabel("$F/F_s$")
-        slope.plot(x, tree["slope"].values / contacts.stiffness, color="black")
+        slope.plot(x, data["slope"].values / contacts.stiffness, color="black")
         slope.set_ylabel("$F'/Nk$")
         slope.set_xlabel("displacement $X k/f_s$")
         slope.set_xlim(0, x[-1])

@@ -35,7 +35,11 @@ SUMMARY = {
     "D1": ("1", "v_d (K M)^(1/2)/F_s"),
     "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
     "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
-    "alpha": ("1", "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; 2.21 in the source"),
+    "alpha": (
+        "1",
+        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; the source says 2.21 of "
+        "Klein's case, for which this is 14.2",
+    ),
     "slip_time_sequential": ("s", "slip time of sequential breaking"),
     "B": ("1", "(D0 - eta D1/Omega_S)/2: the spring force drops by B tau^2 F_s as the film melts"),
     "beta": ("1", "B^(-1/2), slip time of instant melting times Omega_S"),
@@ -151,7 +155,7 @@ def end_of_expansion(curve: ForceCurve) -> float:
         return float(x[-1])
     place = int(beyond[0])
     low = float(x[place - 1]) if place > 0 else 0.0
-    return float(optimize.brentq(excess, low, float(x[place])))
+    return float(optimize.brentq(excess, low, float(x[place]), xtol=1e-15 * float(x[-1])))
 
 
 def onset_of_slip(config: Config) -> xr.DataTree:

@@ -26,12 +26,12 @@ def configuration(tree: xr.DataTree) -> Config:
 def force_over_displacement(trees: Sequence[xr.DataTree]) -> Figure:
     """S18: the force of the master equation against displacement, with f_s = 1 and Nk = 1."""
     (tree,) = trees
-    contacts = configuration(tree).contacts
+    data, contacts = tree.to_dataset(), configuration(tree).contacts
     figure = Figure(figsize=(4.5, 3))
     axes = figure.subplots()
     axes.plot(
-        tree["displacement"].values * contacts.stiffness / contacts.static_force,
-        tree["contact_force"].values / contacts.static_force,
+        data["displacement"].values * contacts.stiffness / contacts.static_force,
+        data["contact_force"].values / contacts.static_force,
         color="black",
     )
     axes.axhline(tree.attrs["F_steady"] / contacts.static_force, color="0.8", zorder=0)

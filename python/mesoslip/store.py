@@ -151,9 +151,7 @@ def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
     return xr.Dataset(
         {"realization": variable("realization", ("slip",), owner)}
         | {name: variable(name, ("slip",), values[name]) for name in order}
-        | {
-            "contacts_broken": variable("contacts_broken", ("slip",), values["contacts_broken"])
-        }
+        | {"contacts_broken": variable("contacts_broken", ("slip",), values["contacts_broken"])}
     ).set_coords("realization")
 
 
@@ -187,13 +185,14 @@ def attributes(
 ) -> dict[str, Any]:
     """Attributes of an output: what was run, by what, and how it went."""
     reached = min(one.time for one in realizations)
+    residuals = [one.energy_residual for one in realizations]
     return program_attributes(config, "run") | {
         "seed": config.run.seed,
         "complete": "true" if complete else "false",
         "comment": "" if complete else f"interrupted; every realization came to {reached:.6g} s",
         "break_count": sum(one.breaks for one in realizations),
         "advance_count": sum(one.advances for one in realizations),
-        "energy_residual": max((one.energy_residual for one in realizations), key=abs),
+        "energy_residual": max(residuals, key=abs),
         "wall_seconds": wall_seconds,
     }
 

@@ -1,0 +1,231 @@
+"""The master equation under a moving slider, against its force curve and against N contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mesoslip import ForceCurve
+from mesoslip.engine import Realization
+from oracles import frozen_law, stationary_force
+
+FORCE = 18e-6
+REVERSALS = [
+    {"duration": duration, "velocity": velocity}
+    for duration, velocity in (
+        (0.12, 1e-7),
+        (0.05, -1e-7),
+        (0.02, 0.0),
+        (0.1, 2e-7),
+        (0.2, -1.5e-7),
+        (0.1, 1e-7),
+    )
+]
+PRESCRIBED = {"slider": {"kind": "prescribed"}}
+
+
+def finish(config, advances=None):
+    realization = Realization(config, 0)
+    while not realization.finished:
+        realization.advance(advances)
+    return realization
+
+
+def dispersion(width, law="gaussian"):
+    return {"contacts__threshold": {"law": law, "relative_width": width}}
+
+
+def back_and_forth(klein, **changes):
+    return klein(
+        run__duration=None, drive={"stage": REVERSALS}, **PRESCRIBED, **dispersion(0.1), **changes
+    )
+
+
+@pytest.mark.parametrize("initial", ["relaxed", "uniform", "steady"])
+@pytest.mark.parametrize("coupling", ["scaled", "equal"])
+def test_forward_sliding_is_the_force_curve(klein, coupling, initial):
+    """Two ways to F(X), and the error falls with the square of the step."""
+    errors = []
+    for resolution in (0.25, 0.125):
+        config = klein(
+            run__engine="me",
+            run__resolution=resolution,
+            run__duration=0.5,
+            contacts__delay=0.0,
+            contacts__drag_rate=0.0,
+            contacts__coupling=coupling,
+            contacts__initial=initial,
+            output__interval=5e-4,
+            **PRESCRIBED,
+            **dispersion(0.1),
+        )
+        trace = finish(config).trace
+        curve = ForceCurve(config)
+        inside = trace[:, 2] < curve.samples[-1]
+        error = trace[inside, 5] - curve.force(trace[inside, 2])
+        errors.append(np.sqrt(np.mean(error**2)) / FORCE)
+    assert errors[1] < 2e-4
+    assert errors[1] < 0.45 * errors[0]
+
+
+@pytest.mark.parametrize("law", ["gaussian", "uniform", "lognormal", "weibull", "exponential"])
+@pytest.mark.parametrize("velocity", [1e-6, 2e-5])
+def test_the_delay_weakens_the_force(klein, law, velocity):
+    """F(v) of model section 4, with delay and drag."""
+    config = klein(
+        run__engine="me",
+        run__duration=3e-6 / velocity,
+        run__resolution=0.1,
+        drive__velocity=velocity,
+        contacts__initial="steady",
+        output__interval=3e-9 / velocity,
+        **PRESCRIBED,
+        **dispersion(0.3, law),
+    )
+    trace = finish(config).trace
+    late = trace[len(trace) // 2 :]
+    assert np.mean(late[:, 5]) == pytest.approx(stationary_force(config, velocity), rel=2e-4)
+
+
+@pytest.mark.parametrize("coupling", ["scaled", "equal"])
+def test_many_contacts_tend_to_it(klein, coupling):
+    """Reversals, delay and drag: what N contacts differ by falls as N^(-1/2)."""
+    exact = finish(
+        back_and_forth(klein, run__engine="me", run__resolution=0.0625, contacts__coupling=coupling)
+    ).trace[:, 5]
+    scaled = []
+    for count in (100, 1000, 10_000, 100_000, 1_000_000):
+        config = back_and_forth(klein, contacts__count=count, contacts__coupling=coupling)
+        error = finish(config).trace[:, 5] - exact
+        scaled.append(np.sqrt(np.mean(error**2) * count) / FORCE)
+    # One realization each: the size of its fluctuation is itself a matter of chance.
+    assert max(scaled) < 0.5
+    assert min(scaled) > 0.05
+
+
+def test_contacts_that_survived_do_not_break_below_it(klein):
+    """After a reversal the memoryless rate P(x) is wrong, and N contacts decide so.
+
+    Reloading within what has been borne breaks nothing; the memoryless form breaks contacts at the
+    rate P = P_c/J_c again.
+    """
+    width = 0.1
+    stages = [
+        {"duration": 0.088, "velocity": 1e-7},
+        {"duration": 0.02, "velocity": -1e-7},
+        {"duration": 0.02, "velocity": 1e-7},
+    ]
+    changes = {
+        "run__duration": None,
+        "drive": {"stage": stages},
+        "contacts__coupling": "equal",
+        "contacts__reattach": False,
+        "contacts__drag_rate": 0.0,
+        **PRESCRIBED,
+        **dispersion(width),
+    }
+    remembering = finish(klein(run__engine="me", run__resolution=0.1, **changes)).trace
+    contacts = finish(klein(contacts__count=1_000_000, **changes)).trace
+    law = frozen_law("gaussian", width)
+    top = 0.088e-7 / 9e-9
+    memory = top * law.sf(top) / law.sf(0.1)
+    memoryless = memory * law.sf(top) / law.sf(top - 0.02e-7 / 9e-9)
+    # Forward they agree.
+    first = int(0.088 / 1e-3)
+    assert remembering[first, 5] / FORCE == pytest.approx(memory, abs=2e-4)
+    # Back at the same place: the same force with memory, much less without.
+    assert remembering[-1, 5] / FORCE == pytest.approx(memory, abs=2e-4)
+    assert contacts[-1, 5] / FORCE == pytest.approx(memory, abs=3e-3)
+    assert memoryless < memory - 0.1
+
+
+def test_the_first_slip_of_klein(klein):
+    """N contacts tend to it in the slip as well: the catalogue's first line, error ~ N^(-1/2)."""
+    config = klein(run__engine="me", run__duration=2.5)
+    exact = finish(config).slips[0]
+    assert exact[3] == pytest.approx(17.727e-6, rel=1e-4)
+    errors = []
+    for count in (1000, 10_000, 100_000):
+        slip = finish(klein(run__duration=2.5, contacts__count=count)).slips[0]
+        errors.append(abs(slip[3] - exact[3]) / FORCE * np.sqrt(count))
+        assert abs(slip[5] - exact[5]) / exact[5] < 3 / np.sqrt(count)
+    assert max(errors) < 3
+
+
+@pytest.mark.parametrize("engine_slider", [{}, PRESCRIBED])
+def test_contacts_are_conserved(klein, engine_slider):
+    """Pinned and detached ones together are N, to rounding, after slips and reversals."""
+    changes = {"run__duration": 4.0, **engine_slider}
+    realization = Realization(klein(run__engine="me", **changes), 0)
+    while realization.time < 3.9 and not realization.finished:
+        realization.advance(20_000)
+        count = int(realization._state_integer[0])
+        pinned = realization._population[:count, 7].sum()
+        assert realization._population[:count, 7:].min() >= 0
+        assert pinned + realization.detached == pytest.approx(4080, abs=4080 * 1e-12)
+    assert realization.breaks > 4080
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"contacts__coupling": "equal"},
+        {"contacts__initial": "steady"},
+        {"contacts__initial": "uniform"},
+        {"contacts__delay": 0.0},
+        {"contacts__threshold": {"law": "exponential", "relative_width": 0.5}},
+    ],
+)
+def test_energy_balance_closes_with_the_step(klein, changes):
+    """What it lacks is an error of the steps, of second order."""
+    residuals = [
+        abs(
+            finish(
+                klein(run__engine="me", run__resolution=resolution, run__duration=3.0, **changes)
+            ).energy_residual
+        )
+        for resolution in (0.4, 0.2)
+    ]
+    assert residuals[1] < 2e-4
+    assert residuals[1] < max(0.5 * residuals[0], 1e-6)
+
+
+def test_segments_do_not_matter(klein):
+    """The same numbers to the bit, also when the arrays grow on the way."""
+    config = klein(run__engine="me", run__duration=2.2, output__slip_interval=1e-4)
+    whole = finish(config)
+    pieces = finish(config, 777)
+    assert np.array_equal(whole.trace, pieces.trace)
+    assert np.array_equal(whole.slip_trace, pieces.slip_trace)
+    assert np.array_equal(whole.energy, pieces.energy)
+
+
+def test_arrays_grow(klein, monkeypatch):
+    from mesoslip import engine
+
+    config = klein(run__engine="me", run__duration=2.2)
+    whole = finish(config)
+    monkeypatch.setattr(engine, "POPULATIONS", 16)
+    small = finish(config)
+    assert np.array_equal(whole.trace, small.trace)
+
+
+def test_backward_mirrors_forward(klein):
+    forward = finish(klein(run__engine="me", run__duration=2.2)).trace
+    backward = finish(klein(run__engine="me", run__duration=2.2, drive__velocity=-1e-7)).trace
+    np.testing.assert_allclose(backward[:, 1:6], -forward[:, 1:6], rtol=0, atol=1e-18)
+    np.testing.assert_array_equal(backward[:, 6], forward[:, 6])
+
+
+def test_without_attaching_the_force_ends(klein):
+    realization = finish(klein(run__engine="me", contacts__reattach=False, run__duration=3.0))
+    assert realization.breaks == pytest.approx(4080, rel=1e-12)
+    assert realization.trace[-1, 6] == pytest.approx(4080, rel=1e-12)
+
+
+def test_samples_do_not_change_a_run(klein):
+    config = {"run__engine": "me", "run__duration": 2.2}
+    coarse = finish(klein(output__interval=1e-2, **config))
+    fine = finish(klein(output__interval=1e-3, **config))
+    np.testing.assert_array_equal(coarse.trace[:, 1:], fine.trace[::10, 1:])
+    assert np.array_equal(coarse.energy, fine.energy)

@@ -365,7 +365,6 @@ end subroutine force_curve
 subroutine onset(equation, coefficients, damping, drag, end_displacement, interval, tolerance, &
    & capacity, samples, length, ended, status, message)
    !f2py threadsafe
-   use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type
    use mesoslip_onset, only: integrate_onset, onset_type
    implicit none

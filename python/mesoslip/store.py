@@ -185,14 +185,14 @@ def attributes(
 ) -> dict[str, Any]:
     """Attributes of an output: what was run, by what, and how it went."""
     reached = min(one.time for one in realizations)
-    residuals = [one.energy_residual for one in realizations]
+    residual: float = max((one.energy_residual for one in realizations), key=abs)
     return program_attributes(config, "run") | {
         "seed": config.run.seed,
         "complete": "true" if complete else "false",
         "comment": "" if complete else f"interrupted; every realization came to {reached:.6g} s",
         "break_count": sum(one.breaks for one in realizations),
         "advance_count": sum(one.advances for one in realizations),
-        "energy_residual": max(residuals, key=abs),
+        "energy_residual": residual,
         "wall_seconds": wall_seconds,
     }
 

@@ -18,7 +18,8 @@ SOURCES := meson.build meson.options pyproject.toml \
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
 # Figures need the outputs of runs, but for S18, and two of other commands.
-FIGURE_RUNS := $(filter-out out/S18.nc,$(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml)))
+FIGURE_RUNS := $(filter-out out/S18.nc,\
+  $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml runs/limit-*.toml)))
 FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc out/S19a.onset.nc out/S19b.onset.nc
 
 # meson and meson-python find ninja here.
@@ -95,6 +96,7 @@ out/%.png: out/%.nc | $(INSTALLED)
 $(FIGURE_OUTPUTS): runs/klein.toml
 out/S19a-me.nc: runs/S19a.toml
 out/S19b-me.nc: runs/S19b.toml
+$(patsubst runs/%.toml,out/%.nc,$(wildcard runs/limit-*.toml)): runs/limit-me.toml
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)

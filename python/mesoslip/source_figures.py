@@ -85,6 +85,36 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
+    """Force of N contacts and of infinitely many under a block that goes forth and back, and the
+    difference over N."""
+    exact, *finite = trees
+    figure = Figure(figsize=(6.5, 3))
+    force, difference = figure.subplots(1, 2, width_ratios=[1.6, 1])
+    infinite = exact["contact_force"].values[0]
+    counts, errors = [], []
+    for tree in finite:
+        config = configuration(tree)
+        counts.append(config.contacts.count)
+        deviation = (tree["contact_force"].values - infinite) / config.contacts.static_force
+        errors.append(np.sqrt(np.mean(deviation**2)))
+    times = exact["time"].values
+    force.plot(
+        times, finite[0]["contact_force"].values[0] * 1e6, color="0.7", label=f"$N$ = {counts[0]}"
+    )
+    force.plot(times, infinite * 1e6, color="black", label=r"$N \to \infty$")
+    force.set_xlabel("time (s)")
+    force.set_ylabel("contact force (µN)")
+    force.legend()
+    difference.loglog(counts, errors, "o", color="black", markersize=4)
+    slope = errors[-1] * np.sqrt(counts[-1] / np.array(counts))
+    difference.loglog(counts, slope, color="tab:red", linestyle="--", label="$N^{-1/2}$")
+    difference.set_xlabel("$N$")
+    difference.set_ylabel("rms difference over $F_s$")
+    difference.legend()
+    return figure
+
+
 def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
     """S20: the spring force in the stick-slip regime; an inset shows one slip."""
     (tree,) = trees
@@ -213,6 +243,9 @@ FIGURES = {
     "S21": SourceFigure(("S21",), slip_details),
     "S22": SourceFigure(("S22a", "S22b", "S22c", "S22d"), delays),
     "S23": SourceFigure(("S23a", "S23b", "S23c"), dispersions),
+    "limit": SourceFigure(
+        ("limit-me", *(f"limit-{power}" for power in range(2, 7))), limit_of_many_contacts
+    ),
     "S28": SourceFigure(("S28a", "S28b", "S28c"), viscosities),
 }
 

@@ -13,7 +13,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fixed_step import numba_run, numpy_steps
-from mesoslip import Config
+from mesoslip import Config, ForceCurve
 from mesoslip.engine import Realization
 
 ROOT = Path(__file__).parents[2]
@@ -105,6 +105,76 @@ def against_fixed_steps() -> None:
     )
 
 
+def curve_cost() -> None:
+    """Kernel time of the force curve over 20 periods, and the digits it has."""
+    print("\nForce curve of the master equation over 20 mean breaking stretches")
+    print("  law          width   panels   kernel s   digits   slope error")
+    for law, width in (
+        ("gaussian", 0.2),
+        ("gaussian", 0.01),
+        ("gaussian", 0.003),
+        ("lognormal", 1.0),
+        ("exponential", 0.5),
+        ("uniform", 0.2),
+    ):
+        tables = Config.load(KLEIN).to_dict()
+        tables["contacts"]["threshold"] = {"law": law, "relative_width": width}
+        tables["curve"] = {"tolerance": 1e-8}
+        curve = ForceCurve(Config.from_dict(tables))
+        print(
+            f"  {law:12} {width:5g} {curve.panels:8d} {curve.kernel_seconds:10.3f} "
+            f"{curve.digits:8d} {curve.slope_error:13.0e}",
+            flush=True,
+        )
+    tables["contacts"]["threshold"] = {"law": "gaussian", "relative_width": 0.05}
+    print("  The same with width 0.05 over more periods")
+    for periods in (20, 200, 2000):
+        tables["curve"] = {"tolerance": 1e-8, "length": periods * 9e-9}
+        curve = ForceCurve(Config.from_dict(tables))
+        print(f"  {periods:5d} periods: {curve.panels:8d} panels, {curve.kernel_seconds:7.3f} s")
+
+
+def master_equation_cost() -> None:
+    """Cost and accuracy of the master equation, beside N contacts of the same accuracy."""
+    print("\nKlein's case by the master equation; error of the first slip's force over F_s")
+    print("  resolution   12 s run: kernel s    advances   energy residual   error")
+    static = Config.load(KLEIN).contacts.static_force
+
+    def first_slip(changes: list[str]) -> Realization:
+        return finish(
+            Config.load(KLEIN, ["run.duration=1.96", "output.slip_interval=1ms", *changes])
+        )
+
+    exact = first_slip(["run.engine=me", "run.resolution=0.05"]).slips[0, 3]
+    error = 1.0
+    for resolution in (1.0, 0.5, 0.25, 0.125):
+        changes = ["run.engine=me", f"run.resolution={resolution}"]
+        whole = finish(Config.load(KLEIN, changes))
+        error = abs(first_slip(changes).slips[0, 3] - exact) / static
+        print(
+            f"  {resolution:10g} {whole.kernel_seconds:20.3f} {whole.advances:11d} "
+            f"{whole.energy_residual:17.0e} {error:7.0e}",
+            flush=True,
+        )
+    print("  N contacts   12 s run: kernel s    advances   energy residual   error (16 seeds)")
+    for count in (1000, 10_000, 100_000):
+        whole = finish(Config.load(KLEIN, [f"contacts.count={count}"]))
+        forces = [
+            first_slip([f"contacts.count={count}", f"run.seed={seed}"]).slips[0, 3]
+            for seed in range(1, 17)
+        ]
+        scatter = float(np.sqrt(np.mean((np.array(forces) - exact) ** 2))) / static
+        print(
+            f"  {count:10d} {whole.kernel_seconds:20.3f} {whole.advances:11d} "
+            f"{whole.energy_residual:17.0e} {scatter:7.0e}",
+            flush=True,
+        )
+    print(
+        f"  An error of {error:.0e} by N contacts takes N = {count * (scatter / error) ** 2:.0e}, "
+        f"{whole.kernel_seconds * (scatter / error) ** 2:.0e} s"
+    )
+
+
 def main() -> None:
     np.seterr(all="raise")
     whole = min((finish(Config.load(KLEIN)) for _ in range(3)), key=lambda one: one.kernel_seconds)
@@ -116,6 +186,8 @@ def main() -> None:
     cost_over_contacts()
     prescribed_cost()
     against_fixed_steps()
+    curve_cost()
+    master_equation_cost()
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ FOLDER = Path(__file__).parents[1] / "reference"
 STAGES = [(0.02, 1e-6), (0.005, 0.0), (0.06, -1e-6), (0.04, 2e-6)]
 CASES = {
     "klein": klein_tables(run__duration=1.94, output__slip_interval=1e-4),
+    "infinite": klein_tables(run__engine="me", run__duration=1.94, output__slip_interval=1e-4),
     "block": klein_tables(
         run__duration=None,
         drive={"stage": [{"duration": time, "velocity": speed} for time, speed in STAGES]},

@@ -215,3 +215,73 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
     assert tree.attrs["complete"] == "false"
     assert tree["time"].values[-1] > 2
     mesoslip.plot(tree, tmp_path / "partial.png")
+
+
+def test_curve_tells_the_instability(short, tmp_path, command):
+    output = tmp_path / "curve.nc"
+    changes = ("--set", "curve.density_at=[3e-9]", "--set", "curve.drive_displacement=50 nm")
+    status, told, _ = command("curve", short, "-o", output, "--json", *changes)
+    assert status == 0
+    summary = json.loads(told)
+    for name in ("K_star", "X_c", "F_peak", "F_steady", "D0", "D1", "D2", "D3", "stable", "digits"):
+        assert name in summary
+    tree = mesoslip.read(output)
+    for node in tree.subtree:
+        for name, variable in node.variables.items():
+            assert "units" in variable.attrs, name
+    assert tree.attrs["K_star"] == summary["K_star"]
+    assert tree["critical"].sizes["point"] >= 2
+    assert "potential" in tree.data_vars
+    assert tree["stretch_density"]["unbroken_part"].values[0] == pytest.approx(1, abs=1e-9)
+    status, told, _ = command("curve", short)
+    assert status == 0
+    assert "K_star_estimate" in told
+    assert command("plot", output)[0] == 0
+    assert output.with_suffix(".png").exists()
+
+
+def test_a_stiff_spring_has_an_answer(short, command):
+    status, told, _ = command("curve", short, "--json", "--set", "slider.stiffness=1e6")
+    assert status == 0
+    summary = json.loads(told)
+    assert summary["stable"] is True
+    assert summary["X_c"] is None
+    status, told, _ = command("onset", short, "--set", "slider.stiffness=1e6")
+    assert status == 0
+    assert "no onset" in told
+
+
+def test_a_rough_law_is_told(short, command):
+    changes = ("contacts.threshold.law=uniform", "contacts.threshold.relative_width=0.2")
+    arguments = [part for change in changes for part in ("--set", change)]
+    status, _, told = command("curve", short, *arguments)
+    assert status == 0
+    assert "digits" in told
+
+
+def test_onset_writes_both_equations(short, tmp_path, command):
+    output = tmp_path / "onset.nc"
+    status, told, _ = command("onset", short, "-o", output, "--json")
+    assert status == 0
+    assert json.loads(told)["alpha"] == pytest.approx(14.2, abs=0.1)
+    assert set(mesoslip.read(output).children) == {"sequential", "melting"}
+    assert command("plot", output)[0] == 0
+
+
+def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
+    output = tmp_path / "me.nc"
+    status, _, told = command("run", short, "-o", output, "--set", "run.engine=me")
+    assert status == 0
+    assert "1 slips" in told
+    assert command("slips", output)[0] == 0
+    assert command("plot", output)[0] == 0
+    detached = mesoslip.read(output)["detached_contacts"].values
+    assert np.any(detached % 1 > 0)
+
+
+def test_a_curve_has_no_slips(short, tmp_path, command):
+    output = tmp_path / "curve.nc"
+    assert command("curve", short, "-o", output)[0] == 0
+    status, _, told = command("slips", output)
+    assert status == 2
+    assert "not an output of mesoslip run" in told

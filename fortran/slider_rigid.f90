@@ -8,6 +8,7 @@ module mesoslip_slider_rigid
    use mesoslip_kinds, only: wp
    use mesoslip_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_motion_series, only: crossing, horner, integral, inverse, next_turn, second_integral
    use mesoslip_slider, only: motion_type, slider_type, exchange_slider
    implicit none
    private
@@ -18,9 +19,6 @@ module mesoslip_slider_rigid
    !> the fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
    integer, parameter :: few_terms = 6, some_terms = 10, most_terms = 17
    real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 8.0e-2_wp, longest_step = 0.5_wp
-
-   integer :: i
-   real(wp), parameter :: inverse(most_terms + 2) = [(1.0_wp / i, i=1, most_terms + 2)]
 
    !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
    real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
@@ -278,141 +276,6 @@ contains
       end if
    end subroutine first_end
 
-   !> Shorten a step until the motion in it goes one way, to a turning point if there is one.
-   subroutine next_turn(series, terms, step, turns, sense)
-      real(wp), intent(in) :: series(0:)
-      integer, intent(in) :: terms
-      real(wp), intent(inout) :: step
-      !> Whether the step ends at a turning point
-      logical, intent(out) :: turns
-      !> Direction of the motion, +1 or -1
-      real(wp), intent(out) :: sense
-
-      integer, parameter :: most_halvings = 100
-      real(wp) :: rate(0:most_terms - 1), end_velocity
-      integer :: halving, term
-
-      turns = .false.
-      sense = sign(1.0_wp, series(0))
-      do term = 0, terms - 2
-         rate(term) = (term + 1) * series(term + 1)
-      end do
-      do halving = 1, most_halvings
-         if (leads(series, terms, step)) exit
-         if (leads(rate, terms - 1, step)) then
-            ! The acceleration keeps its sign, so there is at most one turning point.
-            end_velocity = horner(series, terms, step)
-            if (series(0) * end_velocity < 0.0_wp) then
-               step = turning_point(series, rate, terms, step)
-               turns = .true.
-            else
-               sense = sign(1.0_wp, series(0) + end_velocity)
-            end if
-            exit
-         end if
-         if (abs(series(0)) + abs(series(1)) <= 0.0_wp) then
-            ! At rest and in balance the jerk decides.
-            sense = sign(1.0_wp, series(2))
-            if (leads(rate(1:), terms - 2, step)) exit
-         end if
-         step = 0.5_wp * step
-      end do
-   end subroutine next_turn
-
-   !> Whether a series keeps the sign of its constant term, by the size of the terms after it.
-   pure function leads(series, terms, time)
-      real(wp), intent(in) :: series(0:), time
-      integer, intent(in) :: terms
-      logical :: leads
-
-      real(wp) :: rest
-      integer :: term
-
-      rest = 0.0_wp
-      do term = terms - 1, 1, -1
-         rest = (rest + abs(series(term))) * time
-      end do
-      leads = abs(series(0)) > rest
-   end function leads
-
-   !> Time at which a motion in one direction has come a given way, by Halley's method in a bracket.
-   pure function crossing(series, terms, way, longest) result(time)
-      !> Coefficients of the velocity
-      real(wp), intent(in) :: series(0:)
-      integer, intent(in) :: terms
-      !> Way, which is made at the longest time or before
-      real(wp), intent(in) :: way, longest
-      real(wp) :: time
-
-      integer, parameter :: most_iterations = 100
-      real(wp), parameter :: converged = 1.0e-5_wp
-      real(wp) :: lower, upper, excess, discriminant, velocity, change, next
-      integer :: iteration
-
-      lower = 0.0_wp
-      upper = longest
-      time = longest
-      discriminant = series(0)**2 + 2.0_wp * series(1) * way
-      if (discriminant > 0.0_wp) then
-         time = min(2.0_wp * way / (series(0) + sign(sqrt(discriminant), way)), longest)
-      end if
-      do iteration = 1, most_iterations
-         excess = integral(series, terms, time) - way
-         velocity = horner(series, terms, time)
-         if (excess * way >= 0.0_wp) then
-            upper = time
-         else
-            lower = time
-         end if
-         next = lower
-         if (abs(excess) < abs(velocity) * longest) then
-            change = excess / velocity
-            next = time - change &
-               & * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
-         end if
-         if (next > lower .and. next < upper) then
-            change = next - time
-            time = next
-            ! Convergence is cubic: the next change would be lost in rounding.
-            if (abs(change) <= converged * next) exit
-         else
-            if (upper - lower <= spacing(upper) .or. abs(excess) <= 0.0_wp) exit
-            time = 0.5_wp * (lower + upper)
-         end if
-      end do
-   end function crossing
-
-   !> Time at which the velocity of a motion with one turning point is zero, by Newton's method in a
-   !> bracket.
-   pure function turning_point(series, rate, terms, longest) result(time)
-      !> Coefficients of the velocity and the acceleration
-      real(wp), intent(in) :: series(0:), rate(0:)
-      integer, intent(in) :: terms
-      !> Time after the turning point
-      real(wp), intent(in) :: longest
-      real(wp) :: time
-
-      integer, parameter :: most_iterations = 100
-      real(wp) :: lower, upper, velocity, next
-      integer :: iteration
-
-      lower = 0.0_wp
-      upper = longest
-      time = 0.5_wp * longest
-      do iteration = 1, most_iterations
-         velocity = horner(series, terms, time)
-         if (velocity * series(0) > 0.0_wp) then
-            lower = time
-         else
-            upper = time
-         end if
-         next = time - velocity / horner(rate, terms - 1, time)
-         if (.not. (next > lower .and. next < upper)) next = 0.5_wp * (lower + upper)
-         if (abs(next - time) <= epsilon(1.0_wp) * longest) exit
-         time = next
-      end do
-   end function turning_point
-
    !> Add the losses of a step to the energy balance: the integrals of C V**2 and M eta_S (V - W) V.
    subroutine add_losses(self, early, late, step, terms)
       type(slider_rigid_type), intent(inout) :: self
@@ -532,56 +395,5 @@ contains
       call exchange_slider(self, archive)
       call archive%exchange(self%mean_velocity)
    end subroutine exchange
-
-   !> Value of a series; even and odd terms apart, so that the two sums run side by side.
-   pure function horner(series, terms, time) result(value)
-      real(wp), intent(in) :: series(0:), time
-      integer, intent(in) :: terms
-      real(wp) :: value
-
-      real(wp) :: even, odd, square
-      integer :: term
-
-      square = time**2
-      even = 0.0_wp
-      odd = 0.0_wp
-      do term = 2 * ((terms - 1) / 2), 0, -2
-         even = even * square + series(term)
-      end do
-      do term = 2 * (terms / 2) - 1, 1, -2
-         odd = odd * square + series(term)
-      end do
-      value = even + time * odd
-   end function horner
-
-   !> Integral of a series from zero.
-   pure function integral(series, terms, time) result(value)
-      real(wp), intent(in) :: series(0:), time
-      integer, intent(in) :: terms
-      real(wp) :: value
-
-      integer :: term
-      real(wp) :: once(0:most_terms - 1)
-
-      do term = 0, terms - 1
-         once(term) = series(term) * inverse(term + 1)
-      end do
-      value = time * horner(once, terms, time)
-   end function integral
-
-   !> Integral of the integral of a series from zero.
-   pure function second_integral(series, terms, time) result(value)
-      real(wp), intent(in) :: series(0:), time
-      integer, intent(in) :: terms
-      real(wp) :: value
-
-      integer :: term
-      real(wp) :: twice(0:most_terms - 1)
-
-      do term = 0, terms - 1
-         twice(term) = series(term) * (inverse(term + 1) * inverse(term + 2))
-      end do
-      value = time**2 * horner(twice, terms, time)
-   end function second_integral
 
 end module mesoslip_slider_rigid

@@ -91,16 +91,16 @@ def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
     exact, *finite = trees
     figure = Figure(figsize=(6.5, 3))
     force, difference = figure.subplots(1, 2, width_ratios=[1.6, 1])
-    infinite = exact["contact_force"].values[0]
+    infinite = exact.to_dataset()["contact_force"].values[0]
     counts, errors = [], []
     for tree in finite:
         config = configuration(tree)
         counts.append(config.contacts.count)
-        deviation = (tree["contact_force"].values - infinite) / config.contacts.static_force
+        deviation = (tree.to_dataset()["contact_force"].values - infinite) / config.contacts.static_force
         errors.append(np.sqrt(np.mean(deviation**2)))
-    times = exact["time"].values
+    times = exact.to_dataset()["time"].values
     force.plot(
-        times, finite[0]["contact_force"].values[0] * 1e6, color="0.7", label=f"$N$ = {counts[0]}"
+        times, finite[0].to_dataset()["contact_force"].values[0] * 1e6, color="0.7", label=f"$N$ = {counts[0]}"
     )
     force.plot(times, infinite * 1e6, color="black", label=r"$N \to \infty$")
     force.set_xlabel("time (s)")

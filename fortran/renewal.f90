@@ -144,16 +144,18 @@ contains
       real(wp), intent(in) :: released(:, :, :)
       type(renewal_solution_type), intent(inout) :: solution
 
-      real(wp) :: matrix(size(weight), size(weight)), state(3)
+      real(wp) :: matrix(size(weight), size(weight)), state(3), whole, age
       real(wp), allocatable :: left(:, :, :)
-      integer :: points, panels, panel, lag, lags, i
+      integer :: points, panels, panel, lag, lags, young, i
 
       points = size(released, 1)
       panels = size(released, 2)
       matrix = width * integration_matrix(solution%point)
       lags = min(panels, int(lives%longest / width) + 2)
-      allocate (left(points, 3, lags))
-      do lag = 1, lags
+      ! Of those that attached so many panels back, or fewer, none has broken.
+      young = min(lags, int(lives%shortest / width))
+      allocate (left(points, 3, young + 1:lags))
+      do lag = young + 1, lags
          do i = 1, points
             left(i, :, lag) = width * weight(i) &
                & * lives%newborn_state((lag - solution%point(i)) * width)
@@ -162,13 +164,23 @@ contains
 
       allocate (solution%slope(points, panels), solution%force(points, panels))
       allocate (solution%stiffness(points, panels), solution%pinned(panels + 1))
+      ! Number and sum of ages of the young ones.
+      whole = 0.0_wp
+      age = 0.0_wp
       do panel = 1, panels + 1
          state = lives%first_state(start + (panel - 1) * width)
-         do lag = 1, min(lags, panel - 1)
+         do lag = young + 1, min(lags, panel - 1)
             do i = 1, 3
                state(i) = state(i) + dot_product(left(:, i, lag), released(:, panel - lag, 1))
             end do
          end do
+         if (young > 0 .and. panel > 1) then
+            age = age + width * whole
+            call count_young(1, 1.0_wp)
+            if (panel > young + 1) call count_young(young + 1, -1.0_wp)
+         end if
+         state = state + [whole, lives%newborn_stiffness * whole, &
+            & lives%newborn_force * whole + lives%newborn_stiffness * age]
          solution%pinned(panel) = state(1)
          if (panel > 1) then
             solution%mismatch = max(solution%mismatch, abs(state(3) - solution%force(1, panel - 1) &
@@ -183,6 +195,20 @@ contains
             & + lives%newborn_force * released(:, panel, 1) - released(:, panel, 2)
          solution%force(:, panel) = state(3)
       end do
+
+   contains
+
+      !> Count those that attached some panels back among the young, or take them out.
+      subroutine count_young(lag, sign_of_change)
+         integer, intent(in) :: lag
+         real(wp), intent(in) :: sign_of_change
+
+         associate (attached => width * weight * released(:, panel - lag, 1))
+            whole = whole + sign_of_change * sum(attached)
+            age = age + sign_of_change * width * sum((lag - solution%point) * attached)
+         end associate
+      end subroutine count_young
+
    end subroutine bear
 
    !> Solution of a small linear system whose matrix is close to the identity.

@@ -168,7 +168,8 @@ class ForceCurve:
                 inside = np.linspace(max(0.0, start), length, 20011)[1:-1]
                 self.error = float(np.max(np.abs(fine.force(inside) - coarse.force(inside))))
                 self.slope_error = float(np.max(np.abs(fine.slope(inside) - coarse.slope(inside))))
-            if self.error <= self.config.curve.tolerance or self._work(panels * 2, width / 2):
+            is_exact = self.error <= self.config.curve.tolerance
+            if is_exact or (coarse is not None and self._is_too_much(2 * panels, width / 2)):
                 break
             coarse = fine
             width /= 2
@@ -176,11 +177,10 @@ class ForceCurve:
         self.panels = panels
         self.conservation_error = fine.conservation_error if self.config.contacts.reattach else 0.0
 
-    def _work(self, panels: int, width: float) -> bool:
+    def _is_too_much(self, panels: int, width: float) -> bool:
         """Whether a solution would take too much work."""
-        lags = min(panels, self.scales.longest / width)
-        band = min(lags, (self.scales.longest - self.scales.shortest) / width + 3)
-        return panels * POINTS * (3 * lags + 2 * POINTS * band) > MOST_WORK
+        band = min(panels, (self.scales.longest - self.scales.shortest) / width + 3)
+        return panels * band * POINTS * (3 + 2 * POINTS) > MOST_WORK
 
     def _first_panels(self, length: float) -> tuple[float, float]:
         """Start and width of the panels, with their edges where the density is discontinuous."""

@@ -5,11 +5,13 @@
 !> Run N contacts, or infinitely many, for some advances of the slider.
 subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, &
    & coupling, reattach, law, relative_width, initial, seed, realization, slider_kind, mass, &
-   & spring, damping, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
-   & quiet_time, started, reals, integers, state_real, state_integer, records, record, detached, &
-   & detached_contact, resolution, populations, population, packets, packet, trace_capacity, &
-   & trace, slip_trace_capacity, slip_trace, slip_capacity, slips, most_advances, rows, finished, &
-   & full, time, breaks, detached_count, advances, energy, status, message)
+   & spring, damping, layers, layer_damping, base, solver, tolerances, stages, stage_end, &
+   & stage_velocity, interval, slip_interval, slip_velocity, quiet_time, started, reals, integers, &
+   & state_real, state_integer, records, record, detached, detached_contact, resolution, &
+   & populations, population, packets, packet, layer_state, trace_capacity, trace, &
+   & slip_trace_capacity, slip_trace, layers_recorded, layer_trace, slip_capacity, slips, &
+   & most_advances, rows, finished, full, time, breaks, detached_count, advances, integrator, &
+   & energy, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type, raise, status_invalid
@@ -18,6 +20,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    use mesoslip_contact_ensemble, only: contact_ensemble_type, new_contact_ensemble
    use mesoslip_contact_populations, only: contact_populations_type, new_contact_populations
    use mesoslip_contacts, only: contact_parameters_type
+   use mesoslip_slider_layered, only: layered_parameters_type, slider_layered_type
    use mesoslip_slider_prescribed, only: slider_prescribed_type
    use mesoslip_slider_rigid, only: slider_rigid_type
    use mesoslip_recorder, only: recorder_parameters_type
@@ -36,6 +39,10 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    !> Kind of the slider, its mass, spring constant and damping rate
    integer, intent(in) :: slider_kind
    real(8), intent(in) :: mass, spring, damping
+   !> Number of layers, their damping rate; mass, stiffness and damping rate of the base; solver,
+   !> and its tolerances, relative and absolute
+   integer, intent(in) :: layers, solver
+   real(8), intent(in) :: layer_damping, base(3), tolerances(2)
    !> Stages of the drive
    integer, intent(in) :: stages
    real(8), intent(in) :: stage_end(stages), stage_velocity(stages)
@@ -55,10 +62,15 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    real(8), intent(in) :: resolution
    integer, intent(in) :: populations, packets
    real(8), intent(inout), target :: population(populations, 12), packet(4, packets)
+   !> Displacements and velocities of base and layers
+   real(8), intent(inout), target :: layer_state(layers + 1, 2)
    !> Arrays to record into
    integer, intent(in) :: trace_capacity, slip_trace_capacity, slip_capacity
-   real(8), intent(inout), target :: trace(7, trace_capacity)
-   real(8), intent(inout), target :: slip_trace(8, slip_trace_capacity)
+   real(8), intent(inout), target :: trace(9, trace_capacity)
+   real(8), intent(inout), target :: slip_trace(10, slip_trace_capacity)
+   !> Layers whose displacements go with the trace: none or all of them
+   integer, intent(in) :: layers_recorded
+   real(8), intent(inout), target :: layer_trace(layers_recorded, trace_capacity)
    real(8), intent(inout), target :: slips(7, slip_capacity)
    !> Largest number of advances
    integer(8), intent(in) :: most_advances
@@ -70,14 +82,17 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    !> Terms of the energy balance; breaks and advances so far, contacts that are detached
    real(8), intent(out) :: energy(8), breaks, detached_count
    integer(8), intent(out) :: advances
+   !> Steps, evaluations and failed steps of the slider's integrator in this call
+   integer(8), intent(out) :: integrator(3)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
    integer, parameter :: engine_contacts = 1, engine_master_equation = 2
-   integer, parameter :: kind_rigid = 1, kind_prescribed = 2
+   integer, parameter :: kind_rigid = 1, kind_prescribed = 2, kind_layered = 3
    type(simulation_type) :: simulation
    type(contact_ensemble_type), allocatable :: ensemble
    type(contact_populations_type), allocatable :: all
+   type(slider_layered_type), allocatable :: elastic
    type(contact_parameters_type) :: parameters
    type(recorder_parameters_type) :: recorder_parameters
    type(archive_type) :: archive
@@ -90,6 +105,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    breaks = 0.0_wp
    detached_count = 0.0_wp
    advances = 0
+   integrator = 0
    energy = 0.0_wp
    status = 0
    message = ""
@@ -134,6 +150,13 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
          & damping=damping))
    case (kind_prescribed)
       allocate (simulation%slider, source=slider_prescribed_type())
+   case (kind_layered)
+      allocate (elastic)
+      elastic%parameters = layered_parameters_type(layers=layers, mass=mass, stiffness=spring, &
+         & damping=layer_damping, base_mass=base(1), base_stiffness=base(2), &
+         & base_damping=base(3), solver=solver, relative=tolerances(1), absolute=tolerances(2))
+      call elastic%attach(layer_state)
+      call move_alloc(elastic, simulation%slider)
    case default
       status = status_invalid
       message = "unknown kind of slider"
@@ -148,7 +171,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    recorder_parameters%duration = stage_end(stages)
    recorder_parameters%contacts = count
    simulation%recorder%parameters = recorder_parameters
-   call simulation%recorder%attach(trace, slip_trace, slips)
+   call simulation%recorder%attach(trace, slip_trace, slips, layer_trace)
 
    archive%reals = state_real
    archive%integers = state_integer
@@ -177,6 +200,8 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    call simulation%exchange(archive)
    state_real = archive%reals
    state_integer = archive%integers
+   integrator = simulation%slider%integrator_counts()
+   call simulation%slider%close()
 end subroutine run_segment
 
 !> Sizes of the state of a run.

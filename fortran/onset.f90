@@ -75,7 +75,8 @@ contains
    end subroutine integrate_onset
 
    !> Rates of displacement, velocity and running mean of the velocity, for CVODE.
-   function rates(time, state, rate, user_data) bind(c) result(status)
+   function rates(time, state, rate, user_data) bind(c, name="mesoslip_onset_rates") &
+      & result(status)
       real(c_double), value :: time
       type(N_Vector) :: state, rate
       type(c_ptr), value :: user_data
@@ -98,7 +99,8 @@ contains
    end function rates
 
    !> Zero where an equation ends, for CVODE.
-   function ends(time, state, value, user_data) bind(c) result(status)
+   function ends(time, state, value, user_data) bind(c, name="mesoslip_onset_ends") &
+      & result(status)
       real(c_double), value :: time
       type(N_Vector) :: state
       real(c_double) :: value(*)

@@ -18,8 +18,8 @@ module mesoslip_recorder
    public :: trace_length, slip_trace_length, slip_length, most_samples_in_step
 
    !> Numbers in a sample: time, displacement of the drive, displacement, velocity, spring force,
-   !> contact force, detached contacts
-   integer, parameter :: trace_length = 7
+   !> contact force, detached contacts, elastic force, displacement of the base
+   integer, parameter :: trace_length = 9
    !> A sample of a slip trace has the number of the slip as well
    integer, parameter :: slip_trace_length = trace_length + 1
    !> Numbers of a slip: its number, start time, end time, spring force before and after, peak
@@ -71,13 +71,14 @@ module mesoslip_recorder
       real(wp), private :: next_slip_sample = huge(1.0_wp)
       real(wp), private :: sense = 1.0_wp, last_excess = 0.0_wp, last_fast = 0.0_wp
       real(wp), private :: start_time = 0.0_wp, end_time = 0.0_wp, force_before = 0.0_wp
-      real(wp), private :: force_after = 0.0_wp, peak_velocity = 0.0_wp, last_acceleration = 0.0_wp
+      real(wp), private :: force_after = 0.0_wp, peak_velocity = 0.0_wp
       real(wp), private :: breaks_before = 0.0_wp, breaks_after = 0.0_wp
       logical, private :: has_least = .false.
 
       real(wp), pointer, contiguous, private :: trace(:, :) => null()
       real(wp), pointer, contiguous, private :: slip_trace(:, :) => null()
       real(wp), pointer, contiguous, private :: slips(:, :) => null()
+      real(wp), pointer, contiguous, private :: layers(:, :) => null()
    contains
       !> Use arrays of the caller
       procedure :: attach
@@ -95,7 +96,7 @@ module mesoslip_recorder
 contains
 
    !> Use arrays of the caller, empty.
-   subroutine attach(self, trace, slip_trace, slips)
+   subroutine attach(self, trace, slip_trace, slips, layers)
       !> The recorder
       class(recorder_type), intent(inout) :: self
       !> Samples, shape (trace_length, capacity)
@@ -104,7 +105,11 @@ contains
       real(wp), intent(inout), target, contiguous :: slip_trace(:, :)
       !> Slips, shape (slip_length, capacity)
       real(wp), intent(inout), target, contiguous :: slips(:, :)
+      !> Displacements of the layers at the samples of the trace, shape (layers, capacity); without
+      !> layers none are recorded
+      real(wp), intent(inout), target, contiguous :: layers(:, :)
 
+      self%layers => layers
       self%trace => trace
       self%slip_trace => slip_trace
       self%slips => slips
@@ -173,6 +178,8 @@ contains
       do while (self%next_sample <= slider%time)
          self%trace_count = self%trace_count + 1
          self%trace(:, self%trace_count) = sample(slider%observe(self%next_sample), detached)
+         if (size(self%layers, 1) > 0) call slider%observe_layers(self%next_sample, &
+            & self%layers(:, self%trace_count))
          self%samples = self%samples + 1
          self%next_sample = real(self%samples, wp) * self%parameters%interval
          ! The end of the run is a sample if rounding alone keeps it from being one.
@@ -197,7 +204,6 @@ contains
       self%force_before = motion%spring_force
       self%breaks_before = breaks
       self%peak_velocity = 0.0_wp
-      self%last_acceleration = 0.0_wp
       self%has_least = .false.
       self%slip_samples = 0
       self%next_slip_sample = huge(1.0_wp)
@@ -216,10 +222,10 @@ contains
       type(motion_type) :: motion
 
       self%peak_velocity = max(self%peak_velocity, self%sense * slider%velocity)
-      if (self%last_acceleration > 0.0_wp .and. self%sense * slider%acceleration < 0.0_wp) then
+      if (self%sense * slider%start_acceleration > 0.0_wp &
+         & .and. self%sense * slider%acceleration < 0.0_wp) then
          self%peak_velocity = max(self%peak_velocity, self%sense * fastest(slider, self%sense))
       end if
-      self%last_acceleration = self%sense * slider%acceleration
 
       if (abs(excess) > self%parameters%slip_velocity) then
          self%last_fast = slider%time
@@ -310,7 +316,8 @@ contains
       real(wp) :: sample(trace_length)
 
       sample = [motion%time, motion%drive_displacement, motion%displacement, motion%velocity, &
-         & motion%spring_force, motion%contact_force, detached]
+         & motion%spring_force, motion%contact_force, detached, &
+         & motion%elastic_force, motion%base_displacement]
    end function sample
 
    !> Motion where the velocity passed that of the drive during the last advance.
@@ -388,7 +395,6 @@ contains
       call archive%exchange(self%force_before)
       call archive%exchange(self%force_after)
       call archive%exchange(self%peak_velocity)
-      call archive%exchange(self%last_acceleration)
       call archive%exchange(self%breaks_before)
       call archive%exchange(self%breaks_after)
       call archive%exchange(self%has_least)

@@ -94,6 +94,10 @@ contains
          time = self%slider%time
          displacement = self%slider%displacement
          call self%advance()
+         if (allocated(self%slider%failure)) then
+            error = self%slider%failure
+            return
+         end if
          if (self%slider%time > time &
             & .or. abs(self%slider%displacement - displacement) > 0.0_wp) then
             idle = 0
@@ -128,6 +132,7 @@ contains
 
       call self%slider%advance(law, window)
       self%advances = self%advances + 1
+      if (allocated(self%slider%failure)) return
       call self%recorder%record(self%slider, self%contacts%detached_count, self%contacts%breaks)
 
       call self%contacts%respond(before, self%slider%pose())

@@ -3,9 +3,10 @@
 !> A slider knows nothing about contacts. Displacements are relative to an origin that moves along
 !> with the slider, so that they keep their digits however far it goes.
 module mesoslip_slider
-   use mesoslip_kinds, only: wp
+   use mesoslip_kinds, only: i8, wp
    use mesoslip_accumulator, only: accumulator_type
    use mesoslip_archive, only: archive_type
+   use mesoslip_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    implicit none
    private
@@ -26,6 +27,8 @@ module mesoslip_slider
       real(wp) :: spring_force = 0.0_wp
       !> Force that the slider exerts on the contacts [N]
       real(wp) :: contact_force = 0.0_wp
+      !> Mean elastic force of a slider of layers [N], and displacement of its base [m]
+      real(wp) :: elastic_force = 0.0_wp, base_displacement = 0.0_wp
    end type motion_type
 
    !> A slider: what it has in common whatever its kind.
@@ -36,8 +39,8 @@ module mesoslip_slider
       real(wp) :: origin = 0.0_wp
       !> Displacement of the slider [m] and its velocity [m/s]
       real(wp) :: displacement = 0.0_wp, velocity = 0.0_wp
-      !> Its acceleration at the end of the last advance [m/s2]
-      real(wp) :: acceleration = 0.0_wp
+      !> Its acceleration at the end of the last advance, and at its start [m/s2]
+      real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
       real(wp) :: sense = 1.0_wp
       !> Velocity of the drive [m/s], and where it was when it took this velocity [s, m]
@@ -46,6 +49,8 @@ module mesoslip_slider
       real(wp) :: step_time = 0.0_wp
       !> Work done by the drive, and lost in the drag of contacts and in the slider's damping [J]
       type(accumulator_type) :: drive_work, drag_loss, damping_loss
+      !> Set when the slider cannot go on
+      type(error_type), allocatable :: failure
    contains
       !> Put the slider at rest in balance with the contacts
       procedure(start_interface), deferred :: start
@@ -63,6 +68,12 @@ module mesoslip_slider
       procedure, non_overridable :: drive_at
       !> Move the origin of displacements
       procedure :: shift_origin
+      !> Displacements of the layers at a time of the last advance
+      procedure :: observe_layers
+      !> Numbers that tell what the slider's integrator did
+      procedure :: integrator_counts
+      !> Free what the slider holds
+      procedure :: close => close_slider
       !> Put the state into an archive or take it out
       procedure :: exchange => exchange_slider
    end type slider_type
@@ -162,6 +173,37 @@ contains
       self%displacement = self%displacement - shift
       self%origin = self%origin + shift
    end subroutine shift_origin
+
+   !> Displacements of the layers at a time of the last advance; nothing for a rigid slider.
+   pure subroutine observe_layers(self, time, displacement)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Absolute displacements, shape (layers) [m]
+      real(wp), intent(out) :: displacement(:)
+
+      displacement = self%origin + self%displacement + 0.0_wp * time
+   end subroutine observe_layers
+
+   !> Steps, evaluations and failed steps of the slider's integrator; none without one.
+   function integrator_counts(self) result(counts)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> These three
+      integer(i8) :: counts(3)
+
+      counts = 0_i8
+      if (allocated(self%failure)) counts(3) = 1_i8
+   end function integrator_counts
+
+   !> Free what the slider holds; nothing for most.
+   subroutine close_slider(self)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+
+      self%step_time = self%time
+   end subroutine close_slider
 
    !> Put the state into an archive or take it out.
    subroutine exchange_slider(self, archive)

@@ -8,7 +8,6 @@ module mesoslip_slider_rigid
    use mesoslip_kinds, only: wp
    use mesoslip_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, window_type
-   use mesoslip_motion_series, only: crossing, horner, integral, inverse, next_turn, second_integral
    use mesoslip_slider, only: motion_type, slider_type, exchange_slider
    implicit none
    private
@@ -19,6 +18,11 @@ module mesoslip_slider_rigid
    !> the fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
    integer, parameter :: few_terms = 6, some_terms = 10, most_terms = 17
    real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 8.0e-2_wp, longest_step = 0.5_wp
+
+   !> For the procedures of motion_series.inc
+   integer, parameter :: longest_series = most_terms
+   integer :: i
+   real(wp), parameter :: inverse(longest_series + 2) = [(1.0_wp / i, i=1, longest_series + 2)]
 
    !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
    real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
@@ -142,7 +146,7 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, change, reach, target, drive_gap, way, swept, extension
+      real(wp) :: step, change, reach, target, sense, drive_gap, way, swept, extension
       logical :: crosses, turns
       type(motion_rates_type) :: early, late
       integer :: term
@@ -164,7 +168,9 @@ contains
       reach = (abs(self%series(0)) + change) * step
       if (.not. reach < min(window%upper - self%displacement, &
          & self%displacement - window%lower)) then
-         call first_end(self, window, terms, change, step, crosses, turns, target)
+         call first_end(self%series, terms, window%upper - self%displacement, &
+            & window%lower - self%displacement, change, step, crosses, turns, sense)
+         target = merge(window%upper, window%lower, sense > 0.0_wp)
       end if
 
       way = integral(self%series, terms, step)
@@ -196,6 +202,7 @@ contains
          & + self%drive_velocity * (self%time - self%drive_time)
       late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
+      self%start_acceleration = early%acceleration
       call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
       call add_losses(self, early, late, step, terms)
    end subroutine move
@@ -246,35 +253,6 @@ contains
          driving = 0.0_wp
       end do
    end subroutine expand
-
-   !> Shorten a step to the first place where the motion leaves the window or turns round.
-   subroutine first_end(self, window, terms, change, step, crosses, turns, target)
-      type(slider_rigid_type), intent(in) :: self
-      type(window_type), intent(in) :: window
-      integer, intent(in) :: terms
-      !> Bound on the change of the velocity in the whole step [m/s]
-      real(wp), intent(in) :: change
-      !> Length of the step [s]
-      real(wp), intent(inout) :: step
-      !> Whether it ends at a displacement of the window, and which
-      logical, intent(out) :: crosses
-      real(wp), intent(out) :: target
-      !> Whether it ends at a turning point
-      logical, intent(out) :: turns
-
-      real(wp) :: sense, gap
-
-      turns = .false.
-      sense = sign(1.0_wp, self%series(0))
-      if (abs(self%series(0)) <= change) call next_turn(self%series, terms, step, turns, sense)
-      target = merge(window%upper, window%lower, sense > 0.0_wp)
-      gap = target - self%displacement
-      crosses = sense * (integral(self%series, terms, step) - gap) >= 0.0_wp
-      if (crosses) then
-         step = crossing(self%series, terms, gap, step)
-         turns = .false.
-      end if
-   end subroutine first_end
 
    !> Add the losses of a step to the energy balance: the integrals of C V**2 and M eta_S (V - W) V.
    subroutine add_losses(self, early, late, step, terms)
@@ -395,5 +373,22 @@ contains
       call exchange_slider(self, archive)
       call archive%exchange(self%mean_velocity)
    end subroutine exchange
+
+   !> Integral of the integral of a series from zero.
+   pure function second_integral(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: value
+
+      integer :: term
+      real(wp) :: twice(0:longest_series - 1)
+
+      do term = 0, terms - 1
+         twice(term) = series(term) * (inverse(term + 1) * inverse(term + 2))
+      end do
+      value = time**2 * horner(twice, terms, time)
+   end function second_integral
+
+   include "motion_series.inc"
 
 end module mesoslip_slider_rigid

@@ -1,12 +1,13 @@
 !> The integrator CVODE of SUNDIALS, with the names of version 7; for version 6 see sundials_6.f90.
 module mesoslip_sundials_cvode
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_funloc, c_funptr, &
-      & c_int, c_loc, c_long, c_null_char, c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_funptr, &
+      & c_int, c_long, c_null_char, c_null_ptr, c_ptr
    use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_NORMAL, CV_ONE_STEP, CV_ROOT_RETURN, FCVode, &
-      & FCVodeCreate, FCVodeFree, FCVodeGetDky, FCVodeGetNumErrTestFails, FCVodeGetNumRhsEvals, &
-      & FCVodeGetNumSteps, FCVodeInit, FCVodeReInit, FCVodeRootInit, FCVodeSetInitStep, &
-      & FCVodeSetJacFn, FCVodeSetLinearSolver, FCVodeSetMaxNumSteps, FCVodeSetMaxStep, &
-      & FCVodeSetNonlinearSolver, FCVodeSetUserData, FCVodeSStolerances
+      & FCVodeCreate, FCVodeFree, FCVodeGetDky, FCVodeGetLastOrder, FCVodeGetLastStep, &
+      & FCVodeGetNumErrTestFails, FCVodeGetNumRhsEvals, FCVodeGetNumSteps, FCVodeInit, &
+      & FCVodeReInit, FCVodeRootInit, FCVodeSetJacFn, FCVodeSetLinearSolver, &
+      & FCVodeSetMaxNumSteps, FCVodeSetNonlinearSolver, FCVodeSetStopTime, FCVodeSetUserData, &
+      & FCVodeSStolerances
    use fnvector_serial_mod, only: FN_VMake_Serial
    use fsundials_core_mod, only: FN_VDestroy, FSUNContext_Create, FSUNContext_Free, &
       & FSUNLinSolFree, FSUNMatDestroy, FSUNNonlinSolFree, N_Vector, SUN_COMM_NULL, &
@@ -32,15 +33,28 @@ module mesoslip_sundials_cvode
    !> as the integrator lives; close frees everything.
    type :: cvode_type
       type(c_ptr), private :: context = c_null_ptr, memory = c_null_ptr
-      type(N_Vector), pointer, private :: state => null(), dense => null()
+      type(N_Vector), pointer, private :: state => null()
       type(SUNNonlinearSolver), pointer, private :: fixed_point => null()
       type(SUNLinearSolver), pointer, private :: linear => null()
       type(SUNMatrix), pointer, private :: matrix => null()
       type(message_type), pointer, private :: message => null()
-      integer(c_long), private :: steps_before = 0, evaluations_before = 0, failures_before = 0
+      !> Steps, evaluations of the rates and failed steps before the last restart
+      integer(c_long), private :: counts_before(3) = 0_c_long
    contains
       !> Set up an integration
       procedure :: open
+      !> Whether it is set up
+      procedure :: is_open
+      !> Give the Jacobian as a function, for method_bdf
+      procedure :: set_jacobian
+      !> Start anew from the state in the caller's array
+      procedure :: restart
+      !> Make one step, not beyond a time
+      procedure :: step
+      !> Derivative of the interpolating polynomial of the last step
+      procedure :: derivative
+      !> Steps, evaluations of the rates and failed steps so far
+      procedure :: counts
       !> Have the integration stop where functions are zero
       procedure :: find_roots
       !> Integrate up to a time, or to a root before it
@@ -117,6 +131,112 @@ contains
             & error)
       end if
    end subroutine open
+
+   !> Whether the integrator is set up.
+   pure function is_open(self)
+      !> The integrator
+      class(cvode_type), intent(in) :: self
+      !> Whether it is
+      logical :: is_open
+
+      is_open = c_associated(self%memory)
+   end function is_open
+
+   !> Give the Jacobian as a function of SUNDIALS' form, for method_bdf.
+   subroutine set_jacobian(self, jacobian, error)
+      !> The integrator
+      class(cvode_type), intent(inout) :: self
+      !> The function, which fills a banded matrix
+      type(c_funptr), intent(in) :: jacobian
+      !> Set if it fails; the integrator is then closed
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%expect(FCVodeSetJacFn(self%memory, jacobian), "Jacobian", error)
+   end subroutine set_jacobian
+
+   !> Start anew from the state in the caller's array.
+   subroutine restart(self, time, error)
+      !> The integrator
+      class(cvode_type), intent(inout) :: self
+      !> Time at the start
+      real(c_double), intent(in) :: time
+      !> Set if it fails; the integrator is then closed
+      type(error_type), allocatable, intent(out) :: error
+
+      self%counts_before = self%counts()
+      call self%expect(FCVodeReInit(self%memory, time, self%state), "restart", error)
+   end subroutine restart
+
+   !> Make one step, not beyond a time.
+   subroutine step(self, stop_time, time, length, order, error)
+      !> The integrator
+      class(cvode_type), intent(inout) :: self
+      !> Time that must not be passed
+      real(c_double), intent(in) :: stop_time
+      !> Time at the end of the step, its length and order
+      real(c_double), intent(out) :: time, length
+      integer, intent(out) :: order
+      !> Set if it fails; the integrator is then closed
+      type(error_type), allocatable, intent(out) :: error
+
+      real(c_double) :: reached(1), last(1)
+      integer(c_int) :: orders(1), status
+
+      time = stop_time
+      length = 0.0_c_double
+      order = 0
+      call self%expect(FCVodeSetStopTime(self%memory, stop_time), "stop time", error)
+      if (allocated(error)) return
+      status = FCVode(self%memory, stop_time, self%state, reached, CV_ONE_STEP)
+      call self%expect(status, "integration", error)
+      if (allocated(error)) return
+      status = FCVodeGetLastStep(self%memory, last)
+      status = FCVodeGetLastOrder(self%memory, orders)
+      time = reached(1)
+      length = last(1)
+      order = int(orders(1))
+   end subroutine step
+
+   !> Derivative of the interpolating polynomial of the last step.
+   subroutine derivative(self, time, order, values, error)
+      !> The integrator
+      class(cvode_type), intent(inout) :: self
+      !> A time within the step, and the order, at most that of the step
+      real(c_double), intent(in) :: time
+      integer, intent(in) :: order
+      !> The derivative, shape of the state
+      real(c_double), intent(inout), target, contiguous :: values(:)
+      !> Set if it fails; the integrator is then closed
+      type(error_type), allocatable, intent(out) :: error
+
+      type(N_Vector), pointer :: vector
+      integer(c_int) :: status
+
+      vector => FN_VMake_Serial(size(values, kind=sunindextype), values, self%context)
+      status = FCVodeGetDky(self%memory, time, int(order, c_int), vector)
+      call FN_VDestroy(vector)
+      call self%expect(status, "interpolation", error)
+   end subroutine derivative
+
+   !> Steps, evaluations of the rates and failed steps so far.
+   function counts(self)
+      !> The integrator
+      class(cvode_type), intent(in) :: self
+      !> These three
+      integer(c_long) :: counts(3)
+
+      integer(c_long) :: number(1)
+      integer(c_int) :: status
+
+      counts = self%counts_before
+      if (.not. self%is_open()) return
+      status = FCVodeGetNumSteps(self%memory, number)
+      if (status >= 0) counts(1) = counts(1) + number(1)
+      status = FCVodeGetNumRhsEvals(self%memory, number)
+      if (status >= 0) counts(2) = counts(2) + number(1)
+      status = FCVodeGetNumErrTestFails(self%memory, number)
+      if (status >= 0) counts(3) = counts(3) + number(1)
+   end function counts
 
    !> Have the integration stop where functions are zero.
    subroutine find_roots(self, functions, number, error)

@@ -47,7 +47,8 @@ contains
    end subroutine collect_messages
 
    !> Keep a message.
-   subroutine handle(code, module_name, function_name, text, user_data) bind(c)
+   subroutine handle(code, module_name, function_name, text, user_data) &
+      & bind(c, name="mesoslip_message")
       integer(c_int), value :: code
       character(kind=c_char), intent(in) :: module_name(*), function_name(*), text(*)
       type(c_ptr), value :: user_data

@@ -47,7 +47,8 @@ contains
    end subroutine collect_messages
 
    !> Keep a message.
-   subroutine handle(line, function_name, file_name, text, code, user_data, context) bind(c)
+   subroutine handle(line, function_name, file_name, text, code, user_data, context) &
+      & bind(c, name="mesoslip_message")
       integer(c_int), value :: line, code
       character(kind=c_char), intent(in) :: function_name(*), file_name(*), text(*)
       type(c_ptr), value :: user_data, context

@@ -40,12 +40,14 @@ BYTES_PER_SAMPLE = 3 * 7 * 8
 
 # Tables and keys that the format knows and this version does not.
 NOT_YET_KEYS = {
-    "slider": ("layers", "layer_damping", "base", "solver"),
     "contacts": ("ageing",),
     "drive": ("force_rate",),
     "": ("interaction",),
 }
-NOT_YET_VALUES = {"slider.kind": ("layered", "quasistatic")}
+NOT_YET_VALUES = {"slider.kind": ("quasistatic",)}
+
+# Work of a run by series, steps times layers, beyond which stiff formulas take over.
+MOST_SERIES_WORK = 3e11
 
 # Keys that exclude each other: laid over a base, one replaces the other.
 EXCLUSIVE = {"drive": ("velocity", "stage"), "slider": ("damping", "damping_ratio")}
@@ -64,6 +66,7 @@ Force = Annotated[float, _quantity("N", "18 uN")]
 Area = Annotated[float, _quantity("m^2", "1e-10 m^2")]
 Length = Annotated[float, _quantity("m", "3.5 nm")]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3")]
+Pressure = Annotated[float, _quantity("Pa", "70 GPa")]
 Number = Annotated[float, _quantity("1", "0.2")]
 
 
@@ -137,10 +140,116 @@ class RigidSlider(Table):
         return (self.damping_ratio or 0.0) * self.omega_s
 
 
+class Base(Table):
+    """The lower body: a mass on a spring to the ground, which damping holds back."""
+
+    mass: Annotated[Mass, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(gt=0)]
+    damping: Annotated[Rate, Field(ge=0)] = 0.0
+
+
+class Solver(Table):
+    """How layers are integrated: by series, exact to rounding, or by CVODE's formulas."""
+
+    method: Literal["auto", "series", "adams", "bdf"] = "auto"
+    relative_tolerance: Annotated[Number, Field(ge=1e-13, le=1e-2)] = 1e-8
+
+
+class Cantilever(Table):
+    """A round rod that is held at one end, pulled at the other."""
+
+    length: Annotated[Length, Field(gt=0)]
+    radius: Annotated[Length, Field(gt=0)]
+    density: Annotated[Density, Field(gt=0)]
+    young_modulus: Annotated[Pressure, Field(gt=0)]
+
+    @property
+    def mass(self) -> float:
+        """M = ρ π r² L [kg]."""
+        return self.density * math.pi * self.radius**2 * self.length
+
+    @property
+    def stiffness(self) -> float:
+        """K = 3 E I/L³ with I = π r⁴/4 [N/m]."""
+        return 3 * self.young_modulus * math.pi * self.radius**4 / 4 / self.length**3
+
+    @property
+    def bending_frequency(self) -> float:
+        """Lowest frequency of bending, (β₁/L)² √(E I/(ρ S)), β₁ = 1.875 [1/s]."""
+        lowest = 1.8751040687119611
+        stiffness_over_mass = self.young_modulus * self.radius**2 / (4 * self.density)
+        return (lowest / self.length) ** 2 * math.sqrt(stiffness_over_mass)
+
+
+class LayeredSlider(Table):
+    """An elastic block: layers joined by springs, of which the first bears the contacts."""
+
+    kind: Literal["layered"]
+    mass: Annotated[Mass, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(gt=0)]
+    layers: Annotated[StrictInt, Field(ge=1, le=100_000)]
+    layer_damping: Annotated[Rate, Field(ge=0)] = 0.0
+    base: Base | None = None
+    solver: Solver = Solver()
+    cantilever: Cantilever | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_cantilever(cls, tables: Any) -> Any:
+        """Mass and stiffness of the cantilever, unless they are given."""
+        if not isinstance(tables, Mapping) or not isinstance(tables.get("cantilever"), Mapping):
+            return tables
+        try:
+            cantilever = Cantilever.model_validate(tables["cantilever"])
+        except ValidationError:
+            return tables
+        return {"mass": cantilever.mass, "stiffness": cantilever.stiffness, **tables}
+
+    @property
+    def omega_s(self) -> float:
+        """Setup frequency √(K/M) [1/s]."""
+        return math.sqrt(self.stiffness / self.mass)
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """Frequencies of the chain while no contact is pinned, on a fixed base [1/s]."""
+        n = self.layers
+        return tuple(
+            2 * n * self.omega_s * math.sin((2 * j - 1) * math.pi / (2 * (2 * n + 1)))
+            for j in range(1, n + 1)
+        )
+
+    def solver_method(self, config: Config) -> Literal["series", "adams", "bdf"]:
+        """The method, chosen for a run if it is "auto".
+
+        Series need a few steps for each period of the fastest rate, however little it matters to
+        the motion: where that would take too long, BDF steps over it.
+        """
+        if self.solver.method != "auto":
+            return self.solver.method
+        mass = self.mass / self.layers
+        drag = config.contacts.count * config.contacts.contact_drag
+        rate = 2 * self.layers * self.omega_s
+        rate += math.sqrt(config.contacts.stiffness / mass) + drag / mass + 4 * self.layer_damping
+        if self.base is not None:
+            stiffness = self.base.stiffness + config.contacts.stiffness
+            rate += math.sqrt(stiffness / self.base.mass) + drag / self.base.mass
+            rate += self.base.damping
+        work = config.duration * rate * (self.layers + 10)
+        return "series" if work < MOST_SERIES_WORK else "bdf"
+
+
 class PrescribedSlider(Table):
     """A block that goes where the drive goes, K = ∞."""
 
     kind: Literal["prescribed"] = "prescribed"
+
+
+SLIDERS: dict[str, type[Table]] = {
+    "rigid": RigidSlider,
+    "layered": LayeredSlider,
+    "prescribed": PrescribedSlider,
+}
 
 
 def _slider_kind(value: Any) -> Any:
@@ -150,7 +259,9 @@ def _slider_kind(value: Any) -> Any:
 
 
 Slider = Annotated[
-    Annotated[RigidSlider, Tag("rigid")] | Annotated[PrescribedSlider, Tag("prescribed")],
+    Annotated[RigidSlider, Tag("rigid")]
+    | Annotated[LayeredSlider, Tag("layered")]
+    | Annotated[PrescribedSlider, Tag("prescribed")],
     Discriminator(_slider_kind),
 ]
 
@@ -254,6 +365,7 @@ class Output(Table):
     interval: Annotated[Time, Field(gt=0)] | None = None
     slip_interval: Annotated[Time, Field(gt=0)] | None = None
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
+    layers: StrictBool = False
 
 
 class Curve(Table):
@@ -402,6 +514,9 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
             config.curve.newborn_width,
         )
 
+    if config.output.layers and not isinstance(config.slider, LayeredSlider):
+        yield "output.layers", 'is for slider.kind = "layered" only', True
+
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     together = min(config.run.realizations, os.cpu_count() or 1)
     for key, needed, value in (
@@ -412,7 +527,10 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
         ),
         (
             "output.interval",
-            BYTES_PER_SAMPLE * config.duration / interval * config.run.realizations,
+            (BYTES_PER_SAMPLE + 16 * getattr(config.slider, "layers", 0) * config.output.layers)
+            * config.duration
+            / interval
+            * config.run.realizations,
             interval,
         ),
     ):
@@ -431,7 +549,7 @@ def _problems(error: ValidationError, source: str) -> list[Problem]:
 
 
 def _problem_of(details: ErrorDetails, source: str) -> Problem:
-    place = [part for part in details["loc"] if part not in {"rigid", "prescribed"}]
+    place = [part for part in details["loc"] if part not in SLIDERS]
     context = details.get("ctx", {})
     kind, value, message = details["type"], details["input"], details["msg"]
     table, name = _dotted(place[:-1]), str(place[-1]) if place else ""
@@ -442,6 +560,8 @@ def _problem_of(details: ErrorDetails, source: str) -> Problem:
     if kind == "extra_forbidden":
         if name in NOT_YET_KEYS.get(table, ()):
             return Problem(source, _dotted(place), "not available in this version")
+        if table == "slider" and name in LayeredSlider.model_fields:
+            return Problem(source, _dotted(place), 'is for slider.kind = "layered" only')
         near = difflib.get_close_matches(name, _known_keys(place[:-1], details), 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         return Problem(source, _dotted(place), f"unknown key{hint}")
@@ -479,7 +599,12 @@ def _known_keys(place: list[Any], details: ErrorDetails) -> list[str]:
     tables: dict[str, Any] = {
         "run": Run,
         "drive": Drive,
-        "slider": PrescribedSlider if "prescribed" in details["loc"] else RigidSlider,
+        "slider": next(
+            (kind for name, kind in SLIDERS.items() if name in details["loc"]), RigidSlider
+        ),
+        "base": Base,
+        "solver": Solver,
+        "cantilever": Cantilever,
         "contacts": Contacts,
         "output": Output,
         "curve": Curve,

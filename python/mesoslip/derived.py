@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mesoslip.config import Config, RigidSlider
+from mesoslip.config import Config, LayeredSlider, PrescribedSlider, RigidSlider
 from mesoslip.contact_lives import scales
 
 
@@ -42,7 +42,7 @@ def loading_rate(config: Config) -> float | None:
     """D1 = v_d √(KM)/F_s (S46) of the first stage that moves; None without one, or a spring."""
     slider = config.slider
     velocity = _drive_speed(config)
-    if velocity == 0 or not isinstance(slider, RigidSlider):
+    if velocity == 0 or isinstance(slider, PrescribedSlider):
         return None
     return velocity * math.sqrt(slider.stiffness * slider.mass) / config.contacts.static_force
 
@@ -102,13 +102,16 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
 
 def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
     slider, contacts = config.slider, config.contacts
-    if not isinstance(slider, RigidSlider):
+    if isinstance(slider, PrescribedSlider):
         return
+    if isinstance(slider, LayeredSlider):
+        yield from _layers(slider, contacts.count * contacts.contact_mass)
     omega_s = slider.omega_s
     omega_l = math.sqrt(contacts.stiffness / slider.mass)
     yield "omega_s", omega_s, "1/s", "setup frequency, Omega_S = (K/M)^(1/2)"
     yield "setup_period", 2 * math.pi / omega_s, "s", "period of the setup, tau_S = 2 pi/Omega_S"
-    yield "damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S"
+    if isinstance(slider, RigidSlider):
+        yield "damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S"
     yield (
         "omega_l",
         omega_l,
@@ -150,3 +153,24 @@ def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
             "with D0 ~ 1 - delta",
         )
         yield "slip_time_melting", beta / omega_s, "s", "slip time of instant melting"
+
+
+def _layers(slider: LayeredSlider, film_mass: float) -> Iterator[tuple[str, float, str, str]]:
+    yield "slider_mass", slider.mass, "kg", "mass of all layers, M"
+    yield "slider_stiffness", slider.stiffness, "N/m", "static stiffness of all springs, K"
+    frequencies = slider.frequencies
+    yield "chain_frequency", frequencies[0], "1/s", "lowest frequency of the chain without contacts"
+    yield "chain_frequency_highest", frequencies[-1], "1/s", "highest one"
+    if slider.base is not None:
+        mass = slider.base.mass + slider.mass + film_mass
+        yield (
+            "pinned_base_frequency",
+            math.sqrt(slider.base.stiffness / mass),
+            "1/s",
+            "frequency of base and slider pinned together, [K_B/(M_B + M + Nm)]^(1/2)",
+        )
+    if slider.cantilever is not None:
+        bending = slider.cantilever.bending_frequency
+        yield "bending_frequency", bending, "1/s", "lowest bending frequency of the cantilever"
+        ratio = bending / math.sqrt(slider.cantilever.stiffness / slider.cantilever.mass)
+        yield "bending_ratio", ratio, "1", "that over (K/M)^(1/2) of the cantilever, 2.03"

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
-from mesoslip.config import RigidSlider
+from mesoslip.config import LayeredSlider, PrescribedSlider, RigidSlider
 from mesoslip.contact_lives import COUPLINGS, INITIAL_STATES
 from mesoslip.errors import RunError
 from mesoslip.threshold import LAWS
@@ -36,6 +36,8 @@ TRACE_COLUMNS = (
     "spring_force",
     "contact_force",
     "detached_contacts",
+    "elastic_force",
+    "base_displacement",
 )
 SLIP_COLUMNS = (
     "slip",
@@ -58,10 +60,14 @@ ENERGY_COLUMNS = (
 )
 
 ENGINES = {"eq": 1, "me": 2}
-SLIDERS = {"rigid": 1, "prescribed": 2}
+SLIDERS = {"rigid": 1, "prescribed": 2, "layered": 3}
+SOLVERS = {"series": 0, "adams": 1, "bdf": 2}
 
 # In a slip the slider exceeds the drive's velocity by this part of the scale Omega_S F_s/K.
 SLIP_VELOCITY_RATIO = 0.02
+
+# Displacements below this part of the spring's extension under F_s do not matter to CVODE.
+TINY_STRETCH = 1e-6
 
 # Wall time of a segment, between two looks at progress and Ctrl-C [s].
 SEGMENT_SECONDS = 0.25
@@ -78,7 +84,7 @@ POPULATIONS = 4096
 
 def slip_velocity(config: Config) -> float:
     """Velocity above the drive's that makes a slip [m/s]; 0 for a slider without slips."""
-    if not isinstance(config.slider, RigidSlider):
+    if isinstance(config.slider, PrescribedSlider):
         return 0.0
     if config.output.slip_velocity is not None:
         return config.output.slip_velocity
@@ -90,8 +96,9 @@ def slip_velocity(config: Config) -> float:
 class Realization:
     """One run of an engine, advanced in segments.
 
-    ``trace`` has shape (samples, 7) with the columns `TRACE_COLUMNS`, ``slips`` (slips, 7) with
-    `SLIP_COLUMNS`, ``slip_trace`` (samples, 8): a trace and the number of the slip.
+    ``trace`` has shape (samples, 9) with the columns `TRACE_COLUMNS`, ``slips`` (slips, 7) with
+    `SLIP_COLUMNS`, ``slip_trace`` (samples, 10): a trace and the number of the slip;
+    ``layer_trace`` (samples, layers) the displacements of layers, if the output asks for them.
     """
 
     config: Config
@@ -108,10 +115,14 @@ class Realization:
         self._traces: list[Array] = []
         self._slip_traces: list[Array] = []
         self._slips: list[Array] = []
+        self._layer_traces: list[Array] = []
+        self.integrator_counts = np.zeros(3, dtype=np.int64)
         self._started = False
         # Every segment orders the queue anew, which must cost little beside its advances.
         self._is_exact = self.config.run.engine == "eq"
         self._segment = SEGMENT_ADVANCES
+        # CVODE starts anew with each segment, which must therefore not depend on computing times.
+        self._grows = not isinstance(self.config.slider, LayeredSlider)
         if self._is_exact:
             self._segment = max(SEGMENT_ADVANCES, self.config.contacts.count)
 
@@ -130,9 +141,18 @@ class Realization:
         self._detached_contact = np.zeros(count, dtype=np.int32)
         self._population = np.zeros((populations, POPULATION_COLUMNS), order="F")
         self._packet = np.zeros((PACKET_ROWS, populations), order="F")
+        layers = self._layers
+        self._layer_state = np.zeros((layers + 1, 2), order="F")
+        self._layer_trace = np.empty(
+            (layers if self.config.output.layers else 0, TRACE_ROWS), order="F"
+        )
         self._trace = np.empty((len(TRACE_COLUMNS), TRACE_ROWS), order="F")
         self._slip_trace = np.empty((len(TRACE_COLUMNS) + 1, TRACE_ROWS), order="F")
         self._slip = np.empty((len(SLIP_COLUMNS), SLIP_ROWS), order="F")
+
+    @property
+    def _layers(self) -> int:
+        return getattr(self.config.slider, "layers", 1)
 
     def _make_room(self) -> None:
         """Double the arrays of the master equation's state."""
@@ -167,6 +187,11 @@ class Realization:
         return kept
 
     @property
+    def layer_trace(self) -> Array:
+        layers = self._layers if self.config.output.layers else 0
+        return np.concatenate([np.empty((0, layers)), *self._layer_traces])
+
+    @property
     def energy_residual(self) -> float:
         """What the energy balance lacks, relative to the work of the drive or its largest term."""
         scale = abs(self.energy[0]) or float(np.max(np.abs(self.energy)))
@@ -183,12 +208,20 @@ class Realization:
         config = self.config
         contacts, slider = config.contacts, config.slider
         stages = config.drive_stages
-        if isinstance(slider, RigidSlider):
-            mass, spring, damping = slider.mass, slider.stiffness, slider.damping_rate
+        mass = spring = quiet_time = 1.0
+        damping = layer_damping = 0.0
+        base, tolerances, solver = (0.0, 0.0, 0.0), (1e-8, 1e-17), "series"
+        if not isinstance(slider, PrescribedSlider):
+            mass, spring = slider.mass, slider.stiffness
             quiet_time = np.pi / slider.omega_s
-        else:
-            mass = spring = quiet_time = 1.0
-            damping = 0.0
+        if isinstance(slider, RigidSlider):
+            damping = slider.damping_rate
+        if isinstance(slider, LayeredSlider):
+            layer_damping, solver = slider.layer_damping, slider.solver_method(config)
+            if slider.base is not None:
+                base = (slider.base.mass, slider.base.stiffness, slider.base.damping)
+            relative = slider.solver.relative_tolerance
+            tolerances = (relative, relative * TINY_STRETCH * contacts.static_force / spring)
         if not self._started:
             self._allocate()
         segment = advances or self._segment
@@ -212,6 +245,11 @@ class Realization:
             mass=mass,
             spring=spring,
             damping=damping,
+            layers=self._layers,
+            layer_damping=layer_damping,
+            base=np.array(base),
+            solver=SOLVERS[solver],
+            tolerances=np.array(tolerances),
             stage_end=np.cumsum([stage.duration for stage in stages]),
             stage_velocity=np.array([stage.velocity for stage in stages]),
             interval=config.output_interval,
@@ -227,22 +265,26 @@ class Realization:
             resolution=config.run.resolution,
             population=self._population,
             packet=self._packet,
+            layer_state=self._layer_state,
+            layer_trace=self._layer_trace,
             trace=self._trace,
             slip_trace=self._slip_trace,
             slips=self._slip,
             most_advances=segment,
         )
         seconds = time.perf_counter() - start
-        rows, finished, full, now, breaks, detached, made, energy, status, message = results
+        rows, finished, full, now, breaks, detached, made, counts, energy, status, message = results
         self.kernel_seconds += seconds
         # A segment may also end because a buffer is full; a longer one would be no use then.
-        if made - self.advances == segment == self._segment and seconds < 0.5 * SEGMENT_SECONDS:
+        if self._grows and made - self.advances == segment and seconds < 0.5 * SEGMENT_SECONDS:
             self._segment *= 2
         self._started = True
         if status != 0:
             raise RunError(f"realization {self.number}: {message.decode().strip()}")
         self._traces.append(self._trace[:, : rows[0]].T.copy())
         self._slip_traces.append(self._slip_trace[:, : rows[1]].T.copy())
+        self._layer_traces.append(self._layer_trace[:, : rows[0]].T.copy())
+        self.integrator_counts += counts
         self._slips.append(self._slip[:, : rows[2]].T.copy())
         if full:
             self._make_room()

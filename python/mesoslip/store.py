@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from mesoslip import _build, _core, engine
-from mesoslip.config import Config
+from mesoslip.config import Config, LayeredSlider
 from mesoslip.errors import FileError
 
 if TYPE_CHECKING:
@@ -29,6 +29,10 @@ VARIABLES = {
     "spring_force": ("N", "force of the drive on the slider"),
     "contact_force": ("N", "force of the slider on the contacts"),
     "detached_contacts": ("1", "number of detached contacts"),
+    "elastic_force": ("N", "mean elastic force in the slider, K (X_d - X_1)"),
+    "base_displacement": ("m", "displacement of the base"),
+    "layer_displacement": ("m", "displacement of a layer"),
+    "layer": ("1", "number of the layer, 1 at the contacts"),
     "realization": ("1", "number of the realization"),
     "slip": ("1", "number of the slip within its realization"),
     "start_time": ("s", "time of the greatest spring force before the slip"),
@@ -110,7 +114,7 @@ def build(
         {
             name: variable(name, ("realization", "time"), samples[column])
             for column, name in enumerate(columns)
-            if name != "time"
+            if name in recorded(config)
         }
         | {
             "breaks": variable("breaks", each, [one.breaks for one in realizations]),
@@ -127,17 +131,46 @@ def build(
         },
         attrs=attributes(config, realizations, complete=complete, wall_seconds=wall_seconds),
     )
+    if config.output.layers:
+        root = root.merge(layer_displacements(realizations))
     if complete and config.run.engine == "eq":
         root["detached_contacts"] = root["detached_contacts"].astype(np.int32)
 
     groups = {"slips": slip_catalogue(realizations), "energy": energy_balance(realizations)}
     if config.output.slip_interval is not None and engine.slip_velocity(config) > 0:
-        groups["slip_traces"] = slip_traces(realizations)
+        groups["slip_traces"] = slip_traces(config, realizations)
     if config.run.engine == "eq":
         for group, name in (("slips", "contacts_broken"), ("slip_traces", "detached_contacts")):
             if group in groups:
                 groups[group][name] = groups[group][name].astype(np.int64)
     return xr.DataTree(root, children={name: xr.DataTree(data) for name, data in groups.items()})
+
+
+def recorded(config: Config) -> tuple[str, ...]:
+    """Names of the traces that an output of a configuration has, without the time."""
+    names = engine.TRACE_COLUMNS[1:7]
+    if isinstance(config.slider, LayeredSlider):
+        names += ("elastic_force",)
+        if config.slider.base is not None:
+            names += ("base_displacement",)
+    return names
+
+
+def layer_displacements(realizations: Sequence[Realization]) -> xr.Dataset:
+    """Displacements of the layers at the samples of the trace."""
+    traces = [one.layer_trace for one in realizations]
+    longest = max(len(trace) for trace in traces)
+    values = np.full((len(traces), longest, traces[0].shape[1]), np.nan)
+    for number, trace in enumerate(traces):
+        values[number, : len(trace)] = trace
+    return xr.Dataset(
+        {
+            "layer_displacement": variable(
+                "layer_displacement", ("realization", "time", "layer"), values
+            )
+        },
+        coords={"layer": variable("layer", ("layer",), np.arange(1, values.shape[2] + 1))},
+    )
 
 
 def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
@@ -155,13 +188,14 @@ def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
     ).set_coords("realization")
 
 
-def slip_traces(realizations: Sequence[Realization]) -> xr.Dataset:
+def slip_traces(config: Config, realizations: Sequence[Realization]) -> xr.Dataset:
     """The finer traces of all slips one after another, dimension ``sample``."""
     rows = np.concatenate([one.slip_trace for one in realizations])
     owner = np.concatenate([np.full(len(one.slip_trace), one.number) for one in realizations])
     data = {
         name: variable(name, ("sample",), rows[:, column])
         for column, name in enumerate(engine.TRACE_COLUMNS)
+        if name == "time" or name in recorded(config)
     }
     data["slip"] = variable("slip", ("sample",), rows[:, -1].astype(np.int32))
     data["realization"] = variable("realization", ("sample",), owner)
@@ -186,7 +220,16 @@ def attributes(
     """Attributes of an output: what was run, by what, and how it went."""
     reached = min(one.time for one in realizations)
     residual: float = max((one.energy_residual for one in realizations), key=abs)
-    return program_attributes(config, "run") | {
+    solver = {}
+    if isinstance(config.slider, LayeredSlider):
+        counts = np.sum([one.integrator_counts for one in realizations], axis=0)
+        solver = {
+            "solver": config.slider.solver_method(config),
+            "solver_steps": int(counts[0]),
+            "solver_evaluations": int(counts[1]),
+            "solver_failed_steps": int(counts[2]),
+        }
+    return program_attributes(config, "run") | solver | {
         "seed": config.run.seed,
         "complete": "true" if complete else "false",
         "comment": "" if complete else f"interrupted; every realization came to {reached:.6g} s",

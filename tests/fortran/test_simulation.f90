@@ -24,7 +24,7 @@ program test_simulation
    real(wp), target :: record(record_length, count), detached(detached_length, count)
    integer, target :: detached_contact(count)
    real(wp), target :: trace(trace_length, rows), slip_trace(slip_trace_length, rows)
-   real(wp), target :: slips(slip_length, rows)
+   real(wp), target :: slips(slip_length, rows), layers(0, rows)
 
    call closes("gaussian", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed, .true.)
    call closes("exponential", law_exponential, 1.0_wp, coupling_equal, initial_steady, .true.)
@@ -128,7 +128,7 @@ contains
          simulation%slider = slider_prescribed_type()
       end if
       simulation%recorder%parameters = recorder
-      call simulation%recorder%attach(trace, slip_trace, slips)
+      call simulation%recorder%attach(trace, slip_trace, slips, layers)
    end subroutine build
 
 end program test_simulation

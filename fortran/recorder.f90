@@ -2,6 +2,9 @@
 !>
 !> Samples are taken from the motion between events, so how often one looks does not change a run.
 !>
+!> The spring force of a slip is the mean elastic force of a slider of layers, K (X_d - X_1): the
+!> force at the drive has the waves in the slider as well.
+!>
 !> A slip starts where the spring force is greatest, that is where the slider becomes faster than
 !> the drive, if it goes on to exceed the drive's velocity by the slip velocity. It ends where the
 !> spring force is least, before the slider has been slow again for half a period of the setup.
@@ -201,7 +204,7 @@ contains
       if (start_excess < 0.0_wp) motion = pace(slider)
       self%phase = phase_fast
       self%start_time = motion%time
-      self%force_before = motion%spring_force
+      self%force_before = motion%elastic_force
       self%breaks_before = breaks
       self%peak_velocity = 0.0_wp
       self%has_least = .false.
@@ -238,15 +241,15 @@ contains
       if (start_excess > 0.0_wp .and. excess <= 0.0_wp) then
          motion = pace(slider)
          if (.not. self%has_least .or. &
-            & self%sense * (motion%spring_force - self%force_after) < 0.0_wp) then
+            & self%sense * (motion%elastic_force - self%force_after) < 0.0_wp) then
             self%has_least = .true.
             self%end_time = motion%time
-            self%force_after = motion%spring_force
+            self%force_after = motion%elastic_force
             self%breaks_after = breaks
          end if
       else if (start_excess <= 0.0_wp .and. excess > 0.0_wp .and. self%has_least) then
          motion = pace(slider)
-         if (self%sense * (motion%spring_force - self%force_after) &
+         if (self%sense * (motion%elastic_force - self%force_after) &
             & >= 0.5_wp * self%sense * (self%force_before - self%force_after) &
             & .and. 2.0_wp * detached < self%parameters%contacts) then
             call self%close_slip(motion, breaks)
@@ -264,7 +267,7 @@ contains
 
       if (.not. self%has_least) then
          self%end_time = motion%time
-         self%force_after = motion%spring_force
+         self%force_after = motion%elastic_force
          self%breaks_after = breaks
       end if
       self%slip_count = self%slip_count + 1

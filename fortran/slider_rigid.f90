@@ -338,6 +338,7 @@ contains
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + displacement
       motion%spring_force = self%stiffness * (drive - displacement)
+      motion%elastic_force = motion%spring_force
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity
    end function observe

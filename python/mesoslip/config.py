@@ -47,7 +47,7 @@ NOT_YET_KEYS = {
 NOT_YET_VALUES = {"slider.kind": ("quasistatic",)}
 
 # Work of a run by series, steps times layers, beyond which stiff formulas take over.
-MOST_SERIES_WORK = 3e11
+MOST_SERIES_WORK = 1e11
 
 # Keys that exclude each other: laid over a base, one replaces the other.
 EXCLUSIVE = {"drive": ("velocity", "stage"), "slider": ("damping", "damping_ratio")}

@@ -40,6 +40,7 @@ CONTACT: dict[str, Any] = {"color": "black", "label": "contact force $F$"}
 SCALES = {
     "spring_force": (1e6, "µN"),
     "contact_force": (1e6, "µN"),
+    "elastic_force": (1e6, "µN"),
     "velocity": (1e6, "µm/s"),
     "detached_contacts": (1.0, ""),
 }

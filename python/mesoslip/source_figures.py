@@ -96,11 +96,16 @@ def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
     for tree in finite:
         config = configuration(tree)
         counts.append(config.contacts.count)
-        deviation = (tree.to_dataset()["contact_force"].values - infinite) / config.contacts.static_force
+        deviation = (
+            tree.to_dataset()["contact_force"].values - infinite
+        ) / config.contacts.static_force
         errors.append(np.sqrt(np.mean(deviation**2)))
     times = exact.to_dataset()["time"].values
     force.plot(
-        times, finite[0].to_dataset()["contact_force"].values[0] * 1e6, color="0.7", label=f"$N$ = {counts[0]}"
+        times,
+        finite[0].to_dataset()["contact_force"].values[0] * 1e6,
+        color="0.7",
+        label=f"$N$ = {counts[0]}",
     )
     force.plot(times, infinite * 1e6, color="black", label=r"$N \to \infty$")
     force.set_xlabel("time (s)")
@@ -200,6 +205,42 @@ def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+def layers(trees: Sequence[xr.DataTree]) -> Figure:
+    """S24: slips of elastic sliders of 16 and 64 layers, in both measures of the force; insets show
+    the whole cycle."""
+    figure = Figure(figsize=(6.5, 3.4))
+    panels = figure.subplots(1, 2)
+    names = ("elastic_force", "spring_force")
+    titles = ("mean elastic force $K(X_d - X_1)$", "force at the drive")
+    for letter, axes, name, title in zip("ab", panels, names, titles, strict=True):
+        inset = axes.inset_axes((0.45, 0.62, 0.53, 0.36))
+        for tree, style in zip(trees, ("--", "-"), strict=True):
+            count = getattr(configuration(tree).slider, "layers", 1)
+            color = "tab:red" if style == "--" else "black"
+            line: dict[str, Any] = {"color": color, "linestyle": style}
+            slips = tree.children["slips"].to_dataset(inherit=False)
+            if slips.sizes["slip"]:
+                start = slips["start_time"].values[0] - 3e-3
+                plots.draw_series(
+                    axes,
+                    tree,
+                    name,
+                    window=(start, start + 0.02),
+                    time_unit=1e-3,
+                    label=f"$N_l$ = {count}",
+                    **line,
+                )
+            plots.draw_series(inset, tree, name, window=(0, 6), linewidth=0.5, color=color)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.7 * (high - low))
+        inset.tick_params(labelsize=6)
+        inset.set_xlabel("time (s)", fontsize=6)
+        axes.set_xlabel("time in the first slip (ms)")
+        axes.set_ylabel(f"({letter}) {title} (µN)")
+        axes.legend(loc="lower left")
+    return figure
+
+
 def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
     """S28: the spring force for different viscosities of the film, and its first drop."""
     figure = Figure(figsize=(6.5, 3))
@@ -243,10 +284,11 @@ FIGURES = {
     "S21": SourceFigure(("S21",), slip_details),
     "S22": SourceFigure(("S22a", "S22b", "S22c", "S22d"), delays),
     "S23": SourceFigure(("S23a", "S23b", "S23c"), dispersions),
+    "S24": SourceFigure(("S24a", "S24b"), layers),
+    "S28": SourceFigure(("S28a", "S28b", "S28c"), viscosities),
     "limit": SourceFigure(
         ("limit-me", *(f"limit-{power}" for power in range(2, 7))), limit_of_many_contacts
     ),
-    "S28": SourceFigure(("S28a", "S28b", "S28c"), viscosities),
 }
 
 

@@ -148,7 +148,7 @@ def build(
 
 def recorded(config: Config) -> tuple[str, ...]:
     """Names of the traces that an output of a configuration has, without the time."""
-    names = engine.TRACE_COLUMNS[1:7]
+    names: tuple[str, ...] = engine.TRACE_COLUMNS[1:7]
     if isinstance(config.slider, LayeredSlider):
         names += ("elastic_force",)
         if config.slider.base is not None:
@@ -229,15 +229,21 @@ def attributes(
             "solver_evaluations": int(counts[1]),
             "solver_failed_steps": int(counts[2]),
         }
-    return program_attributes(config, "run") | solver | {
-        "seed": config.run.seed,
-        "complete": "true" if complete else "false",
-        "comment": "" if complete else f"interrupted; every realization came to {reached:.6g} s",
-        "break_count": sum(one.breaks for one in realizations),
-        "advance_count": sum(one.advances for one in realizations),
-        "energy_residual": residual,
-        "wall_seconds": wall_seconds,
-    }
+    return (
+        program_attributes(config, "run")
+        | solver
+        | {
+            "seed": config.run.seed,
+            "complete": "true" if complete else "false",
+            "comment": ""
+            if complete
+            else f"interrupted; every realization came to {reached:.6g} s",
+            "break_count": sum(one.breaks for one in realizations),
+            "advance_count": sum(one.advances for one in realizations),
+            "energy_residual": residual,
+            "wall_seconds": wall_seconds,
+        }
+    )
 
 
 def program_attributes(config: Config, command: str) -> dict[str, Any]:

@@ -1,11 +1,11 @@
 !> CVODE is there and right: a damped oscillator against its closed form.
 module oscillator
-   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_funptr, c_int, c_ptr
    use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector
    implicit none
    private
 
-   public :: oscillator_type, right_side
+   public :: oscillator_type, right_side, failing_rates
 
    !> x'' + 2 damping x' + frequency**2 x = 0
    type :: oscillator_type
@@ -33,6 +33,23 @@ contains
       status = 0
    end function right_side
 
+   !> A system whose rates cannot be computed.
+   function no_rates(time, state, rate, user_data) bind(c) result(status)
+      real(c_double), value :: time
+      type(N_Vector) :: state, rate
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+
+      status = -1
+   end function no_rates
+
+   !> That function, for CVODE.
+   function failing_rates() result(pointer)
+      type(c_funptr) :: pointer
+
+      pointer = c_funloc(no_rates)
+   end function failing_rates
+
 end module oscillator
 
 program test_cvode
@@ -46,9 +63,10 @@ program test_cvode
       & FSUNNonlinSolFree, N_Vector, SUN_COMM_NULL, SUNNonlinearSolver
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
    use mesoslip_kinds, only: wp
-   use mesoslip_sundials_cvode, only: sundials_version
+   use mesoslip_errors, only: error_type
+   use mesoslip_sundials_cvode, only: cvode_type, method_adams, method_bdf, sundials_version
    use mesoslip_sundials_index, only: sunindextype
-   use oscillator, only: oscillator_type, right_side
+   use oscillator, only: failing_rates, oscillator_type, right_side
    use testing, only: check, check_close, finish
    implicit none
 
@@ -89,9 +107,61 @@ program test_cvode
    call FN_VDestroy(state)
    call FN_VDestroy(dense)
    call succeed(FSUNContext_Free(context), "end of the context")
+   call wrapped(method_adams)
+   call wrapped(method_bdf)
+   call fails()
    call finish()
 
 contains
+
+   !> The same by our own type: an end, a restart, steps and their polynomials.
+   subroutine wrapped(method)
+      integer, intent(in) :: method
+
+      type(cvode_type) :: cvode
+      type(error_type), allocatable :: error
+      real(wp), target :: state(2), between(2)
+      real(wp) :: reached, length
+      integer :: order
+      logical :: has_root
+
+      state = [1.0_wp, 0.0_wp]
+      call cvode%open(c_funloc(right_side), c_loc(parameters), method, 1, 0.0_wp, state, &
+         & 1.0e-10_wp, 1.0e-12_wp, error)
+      call check(.not. allocated(error) .and. cvode%is_open(), "an integrator is open")
+      call cvode%integrate(5.0_wp, reached, has_root, error)
+      call check_close(state(1), exact(reached), 1.0e-7_wp, "displacement after some time")
+      call check(.not. has_root, "no roots are looked for")
+      call cvode%restart(5.0_wp, error)
+      do
+         call cvode%step(6.0_wp, reached, length, order, error)
+         if (allocated(error) .or. reached >= 6.0_wp) exit
+      end do
+      call check(.not. allocated(error), "steps after a restart")
+      call check_close(state(1), exact(6.0_wp), 1.0e-7_wp, "displacement after a restart")
+      call cvode%derivative(6.0_wp - 0.5_wp * length, 0, between, error)
+      call check_close(between(1), exact(6.0_wp - 0.5_wp * length), 1.0e-7_wp, "interpolation")
+      call check(all(cvode%counts() >= 0) .and. sum(cvode%counts()) > 10, "steps are counted")
+      call cvode%close()
+      call check(.not. cvode%is_open(), "an integrator is closed")
+   end subroutine wrapped
+
+   !> A failure is an error with CVODE's message, and leaves nothing open.
+   subroutine fails()
+      type(cvode_type) :: cvode
+      type(error_type), allocatable :: error
+      real(wp), target :: state(2)
+      real(wp) :: reached
+      logical :: has_root
+
+      state = [1.0_wp, 0.0_wp]
+      call cvode%open(failing_rates(), c_loc(parameters), method_adams, 1, 0.0_wp, state, &
+         & 1.0e-8_wp, 1.0e-12_wp, error)
+      call cvode%integrate(5.0_wp, reached, has_root, error)
+      call check(allocated(error) .and. .not. cvode%is_open(), "a failure is an error")
+      if (allocated(error)) call check(index(error%message, "right-hand side") > 0, &
+         & "CVODE's message: " // error%message)
+   end subroutine fails
 
    !> Check the status that SUNDIALS returned.
    subroutine succeed(status, name)

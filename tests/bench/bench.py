@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from fixed_step import numba_run, numpy_steps
+from fixed_step import numba_run, numpy_steps, verlet_run
 from mesoslip import Config, ForceCurve
 from mesoslip.engine import Realization
 
@@ -175,6 +175,61 @@ def master_equation_cost() -> None:
     )
 
 
+def layers(count: int, duration: float, *changes: str) -> Config:
+    tables = Config.load(KLEIN, [f"run.duration={duration}", *changes]).to_dict()
+    tables["slider"] = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": count}
+    return Config.from_dict(tables)
+
+
+def layered_cost() -> None:
+    """Cost over the number of layers, of the series and of CVODE, and beside a Verlet scheme."""
+    print("\nElastic slider in Klein's case, 4080 contacts, energy balance of the whole run")
+    whole = finish(layers(64, 12.0))
+    print(
+        f"  64 layers, 12 s: {whole.kernel_seconds:.2f} s, {whole.breaks} breaks, "
+        f"{whole.advances} advances, balance to {abs(whole.energy_residual):.0e}"
+    )
+    print("  layers   to 1.94 s: kernel s      breaks    advances   us/advance   slip time ms")
+    for count in (1, 4, 16, 64, 256, 1024):
+        one = finish(layers(count, 1.94))
+        slip = one.slips[0] if len(one.slips) else np.full(7, np.nan)
+        print(
+            f"  {count:6d} {one.kernel_seconds:20.3f} {one.breaks:11d} {one.advances:11d} "
+            f"{1e6 * one.kernel_seconds / one.advances:12.2f} {1e3 * (slip[2] - slip[1]):14.2f}",
+            flush=True,
+        )
+    print("  16 layers, 200 contacts to 1.94 s by each solver, tolerance 1e-8")
+    tables = layers(16, 1.94, "contacts.count=200").to_dict()
+    series = 0.0
+    for method in ("series", "adams", "bdf"):
+        tables["slider"]["solver"] = {"method": method}
+        one = finish(Config.from_dict(tables))
+        series = series or one.kernel_seconds
+        steps, evaluations, failed = one.integrator_counts
+        print(
+            f"  {method:8} {one.kernel_seconds:8.3f} s, {one.kernel_seconds / series:6.1f} times "
+            f"as long, {steps} steps, {evaluations} evaluations, {failed} failed, balance to "
+            f"{abs(one.energy_residual):.0e}",
+            flush=True,
+        )
+    config = layers(64, 1.94)
+    events = finish(config)
+    before, after = events.slips[0, 3], events.slips[0, 4]
+    print(f"  64 layers to 1.94 s: {events.kernel_seconds:.3f} s by events")
+    step = 5e-6
+    while step > 1e-7:
+        highest, lowest, seconds = verlet_run(config, step, 1.94)
+        error = max(abs(highest - before), abs(lowest - after)) / config.contacts.static_force
+        print(
+            f"  Verlet in Numba, step {1e6 * step:5.2f} us: {seconds:7.2f} s, "
+            f"{seconds / events.kernel_seconds:6.1f} times as long, off by {error:.2%} of F_s",
+            flush=True,
+        )
+        if error < 0.01:
+            break
+        step /= 2
+
+
 def main() -> None:
     np.seterr(all="raise")
     whole = min((finish(Config.load(KLEIN)) for _ in range(3)), key=lambda one: one.kernel_seconds)
@@ -188,6 +243,7 @@ def main() -> None:
     against_fixed_steps()
     curve_cost()
     master_equation_cost()
+    layered_cost()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ def parameters(config: Config) -> tuple[float, ...]:
     return (
         slider.mass,
         slider.stiffness,
-        slider.damping_rate,
+        getattr(slider, "damping_rate", 0.0),
         config.drive_stages[0].velocity,
         contacts.contact_static_force,
         contacts.contact_stiffness,
@@ -107,4 +107,67 @@ def numba_run(config: Config, step: float, duration: float) -> tuple[float, floa
     _run(*arguments, 2, 1)
     start = time.perf_counter()
     highest, lowest = _run(*arguments, round(duration / step), 1)
+    return highest, lowest, time.perf_counter() - start
+
+
+@numba.njit(cache=False)
+def _verlet(p, layers, count, step, steps, seed):
+    mass, spring, _, v_d, f_s, k_0, drag_0, delay, ratio, width = p
+    np.random.seed(seed)
+    u = np.empty(count)
+    for i in range(count):
+        u[i] = np.random.normal(1.0, width)
+    k = k_0 * np.sqrt(u)
+    origin = np.zeros(count)
+    due = np.full(count, -1.0)
+    x, v, a = np.zeros(layers), np.zeros(layers), np.zeros(layers)
+    layer_mass, bond = mass / layers, spring * layers
+    highest = lowest = 0.0
+    slipping = False
+    for number in range(steps):
+        now = (number + 1) * step
+        for j in range(layers):
+            v[j] += 0.5 * step * a[j]
+            x[j] += step * v[j]
+        force = 0.0
+        for i in range(count):
+            if due[i] < 0.0:
+                f = k[i] * (x[0] - origin[i])
+                force += f
+                if abs(f) >= u[i] * f_s:
+                    due[i] = now + delay
+            elif due[i] <= now:
+                u[i] = np.random.normal(1.0, width)
+                k[i] = k_0 * math.sqrt(u[i])
+                sense = 1.0 if v[0] >= 0.0 else -1.0
+                origin[i] = x[0] - sense * ratio * f_s / k[i]
+                due[i] = -1.0
+                force += k[i] * (x[0] - origin[i])
+            else:
+                force += drag_0 * u[i] * v[0]
+        below = 0.0
+        for j in range(layers):
+            above = x[j + 1] - x[j] if j + 1 < layers else v_d * now - x[j]
+            a[j] = bond * (above - below) / layer_mass
+            below = above
+        a[0] -= force / layer_mass
+        for j in range(layers):
+            v[j] += 0.5 * step * a[j]
+        pull = spring * (v_d * now - x[0])
+        if pull > highest and not slipping:
+            highest = pull
+            lowest = pull
+        elif pull < 0.97 * highest and highest > 0.0:
+            slipping = True
+        if slipping and pull < lowest:
+            lowest = pull
+    return highest, lowest
+
+
+def verlet_run(config: Config, step: float, duration: float) -> tuple[float, float, float]:
+    """Mean elastic force before and after the first slip of layers [N], and the seconds."""
+    arguments = (parameters(config), config.slider.layers, config.contacts.count, step)
+    _verlet(*arguments, 2, 1)
+    start = time.perf_counter()
+    highest, lowest = _verlet(*arguments, round(duration / step), 1)
     return highest, lowest, time.perf_counter() - start

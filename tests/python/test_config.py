@@ -12,6 +12,8 @@ from mesoslip import Config, ConfigError, FileError
 from mesoslip.derived import derived_quantities
 from mesoslip.units import to_si
 
+LAYERED = {"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 4}
+
 
 def problems(tables) -> list[str]:
     with pytest.raises(ConfigError) as caught:
@@ -35,8 +37,27 @@ def problems(tables) -> list[str]:
         ("slider__damping_ratio", -0.1, ["slider.damping_ratio", "greater than or equal to 0"]),
         ("slider__damping", 5.0, ["slider.damping", "not both"]),
         ("slider__stifness", 97, ["slider.stifness", "unknown key", "'stiffness'"]),
-        ("slider__layers", 16, ["slider.layers", "not available in this version"]),
-        ("slider__kind", "layered", ["slider.kind", "not available", "rigid"]),
+        ("slider__layers", 16, ["slider.layers", 'for slider.kind = "layered" only']),
+        ("slider__kind", "quasistatic", ["slider.kind", "not available", "rigid", "layered"]),
+        ("slider", LAYERED | {"layers": 0}, ["slider.layers", "greater than or equal to 1"]),
+        ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", "unknown key"]),
+        ("slider", LAYERED | {"base": {"mass": 1.0}}, ["slider.base.stiffness", "missing"]),
+        (
+            "slider",
+            LAYERED | {"solver": {"metod": "bdf"}},
+            ["slider.solver.metod", "unknown key", "'method'"],
+        ),
+        (
+            "slider",
+            LAYERED | {"solver": {"relative_tolerance": 1.0}},
+            ["slider.solver.relative_tolerance", "less than or equal to 0.01"],
+        ),
+        (
+            "slider",
+            LAYERED | {"cantilever": {"length": 1.0, "radius": 0.1, "density": 1.0}},
+            ["slider.cantilever.young_modulus", "missing"],
+        ),
+        ("output__layers", True, ["output.layers", 'for slider.kind = "layered" only']),
         ("slider__kind", "bouncy", ["slider.kind", "bouncy", "rigid", "prescribed"]),
         ("slider", 5, ["slider", "table"]),
         ("run__engine", "ab", ["run.engine", "ab", "eq", "me"]),

@@ -11,7 +11,7 @@ module mesoslip_slider
    implicit none
    private
 
-   public :: slider_type, motion_type, exchange_slider
+   public :: slider_type, motion_type, exchange_slider, shift_slider
 
    !> The motion at one time.
    type :: motion_type
@@ -67,7 +67,7 @@ module mesoslip_slider
       !> Where the drive is at a time
       procedure, non_overridable :: drive_at
       !> Move the origin of displacements
-      procedure :: shift_origin
+      procedure :: shift_origin => shift_slider
       !> Displacements of the layers at a time of the last advance
       procedure :: observe_layers
       !> Numbers that tell what the slider's integrator did
@@ -162,7 +162,7 @@ contains
    end function drive_at
 
    !> Move the origin of displacements; ends what can be observed of the last advance.
-   subroutine shift_origin(self, shift)
+   subroutine shift_slider(self, shift)
       !> The slider
       class(slider_type), intent(inout) :: self
       !> Displacement of the new origin [m]
@@ -172,7 +172,7 @@ contains
       self%drive_time = self%time
       self%displacement = self%displacement - shift
       self%origin = self%origin + shift
-   end subroutine shift_origin
+   end subroutine shift_slider
 
    !> Displacements of the layers at a time of the last advance; nothing for a rigid slider.
    pure subroutine observe_layers(self, time, displacement)

@@ -17,7 +17,7 @@ module mesoslip_slider_layered
    use mesoslip_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_quadrature, only: gauss_legendre
-   use mesoslip_slider, only: motion_type, slider_type, exchange_slider
+   use mesoslip_slider, only: motion_type, slider_type, exchange_slider, shift_slider
    use mesoslip_sundials_cvode, only: cvode_type, method_adams, method_bdf
    implicit none
    private
@@ -656,10 +656,7 @@ contains
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
-      self%drive_displacement = self%drive_at(self%time) - shift
-      self%drive_time = self%time
-      self%displacement = self%displacement - shift
-      self%origin = self%origin + shift
+      call shift_slider(self, shift)
       self%state(1:, 1) = self%state(1:, 1) - shift
       self%is_stale = .true.
    end subroutine shift_origin

@@ -17,7 +17,8 @@ module mesoslip_sundials_cvode
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
    use mesoslip_errors, only: error_type, raise, status_failed
    use mesoslip_sundials_index, only: sunindextype
-   use mesoslip_sundials_messages, only: collect_messages, message_type
+   use mesoslip_sundials_messages, only: collect_messages
+   use mesoslip_sundials_text, only: message_type
    implicit none
    private
 

@@ -1,17 +1,11 @@
 !> Messages of SUNDIALS version 7, collected instead of printed.
 module mesoslip_sundials_messages
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_loc, &
-      & c_null_char, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_char, c_funloc, c_funptr, c_int, c_loc, c_ptr
+   use mesoslip_sundials_text, only: keep_text, message_type
    implicit none
    private
 
-   public :: message_type, collect_messages
-
-   !> The last message.
-   type :: message_type
-      !> Its text, blank for none
-      character(len=160) :: text = ""
-   end type message_type
+   public :: collect_messages
 
    interface
       !> Give a context a function for its messages.
@@ -53,15 +47,7 @@ contains
       character(kind=c_char), intent(in) :: function_name(*), file_name(*), text(*)
       type(c_ptr), value :: user_data, context
 
-      type(message_type), pointer :: message
-      integer :: place
-
-      call c_f_pointer(user_data, message)
-      message%text = ""
-      do place = 1, len(message%text)
-         if (text(place) == c_null_char) exit
-         message%text(place:place) = text(place)
-      end do
+      call keep_text(text, user_data)
    end subroutine handle
 
 end module mesoslip_sundials_messages

@@ -166,7 +166,7 @@ class Realization:
     def release(self) -> None:
         """Give back the memory of the state, of a realization that will not go on."""
         del self._record, self._detached, self._detached_contact
-        del self._trace, self._slip_trace, self._slip, self._population, self._packet
+        del self._trace, self._slip_trace, self._slip, self._population, self._packet, self._layer_trace
 
     @property
     def trace(self) -> Array:

@@ -54,6 +54,10 @@ module mesoslip_contact_populations
    real(wp), parameter :: widest_spread = 0.35_wp
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: most_attached_part = 0.1_wp
+   !> A step may last so many times as long as expected
+   real(wp), parameter :: patience = 1.5_wp
+   !> Times beyond which nothing is expected [s]
+   real(wp), parameter :: longest_time = 1.0e30_wp
    !> A gap that counts as none, over the length of a step.
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
@@ -172,7 +176,7 @@ contains
       associate (parameters => self%parameters, moments => self%moments(1))
          rows = size(self%population, 1)
          if (state /= initial_steady .and. state /= initial_uniform) then
-            call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp)
+            call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, 0.0_wp)
          else
             back = 0.0_wp
             if (state == initial_steady) back = parameters%back_force_ratio
@@ -183,7 +187,7 @@ contains
                middle = (place - 0.5_wp) * cell
                call self%add_population(-middle * self%stretch, back, 1.0_wp, &
                   & merge(1, 2, state == initial_steady), &
-                  & broken_threshold(parameters%coupling, back, middle))
+                  & broken_threshold(parameters%coupling, back, middle), 0.0_wp)
             end do
             total = sum(self%population(:self%count, row_moments + number))
             associate (all => self%population(:self%count, :))
@@ -196,13 +200,15 @@ contains
    end subroutine initialize
 
    !> Add a population.
-   subroutine add_population(self, origin, force, weight, law, broken)
+   subroutine add_population(self, origin, force, weight, law, broken, displacement)
       class(contact_populations_type), intent(inout) :: self
       !> Where it attached [m], with what force, how many contacts, with which law
       real(wp), intent(in) :: origin, force, weight
       integer, intent(in) :: law
       !> Threshold below which they have broken before
       real(wp), intent(in) :: broken
+      !> Where the slider is [m]: what is due to break there does so when the slider moves on
+      real(wp), intent(in) :: displacement
 
       real(wp) :: moments(moments_length)
 
@@ -215,8 +221,8 @@ contains
          population(place, row_law) = real(law, wp)
          population(place, row_broken) = max(broken, self%moments(law)%least)
          population(place, row_moments + 1:) = weight * moments
-         population(place, row_ahead) = next_break(self, place, 1.0_wp)
-         population(place, row_behind) = next_break(self, place, -1.0_wp)
+         population(place, row_ahead) = max(displacement, next_break(self, place, 1.0_wp))
+         population(place, row_behind) = min(displacement, next_break(self, place, -1.0_wp))
          self%ahead = min(self%ahead, population(place, row_ahead))
          self%behind = max(self%behind, population(place, row_behind))
       end associate
@@ -278,7 +284,7 @@ contains
       !> Where it holds
       type(window_type), intent(out) :: window
 
-      real(wp) :: sense, duration, births, mass, way, mean_force, slack
+      real(wp) :: sense, duration, part, births, mass, way, mean_force, slack
       logical :: breaks
 
       sense = pose%sense
@@ -298,6 +304,10 @@ contains
       breaks = self%trials > 0
       duration = time_to_move(pose, sense, self%step)
       call self%expect(pose%time, duration, births, mass, window%end_time)
+      ! What is expected holds for about the time the slider is expected to take.
+      if (births > 0.0_wp .and. duration < longest_time) then
+         window%end_time = min(window%end_time, pose%time + patience * duration)
+      end if
 
       window%upper = self%ahead
       window%lower = self%behind
@@ -318,10 +328,13 @@ contains
          end if
       end if
 
-      ! What an observer sees in the step is its middle.
-      self%detached_count = self%detached_number%total() + 0.5_wp * (self%trial_breaks - births)
+      ! What an observer sees in the step is its middle; the step may end before all breaks.
+      part = min(1.0_wp, (window%end_time - pose%time) / duration)
+      self%detached_count = max(0.0_wp, self%detached_number%total() &
+         & + 0.5_wp * (part * self%trial_breaks - births))
       law = self%law()
-      law%drag = law%drag + 0.5_wp * self%parameters%drag * (self%trial_mass - mass)
+      law%drag = max(0.0_wp, law%drag &
+         & + 0.5_wp * self%parameters%drag * (part * self%trial_mass - mass))
       ! Lines that do the right work in the step, and start from the force there is: it does not
       ! depend on the direction in which the slider goes on.
       if (breaks) call add_slope(-2.0_wp * self%trial_work / self%step**2)
@@ -591,7 +604,7 @@ contains
       call self%detached_number%add(-births)
       call self%birth_gain%add(births * self%newborn_energy)
       call self%add_population(moment / births, &
-         & after%sense * self%parameters%back_force_ratio, births, 1, 0.0_wp)
+         & after%sense * self%parameters%back_force_ratio, births, 1, 0.0_wp, after%displacement)
       call self%stiffness%add(self%newborn_stiffness * births)
       call self%offset%add(self%newborn_stiffness * moment - self%parameters%static_force * births &
          & * after%sense * self%parameters%back_force_ratio)

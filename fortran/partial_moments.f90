@@ -27,6 +27,8 @@ module mesoslip_partial_moments
       !> In which coordinate the table is uniform
       integer, private :: coordinates = linear
       real(wp), private :: first = 0.0_wp, step = 1.0_wp
+      !> Correction of the density for what the table leaves out
+      real(wp), private :: scale = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
       !> Exponents, shape (orders)
       real(wp), allocatable, private :: exponent(:)
@@ -77,6 +79,13 @@ contains
                & * self%density(knot + self%step * self%point(node))
          end do
       end do
+      ! All of a law is 1, to the last digit: what attaches over and over must not fade away.
+      do node = 1, size(exponent)
+         if (abs(exponent(node)) > 0.0_wp) cycle
+         self%scale = 1.0_wp / self%table(1, node, 1)
+         self%table(1, :, :) = self%table(1, :, :) * self%scale
+         exit
+      end do
       do cell = 1, cells + 1
          ! Slopes from within the support, at whose ends the density may be discontinuous.
          knot = self%first + min(max(cell - 1.0_wp, 1.0e-9_wp), cells - 1.0e-9_wp) * self%step
@@ -106,7 +115,7 @@ contains
       threshold = coordinate
       if (self%coordinates == root) threshold = coordinate**2
       if (self%coordinates == logarithmic) threshold = exp(coordinate)
-      density = self%law%density(threshold) * threshold**self%exponent
+      density = self%scale * self%law%density(threshold) * threshold**self%exponent
       if (self%coordinates == root) density = density * 2.0_wp * coordinate
       if (self%coordinates == logarithmic) density = density * threshold
    end function density

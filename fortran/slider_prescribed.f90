@@ -51,7 +51,8 @@ contains
       limit = window%upper
       if (self%velocity < 0.0_wp) limit = window%lower
 
-      if (abs(limit - start) <= abs(self%velocity) * (window%end_time - self%time)) then
+      if (abs(self%velocity) > 0.0_wp .and. abs(limit - start) &
+         & <= abs(self%velocity) * (window%end_time - self%time)) then
          arrival = self%drive_time + (limit - self%drive_displacement) / self%velocity
          self%time = min(max(arrival, self%time), window%end_time)
          self%displacement = limit

@@ -21,9 +21,9 @@ module mesoslip_contact_lives
    integer, parameter :: zero = 1, half = 2, one = 3, three_halves = 4, two = 5, minus_half = 6, &
       & minus_one = 7
 
-   !> Pieces and points of the rule by which a newborn's stretch is averaged, and half its range in
-   !> standard deviations
-   integer, parameter :: pieces = 9, points = 12
+   !> Pieces of the range of a newborn's stretch, and of that of the law, and points in each, of the
+   !> rule by which the stretch is averaged; half the range in standard deviations
+   integer, parameter :: pieces = 9, law_pieces = 12, points = 12
    real(wp), parameter :: reach = 9.0_wp
 
    !> The contacts.
@@ -102,7 +102,6 @@ contains
       self%coupling = coupling
       self%back_force = back_force
       self%newborn_width = newborn_width
-      self%reattach = reattach
       self%initial = initial
       call new_partial_moments(self%moments, self%law, exponents)
       call gauss_legendre(self%point, self%weight)
@@ -118,10 +117,6 @@ contains
          state = averaged(self, sharp_state, 0.0_wp)
          self%acceptance = state(1)
       end if
-      state = self%newborn_state(0.0_wp)
-      self%newborn_stiffness = state(2)
-      self%newborn_force = state(3)
-
       ! Mean life <x_s - x_b> and the area under the force of a life, <k (x_s^2 - x_b^2)/2>.
       all = self%moments%above(0.0_wp)
       if (coupling == coupling_equal) then
@@ -133,6 +128,10 @@ contains
          stretching = 0.5_wp * (all(three_halves) - back_force**2 * all(minus_half))
       end if
       if (newborn_width > 0.0_wp) call integrate_life(self, self%mean_life, stretching)
+      self%reattach = reattach
+      state = self%newborn_state(0.0_wp)
+      self%newborn_stiffness = state(2)
+      self%newborn_force = state(3)
       if (reattach) self%steady_force = stretching / self%mean_life
    end subroutine new_contact_lives
 
@@ -149,7 +148,7 @@ contains
       mean_life = 0.0_wp
       stretching = 0.0_wp
       ! The spread of the stretch smooths what is left over its standard deviation.
-      cells = min(most_cells, ceiling(0.5_wp * self%longest / self%newborn_width))
+      cells = ceiling(min(real(most_cells, wp), 0.5_wp * self%longest / self%newborn_width))
       length = self%longest / cells
       do cell = 0, cells - 1
          do node = 1, points
@@ -235,17 +234,20 @@ contains
       real(wp) :: average(3)
 
       real(wp), parameter :: sqrt_2_pi = sqrt(2.0_wp * acos(-1.0_wp))
-      real(wp) :: edge(pieces + 3), swap, length, z
+      real(wp) :: edge(pieces + law_pieces + 2), swap, length, z, first, last
       integer :: piece, other, node
 
-      ! Pieces end where the function is not smooth.
+      ! Pieces end where the function is not smooth, and are short beside the law as well.
       do piece = 1, pieces + 1
          edge(piece) = reach * (2.0_wp * (piece - 1) / pieces - 1.0_wp)
       end do
-      edge(pieces + 2) = (self%sharp_shortest - life) / self%newborn_width
-      edge(pieces + 3) = (self%sharp_longest - life) / self%newborn_width
+      first = (self%sharp_shortest - life) / self%newborn_width
+      last = (self%sharp_longest - life) / self%newborn_width
+      do piece = 0, law_pieces
+         edge(pieces + 2 + piece) = first + (last - first) * piece / law_pieces
+      end do
       edge = min(reach, max(-reach, edge))
-      do piece = pieces + 2, pieces + 3
+      do piece = pieces + 2, size(edge)
          do other = piece, 2, -1
             if (edge(other) >= edge(other - 1)) exit
             swap = edge(other)
@@ -255,8 +257,9 @@ contains
       end do
 
       average = 0.0_wp
-      do piece = 1, pieces + 2
+      do piece = 1, size(edge) - 1
          length = edge(piece + 1) - edge(piece)
+         if (length <= 0.0_wp) cycle
          do node = 1, points
             z = edge(piece) + length * self%point(node)
             average = average + length * self%weight(node) * exp(-0.5_wp * z**2) / sqrt_2_pi &

@@ -58,6 +58,8 @@ module mesoslip_contact_populations
    real(wp), parameter :: patience = 1.5_wp
    !> Times beyond which nothing is expected [s]
    real(wp), parameter :: longest_time = 1.0e30_wp
+   !> Stretch beyond which the cells of the initial states of wide laws grow with it
+   real(wp), parameter :: shortest_even = 0.02_wp
    !> A gap that counts as none, over the length of a step.
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
@@ -170,8 +172,8 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
-      real(wp) :: longest, total, back, cell, middle
-      integer :: cells, place, rows
+      real(wp) :: longest, total, back, cell, middle, edge, even
+      integer :: rows
 
       associate (parameters => self%parameters, moments => self%moments(1))
          rows = size(self%population, 1)
@@ -181,11 +183,16 @@ contains
             back = 0.0_wp
             if (state == initial_steady) back = parameters%back_force_ratio
             longest = breaking_distance(parameters%coupling, back, moments%greatest)
-            cells = max(1, min(rows / 2, ceiling(longest * self%stretch / self%step)))
-            cell = longest / cells
-            do place = 1, cells
-               middle = (place - 0.5_wp) * cell
-               call self%add_population(-middle * self%stretch, back, 1.0_wp, &
+            edge = 0.0_wp
+            even = 1.0_wp
+            if (parameters%law%width > widest_spread) even = shortest_even
+            do while (edge < longest .and. self%count < rows - 1)
+               ! The tails of wide laws are spread over many stretches, and smooth, and many of their
+               ! thresholds are small.
+               cell = min(self%step / self%stretch * max(even, edge), longest - edge)
+               middle = edge + 0.5_wp * cell
+               edge = edge + cell
+               call self%add_population(-middle * self%stretch, back, cell, &
                   & merge(1, 2, state == initial_steady), &
                   & broken_threshold(parameters%coupling, back, middle), 0.0_wp)
             end do
@@ -309,8 +316,8 @@ contains
          window%end_time = min(window%end_time, pose%time + patience * duration)
       end if
 
-      window%upper = self%ahead
-      window%lower = self%behind
+      window%upper = max(self%ahead, pose%displacement)
+      window%lower = min(self%behind, pose%displacement)
       if (breaks .or. births > 0.0_wp) then
          window%upper = min(window%upper, pose%displacement + self%step)
          window%lower = max(window%lower, pose%displacement - self%step)
@@ -329,7 +336,8 @@ contains
       end if
 
       ! What an observer sees in the step is its middle; the step may end before all breaks.
-      part = min(1.0_wp, (window%end_time - pose%time) / duration)
+      part = 0.0_wp
+      if (duration < longest_time) part = min(1.0_wp, (window%end_time - pose%time) / duration)
       self%detached_count = max(0.0_wp, self%detached_number%total() &
          & + 0.5_wp * (part * self%trial_breaks - births))
       law = self%law()

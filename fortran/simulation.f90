@@ -40,6 +40,8 @@ module mesoslip_simulation
       logical :: finished = .false.
 
       integer, private :: stage = 1
+      !> Advances since time or displacement changed
+      integer, private :: idle = 0
       real(wp), private :: start_energy = 0.0_wp
    contains
       !> Prepare the start of a run
@@ -84,10 +86,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       integer(i8) :: advance
-      integer :: idle
       real(wp) :: time, displacement
 
-      idle = 0
       do advance = 1, most_advances
          if (self%finished) exit
          if (.not. (self%recorder%has_room() .and. self%contacts%has_room())) exit
@@ -100,10 +100,10 @@ contains
          end if
          if (self%slider%time > time &
             & .or. abs(self%slider%displacement - displacement) > 0.0_wp) then
-            idle = 0
+            self%idle = 0
          else
-            idle = idle + 1
-            if (idle > most_idle_advances) then
+            self%idle = self%idle + 1
+            if (self%idle > most_idle_advances) then
                call raise(error, status_stalled, "the motion makes no progress: contacts break "// &
                   & "and attach again without end at one displacement")
                return
@@ -194,6 +194,7 @@ contains
       call self%contacts%exchange(archive)
       call self%recorder%exchange(archive)
       call archive%exchange(self%stage)
+      call archive%exchange(self%idle)
       call archive%exchange(self%start_energy)
       call archive%exchange(self%advances)
       call archive%exchange(self%finished)

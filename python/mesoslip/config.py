@@ -46,6 +46,9 @@ NOT_YET_KEYS = {
 }
 NOT_YET_VALUES = {"slider.kind": ("quasistatic",)}
 
+# Step of the master equation over the mean breaking stretch that can be followed.
+FINEST = 2e-5
+
 # Work of a run by series, steps times layers, beyond which stiff formulas take over.
 MOST_SERIES_WORK = 1e11
 
@@ -227,6 +230,8 @@ class LayeredSlider(Table):
         """
         if self.solver.method != "auto":
             return self.solver.method
+        if config.run.engine == "me":
+            return "series"
         mass = self.mass / self.layers
         drag = config.contacts.count * config.contacts.contact_drag
         rate = 2 * self.layers * self.omega_s
@@ -514,6 +519,29 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
             config.curve.newborn_width,
         )
 
+    if config.curve.newborn_width > 0 and config.contacts.initial == "steady":
+        yield (
+            "curve.newborn_width",
+            'must be 0 with contacts.initial = "steady", the state of contacts without a spread',
+            config.curve.newborn_width,
+        )
+    if isinstance(config.slider, LayeredSlider):
+        method = config.slider.solver.method
+        if config.run.engine == "me" and method not in {"auto", "series"}:
+            yield (
+                "slider.solver.method",
+                'must be "series" with engine "me", whose contacts change their law at every step',
+                method,
+            )
+    if config.run.engine == "me":
+        fineness = config.run.resolution * config.contacts.threshold.relative_width
+        if fineness < FINEST:
+            yield (
+                "run.resolution",
+                f"times the relative width of the thresholds must be at least {FINEST:g}, or there "
+                "are more populations than can be followed",
+                config.run.resolution,
+            )
     if config.output.layers and not isinstance(config.slider, LayeredSlider):
         yield "output.layers", 'is for slider.kind = "layered" only', True
 

@@ -132,7 +132,9 @@ class Realization:
         populations = 1 if self._is_exact else POPULATIONS
         if self.config.contacts.initial != "relaxed" and not self._is_exact:
             width = self.config.contacts.threshold.relative_width
-            populations = max(populations, int(8 / (self.config.run.resolution * width)))
+            populations = max(
+                populations, int(32 / (self.config.run.resolution * min(width, 0.35)))
+            )
         reals, integers = _core.state_sizes()
         self._state_real = np.zeros(reals)
         self._state_integer = np.zeros(integers, dtype=np.int64)
@@ -166,7 +168,14 @@ class Realization:
     def release(self) -> None:
         """Give back the memory of the state, of a realization that will not go on."""
         del self._record, self._detached, self._detached_contact
-        del self._trace, self._slip_trace, self._slip, self._population, self._packet, self._layer_trace
+        del (
+            self._trace,
+            self._slip_trace,
+            self._slip,
+            self._population,
+            self._packet,
+            self._layer_trace,
+        )
 
     @property
     def trace(self) -> Array:

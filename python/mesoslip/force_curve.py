@@ -23,6 +23,7 @@ from scipy.interpolate import BPoly
 from mesoslip import _core
 from mesoslip.contact_lives import checked, law_arguments, scales
 from mesoslip.derived import loading_rate
+from mesoslip.errors import ConfigError, Problem
 from mesoslip.store import program_attributes, variable
 from mesoslip.threshold import ThresholdLaw
 
@@ -35,8 +36,10 @@ Array = NDArray[np.float64]
 POINTS = 12
 # Width of the first panels over the spread of the break stretches.
 FIRST_WIDTH = 0.7
-# Multiplications that a solution may take, which is about a second.
+# Multiplications that a finer solution may take, which is about a second.
 MOST_WORK = 2e9
+# Panels that fit into memory.
+MOST_PANELS = 4_000_000
 
 
 # Units and meanings of what a curve is summed up in.
@@ -138,8 +141,8 @@ class ForceCurve:
 
     Raises
     ------
-    RunError
-        If the contacts have no law.
+    ConfigError
+        If the curve is too long for so narrow a threshold law.
     """
 
     def __init__(self, config: Config) -> None:
@@ -162,6 +165,19 @@ class ForceCurve:
         while True:
             begin = time.perf_counter()
             panels = math.ceil((length - start) / width)
+            if panels > MOST_PANELS:
+                raise ConfigError(
+                    [
+                        Problem(
+                            "",
+                            "curve.length",
+                            f"needs {panels:.1e} steps of the spread of the breaking stretches, of "
+                            f"which there may be {MOST_PANELS:.0e}: choose a shorter curve or a "
+                            "wider threshold law",
+                            self.length,
+                        )
+                    ]
+                )
             fine = _solve(arguments, start, width, panels)
             self.kernel_seconds += time.perf_counter() - begin
             if coarse is not None:
@@ -176,6 +192,7 @@ class ForceCurve:
         self._solution = fine
         self.panels = panels
         self.conservation_error = fine.conservation_error if self.config.contacts.reattach else 0.0
+        self.error = max(self.error, self.conservation_error)
 
     def _is_too_much(self, panels: int, width: float) -> bool:
         """Whether a solution would take too much work."""
@@ -306,12 +323,13 @@ class ForceCurve:
         spring = self._spring
         if math.isinf(spring):
             return ()
-        excess = self.slope(self.samples) + spring
+        samples = np.unique([*self.samples, self.K_star[1]])
+        excess = self.slope(samples) + spring
         changes = np.flatnonzero(np.diff(np.sign(excess)) != 0)
         scale = self._stretch
         points = []
         for place in changes:
-            low, high = self.samples[place : place + 2] / scale
+            low, high = samples[place : place + 2] / scale
             root = optimize.brentq(
                 lambda x: float(self.slope(x * scale)) + spring, low, high, xtol=1e-15
             )

@@ -111,7 +111,9 @@ def solve(
     """
     _, d_1, d_2, _ = coefficients
     if interval is None:
-        scale = 1.0 if equation == "melting" else min(1.0, (d_1 * max(d_2, 1.0)) ** -0.2)
+        scale = 1.0
+        if equation == "sequential":
+            scale = min(1.0, (d_1 * max(d_2, 1.0)) ** -0.2, 4 * end_displacement / d_1)
         interval = scale / SAMPLES
     samples = np.zeros((4, MOST_SAMPLES), order="F")
     count, ended, status, message = _core.onset(
@@ -133,7 +135,7 @@ def solve(
 def end_of_expansion(curve: ForceCurve) -> float:
     """Displacement from X_c [m] at which the expansion of F about X_c no longer describes it.
 
-    It is off by `EXPANSION_ERROR` of F_s there.
+    It is off by `EXPANSION_ERROR` of F_s there, unless the curve ends before.
     """
     critical = curve.critical_points[0]
     spring = float(getattr(curve.config.slider, "stiffness", math.nan))
@@ -198,9 +200,12 @@ def onset_of_slip(config: Config) -> xr.DataTree:
     drag = config.contacts.count * config.contacts.contact_drag / slider.mass / omega
     end = end_of_expansion(curve) * slider.stiffness / config.contacts.static_force
     solutions = {
-        "sequential": solve("sequential", coefficients, damping=damping, end_displacement=end),
-        "melting": solve("melting", coefficients, damping=damping, drag=drag),
+        "sequential": solve("sequential", coefficients, damping=damping, end_displacement=end)
     }
+    # A film that drags with more than D0 at the velocity of the drive does not let the force drop.
+    drops = coefficients[0] > drag * coefficients[1]
+    if drops:
+        solutions["melting"] = solve("melting", coefficients, damping=damping, drag=drag)
     attributes |= slip_times(coefficients, drag, omega) | {
         "omega_s": omega,
         "expansion_end": end,
@@ -208,8 +213,12 @@ def onset_of_slip(config: Config) -> xr.DataTree:
         "comment": "S46 ends where its expansion of the force is off by "
         f"{EXPANSION_ERROR:g} of the static force"
         + ("" if solutions["sequential"].ended else "; it did not come to that")
-        + "; S47 ends at the least spring force"
-        + ("" if solutions["melting"].ended else ", but did not come to that"),
+        + (
+            "; S47 has no solution with a drop, as the film drags with more than D0"
+            if not drops
+            else "; S47 ends at the least spring force"
+            + ("" if solutions["melting"].ended else ", but did not come to that")
+        ),
     }
     groups = {
         name: xr.DataTree(_dataset(one, asymptote(name, one.time, coefficients, drag)))

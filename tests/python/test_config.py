@@ -66,6 +66,11 @@ def problems(tables) -> list[str]:
         ("curve", {"length": -1}, ["curve.length", "greater than 0"]),
         ("curve", {"lengths": 1}, ["curve.lengths", "unknown key", "'length'"]),
         ("curve", {"tolerance": 0}, ["curve.tolerance", "greater than or equal"]),
+        (
+            "run",
+            {"engine": "me", "resolution": 1e-3, "duration": 12.0},
+            ["run.resolution", "populations"],
+        ),
         ("curve", {"newborn_width": "9 nm"}, ["curve.newborn_width", "spread"]),
         ("run__duration", "0 s", ["run.duration", "greater than 0"]),
         ("run__duration", None, ["run.duration", "needed"]),

@@ -218,8 +218,10 @@ def test_the_error_estimate_holds(klein):
 
 
 @pytest.mark.parametrize("coupling", ["scaled", "equal"])
-@pytest.mark.parametrize("initial", ["relaxed", "uniform", "steady"])
-@pytest.mark.parametrize("newborn_width", [0.0, 2e-10])
+@pytest.mark.parametrize(
+    ("initial", "newborn_width"),
+    [("relaxed", 0.0), ("uniform", 0.0), ("steady", 0.0), ("relaxed", 2e-10), ("uniform", 2e-10)],
+)
 def test_the_distribution_of_stretches(klein, coupling, initial, newborn_width):
     """Its integral is 1, and with equal stiffness its first moment is the force."""
     curve = ForceCurve(
@@ -267,3 +269,26 @@ def test_a_rough_law_tells_its_digits(klein):
     again = ForceCurve(klein(curve={"tolerance": 1e-4}, **dispersion(0.2, "uniform")))
     x = np.linspace(0, 19 * STRETCH, 1000)
     assert np.max(np.abs(curve.force(x) - again.force(x))) / FORCE <= again.error + curve.error
+
+
+@pytest.mark.parametrize("newborn_width", [9e-11, 9e-10, 2e-9])
+@pytest.mark.parametrize("width", [0.01, 0.2])
+def test_newborns_of_any_spread_are_conserved(klein, width, newborn_width):
+    curve = ForceCurve(klein(curve={"newborn_width": newborn_width}, **dispersion(width)))
+    assert curve.conservation_error < 1e-6
+    assert curve.error >= curve.conservation_error
+
+
+def test_a_spring_just_too_soft(klein):
+    """The two solutions next to K* are found however close they are."""
+    stiffness = ForceCurve(klein()).K_star[0]
+    curve = ForceCurve(klein(slider__stiffness=stiffness * (1 - 1e-8)))
+    assert not curve.stable
+    assert len(curve.critical_points) == 2
+
+
+def test_a_curve_too_long_is_refused(klein):
+    from mesoslip import ConfigError
+
+    with pytest.raises(ConfigError, match=r"curve\.length"):
+        ForceCurve(klein(curve={"length": 1.0}))

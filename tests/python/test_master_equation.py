@@ -229,3 +229,73 @@ def test_samples_do_not_change_a_run(klein):
     fine = finish(klein(output__interval=1e-3, **config))
     np.testing.assert_array_equal(coarse.trace[:, 1:], fine.trace[::10, 1:])
     assert np.array_equal(coarse.energy, fine.energy)
+
+
+def test_detached_contacts_attach_while_the_slider_rests(klein):
+    """A hold after fast sliding, when most contacts are detached, and a way back after it."""
+    stages = [(0.07, 2.4e-6), (0.05, 0.0), (0.1, -4e-7)]
+    changes = {
+        "run__duration": None,
+        "drive": {"stage": [{"duration": time, "velocity": speed} for time, speed in stages]},
+        "contacts__delay": 5e-3,
+        "contacts__coupling": "equal",
+        "contacts__back_force_ratio": 0.3,
+        "contacts__initial": "steady",
+        **PRESCRIBED,
+        **dispersion(0.17, "lognormal"),
+    }
+    exact = finish(klein(run__engine="me", **changes)).trace
+    contacts = finish(klein(contacts__count=100_000, **changes)).trace
+    assert np.sqrt(np.mean((exact[:, 5] - contacts[:, 5]) ** 2)) < 5e-3 * FORCE
+    np.testing.assert_allclose(exact[:, 6] / 4080, contacts[:, 6] / 1e5, atol=0.05)
+    resting = (exact[:, 0] > 0.08) & (exact[:, 0] < 0.11)
+    assert np.all(exact[resting, 6] < 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "width"), [("lognormal", 3.0), ("weibull", 0.8), ("gaussian", 0.1)]
+)
+@pytest.mark.parametrize("initial", ["steady", "uniform"])
+def test_initial_states_of_wide_laws(klein, law, width, initial):
+    """The force at the start is that of the force curve, however far the tail of a law reaches."""
+    config = klein(
+        run__engine="me",
+        run__duration=0.01,
+        contacts__coupling="equal",
+        contacts__back_force_ratio=0.0,
+        contacts__initial=initial,
+        **PRESCRIBED,
+        **dispersion(width, law),
+    )
+    expected = stationary_force(config) if initial == "steady" else 0.5 * FORCE
+    assert finish(config).trace[0, 5] == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("law", "width", "delay", "coupling"),
+    [
+        ("gaussian", 0.3, 1e-5, "scaled"),
+        ("weibull", 0.3, 1e-5, "scaled"),
+        ("exponential", 0.5, 5e-4, "scaled"),
+        ("lognormal", 0.2, 5e-4, "equal"),
+        ("uniform", 0.5, 0.0, "equal"),
+    ],
+)
+@pytest.mark.parametrize("initial", ["steady", "uniform", "relaxed"])
+def test_turning_points_do_not_stall(klein, law, width, delay, coupling, initial):
+    """Newborns of wide laws break at once, on whichever way the slider goes on."""
+    stages = [(0.1, 8e-7), (0.1, 3e-7), (0.05, 0.0), (0.2, -6e-7)]
+    realization = finish(
+        klein(
+            run__engine="me",
+            run__duration=None,
+            drive={"stage": [{"duration": time, "velocity": speed} for time, speed in stages]},
+            contacts__delay=delay,
+            contacts__coupling=coupling,
+            contacts__back_force_ratio=0.3,
+            contacts__initial=initial,
+            **dispersion(width, law),
+        )
+    )
+    assert realization.finished
+    assert abs(realization.energy_residual) < 0.01

@@ -107,3 +107,10 @@ def test_an_onset_needs_a_slider_that_can_slip(klein):
         mesoslip.onset(klein(slider={"kind": "prescribed"}))
     with pytest.raises(ConfigError, match="drive"):
         mesoslip.onset(klein(drive__velocity=0.0))
+
+
+def test_a_film_too_viscous_to_let_the_force_drop(klein):
+    tree = mesoslip.onset(klein(contacts__drag_rate=2e19))
+    assert set(tree.children) == {"sequential"}
+    assert "S47 has no solution" in tree.attrs["comment"]
+    assert "beta" not in tree.attrs

@@ -187,7 +187,7 @@ contains
             even = 1.0_wp
             if (parameters%law%width > widest_spread) even = shortest_even
             do while (edge < longest .and. self%count < rows - 1)
-               ! The tails of wide laws are spread over many stretches, and smooth, and many of their
+               ! The tails of wide laws are spread over many stretches, and smooth; many of their
                ! thresholds are small.
                cell = min(self%step / self%stretch * max(even, edge), longest - edge)
                middle = edge + 0.5_wp * cell

@@ -337,7 +337,9 @@ contains
 
       ! What an observer sees in the step is its middle; the step may end before all breaks.
       part = 0.0_wp
-      if (duration < longest_time) part = min(1.0_wp, (window%end_time - pose%time) / duration)
+      if (duration < longest_time) then
+         part = (min(window%end_time, pose%time + duration) - pose%time) / duration
+      end if
       self%detached_count = max(0.0_wp, self%detached_number%total() &
          & + 0.5_wp * (part * self%trial_breaks - births))
       law = self%law()

@@ -299,3 +299,20 @@ def test_turning_points_do_not_stall(klein, law, width, delay, coupling, initial
     )
     assert realization.finished
     assert abs(realization.energy_residual) < 0.01
+
+
+def test_the_mass_of_detached_contacts_is_that_of_those_which_broke(klein):
+    """Strong drag and a law whose mean threshold is not 1, as small ones cannot attach."""
+    changes = {
+        "run__duration": 0.15,
+        "drive__velocity": 2e-5,
+        "contacts__back_force_ratio": 0.3,
+        "contacts__initial": "steady",
+        "output__interval": 1e-4,
+        **PRESCRIBED,
+        **dispersion(0.8, "lognormal"),
+    }
+    config = klein(run__engine="me", contacts__drag_rate=2e14, **changes)
+    force = finish(config).trace[750:, 5].mean()
+    assert force == pytest.approx(stationary_force(config, 2e-5), rel=1e-3)
+    assert force > 1.1 * stationary_force(klein(contacts__drag_rate=0.0, **changes), 2e-5)

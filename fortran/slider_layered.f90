@@ -464,16 +464,18 @@ contains
       integer(c_int) :: status
 
       type(system_type), pointer :: system
-      real(c_double), pointer :: entries(:)
+      real(c_double), pointer :: start(:), entries(:)
       real(wp) :: spring, dashpot, base
       integer :: stride, upper, layer, last
 
       call c_f_pointer(user_data, system)
-      entries => FSUNBandMatrix_Data(matrix)
       stride = int(FSUNBandMatrix_LDim(matrix))
       upper = int(FSUNBandMatrix_StoredUpperBandwidth(matrix))
-      entries = 0.0_c_double
       last = system%parameters%layers
+      ! What SUNDIALS returns is a pointer to the first entry.
+      start => FSUNBandMatrix_Data(matrix)
+      call c_f_pointer(c_loc(start), entries, [stride * 2 * (last + 1)])
+      entries = 0.0_c_double
       spring = system%spring / system%layer_mass
       dashpot = system%dashpot / system%layer_mass
       do layer = 0, last

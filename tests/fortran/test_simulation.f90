@@ -13,6 +13,8 @@ program test_simulation
    use mesoslip_recorder, only: recorder_parameters_type, slip_length, slip_trace_length, &
       & trace_length
    use mesoslip_simulation, only: energy_length, simulation_type
+   use mesoslip_slider_layered, only: layered_parameters_type, slider_layered_type, &
+      & solver_adams, solver_bdf, solver_series
    use mesoslip_slider_prescribed, only: slider_prescribed_type
    use mesoslip_slider_rigid, only: slider_rigid_type
    use mesoslip_threshold_law, only: law_exponential, law_gaussian, new_threshold_law
@@ -29,6 +31,9 @@ program test_simulation
    call closes("gaussian", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed, .true.)
    call closes("exponential", law_exponential, 1.0_wp, coupling_equal, initial_steady, .true.)
    call closes("prescribed", law_exponential, 1.0_wp, coupling_scaled, initial_steady, .false.)
+   call elastic("series", solver_series, 1.0e-11_wp)
+   call elastic("Adams", solver_adams, 1.0e-4_wp)
+   call elastic("BDF", solver_bdf, 1.0e-3_wp)
    call goes_on()
    call finish()
 
@@ -58,6 +63,44 @@ contains
       call check(simulation%slider%origin + simulation%slider%displacement < 0.0_wp, &
          & "the slider comes back beyond its start: " // name)
    end subroutine closes
+
+   !> Layers on a base, damped, close the energy balance as well as their solver does.
+   subroutine elastic(name, solver, tolerance)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: solver
+      real(wp), intent(in) :: tolerance
+
+      integer, parameter :: number = 6
+      type(simulation_type) :: simulation
+      type(slider_layered_type), allocatable :: slider
+      type(error_type), allocatable :: error
+      real(wp), target :: state(number + 1, 2), layer_trace(number, rows)
+      real(wp) :: energy(energy_length)
+
+      call build(simulation, law_gaussian, 0.1_wp, coupling_scaled, .true.)
+      call simulation%recorder%attach(trace, slip_trace, slips, layer_trace)
+      allocate (slider)
+      slider%parameters = layered_parameters_type(layers=number, mass=1.47e-3_wp, &
+         & stiffness=97.0_wp, damping=20.0_wp, base_mass=5.0e-3_wp, base_stiffness=1.0e4_wp, &
+         & base_damping=10.0_wp, solver=solver, relative=1.0e-8_wp, absolute=1.0e-21_wp)
+      call slider%attach(state)
+      deallocate (simulation%slider)
+      call move_alloc(slider, simulation%slider)
+      call simulation%start(initial_relaxed)
+      call simulation%run(forever, error)
+      call check(.not. allocated(error) .and. simulation%finished, "layers come to the end: "//name)
+      energy = simulation%energy_balance()
+      call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, tolerance, &
+         & "energy balance of layers: " // name)
+      call check(simulation%contacts%breaks > count, "contacts break under layers: " // name)
+      call check(all(simulation%slider%integrator_counts() > 0) .neqv. solver == solver_series, &
+         & "CVODE counts its steps: " // name)
+      call check(abs(layer_trace(1, simulation%recorder%trace_count) &
+         & - trace(9, simulation%recorder%trace_count) &
+         & - trace(3, simulation%recorder%trace_count)) < 1.0e-15_wp, &
+         & "displacement is that of layer 1 relative to the base: " // name)
+      call simulation%slider%close()
+   end subroutine elastic
 
    !> A state that is put away after a few advances and taken up again goes on to the same numbers.
    subroutine goes_on()

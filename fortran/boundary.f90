@@ -4,24 +4,30 @@
 
 !> Run N contacts, or infinitely many, for some advances of the slider.
 subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, &
-   & coupling, reattach, law, relative_width, initial, seed, realization, slider_kind, mass, &
-   & spring, damping, layers, layer_damping, base, solver, tolerances, stages, stage_end, &
-   & stage_velocity, interval, slip_interval, slip_velocity, quiet_time, started, reals, integers, &
-   & state_real, state_integer, records, record, detached, detached_contact, resolution, &
+   & coupling, reattach, law, relative_width, initial, seed, realization, bond, lattice, columns, &
+   & lattice_rows, slider_kind, mass, spring, damping, layers, layer_damping, base, solver, tolerances, stages, stage_end, &
+   & stage_velocity, interval, slip_interval, slip_velocity, quiet_time, least_avalanche, &
+   & snapshot_size, most_avalanches, snapshot_times, snapshot_time, started, reals, integers, &
+   & state_real, state_integer, records, record, detached, detached_contact, tracked, track, &
+   & resolution, &
    & populations, population, packets, packet, layer_state, trace_capacity, trace, &
    & slip_trace_capacity, slip_trace, layers_recorded, layer_trace, slip_capacity, slips, &
-   & most_advances, rows, finished, full, time, breaks, detached_count, advances, integrator, &
-   & energy, status, message)
+   & avalanche_capacity, avalanches, snapshot_capacity, snapshot_contacts, snapshot_place, &
+   & snapshot, most_advances, rows, ending, full, time, breaks, detached_count, advances, integrator, &
+   & energy, avalanche_total, avalanche_slip, displacement, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type, raise, status_invalid
    use mesoslip_archive, only: archive_type
    use mesoslip_threshold_law, only: new_threshold_law
    use mesoslip_contact_ensemble, only: contact_ensemble_type, new_contact_ensemble
+   use mesoslip_contact_lattice, only: contact_lattice_type, interaction_type, new_contact_lattice
    use mesoslip_contact_populations, only: contact_populations_type, new_contact_populations
+   use mesoslip_contact_set, only: contact_arrays_type
    use mesoslip_contacts, only: contact_parameters_type
    use mesoslip_slider_layered, only: layered_parameters_type, slider_layered_type
    use mesoslip_slider_prescribed, only: slider_prescribed_type
+   use mesoslip_slider_quasistatic, only: slider_quasistatic_type
    use mesoslip_slider_rigid, only: slider_rigid_type
    use mesoslip_recorder, only: recorder_parameters_type
    use mesoslip_simulation, only: simulation_type
@@ -36,6 +42,10 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    real(8), intent(in) :: relative_width
    !> Key of the random numbers
    integer(8), intent(in) :: seed, realization
+   !> Stiffness of the bond between neighbours; code of their lattice, its columns and rows, all 0
+   !> for contacts without a place
+   real(8), intent(in) :: bond
+   integer, intent(in) :: lattice, columns, lattice_rows
    !> Kind of the slider, its mass, spring constant and damping rate
    integer, intent(in) :: slider_kind
    real(8), intent(in) :: mass, spring, damping
@@ -48,6 +58,12 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    real(8), intent(in) :: stage_end(stages), stage_velocity(stages)
    !> What to record
    real(8), intent(in) :: interval, slip_interval, slip_velocity, quiet_time
+   !> Least sizes of avalanches in the catalogue and with a snapshot, 0 for none; avalanches after
+   !> which the run is over, 0 for any number; times of snapshots
+   real(8), intent(in) :: least_avalanche, snapshot_size
+   integer(8), intent(in) :: most_avalanches
+   integer, intent(in) :: snapshot_times
+   real(8), intent(in) :: snapshot_time(snapshot_times)
    !> Whether the state is that of a run under way, rather than to be made
    integer, intent(in) :: started
    !> State of the run
@@ -58,6 +74,9 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    integer, intent(in) :: records
    real(8), intent(inout), target :: record(4, records), detached(3, records)
    integer, intent(inout), target :: detached_contact(records)
+   !> Contacts of the present avalanche: as many as contacts when they are on a lattice, or none
+   integer, intent(in) :: tracked
+   integer, intent(inout), target :: track(2, tracked)
    !> Populations and packets of detached contacts, for engine 2, and their resolution
    real(8), intent(in) :: resolution
    integer, intent(in) :: populations, packets
@@ -72,25 +91,36 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    integer, intent(in) :: layers_recorded
    real(8), intent(inout), target :: layer_trace(layers_recorded, trace_capacity)
    real(8), intent(inout), target :: slips(7, slip_capacity)
+   integer, intent(in) :: avalanche_capacity, snapshot_capacity, snapshot_contacts
+   real(8), intent(inout), target :: avalanches(10, avalanche_capacity)
+   real(8), intent(inout), target :: snapshot_place(3, snapshot_capacity)
+   real(8), intent(inout), target :: snapshot(3, snapshot_contacts, snapshot_capacity)
    !> Largest number of advances
    integer(8), intent(in) :: most_advances
-   !> Rows of trace, slip_trace and slips that were filled
-   integer, intent(out) :: rows(3)
-   !> Whether the run is over, or has no room for more populations; the time it has come to
-   integer, intent(out) :: finished, full
+   !> Rows of trace, slip_trace, slips, avalanches and snapshots that were filled
+   integer, intent(out) :: rows(5)
+   !> Why the run is over, 0 if it is not; whether there is no room for more populations; the time
+   !> it has come to
+   integer, intent(out) :: ending, full
    real(8), intent(out) :: time
    !> Terms of the energy balance; breaks and advances so far, contacts that are detached
    real(8), intent(out) :: energy(8), breaks, detached_count
    integer(8), intent(out) :: advances
    !> Steps, evaluations and failed steps of the slider's integrator in this call
    integer(8), intent(out) :: integrator(3)
+   !> Avalanches so far, and the slip in them; displacement of the slider
+   integer(8), intent(out) :: avalanche_total
+   real(8), intent(out) :: avalanche_slip, displacement
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
    integer, parameter :: engine_contacts = 1, engine_master_equation = 2
-   integer, parameter :: kind_rigid = 1, kind_prescribed = 2, kind_layered = 3
+   integer, parameter :: kind_rigid = 1, kind_prescribed = 2, kind_layered = 3, &
+      & kind_quasistatic = 4, kind_force = 5
    type(simulation_type) :: simulation
    type(contact_ensemble_type), allocatable :: ensemble
+   type(contact_lattice_type), allocatable :: neighbours
+   type(contact_arrays_type) :: arrays
    type(contact_populations_type), allocatable :: all
    type(slider_layered_type), allocatable :: elastic
    type(contact_parameters_type) :: parameters
@@ -99,7 +129,10 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    type(error_type), allocatable :: error
 
    rows = 0
-   finished = 0
+   ending = 0
+   avalanche_total = 0
+   avalanche_slip = 0.0_wp
+   displacement = 0.0_wp
    full = 0
    time = 0.0_wp
    breaks = 0.0_wp
@@ -128,9 +161,26 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    parameters%realization = realization
    select case (engine)
    case (engine_contacts)
-      allocate (ensemble)
-      call new_contact_ensemble(ensemble, parameters, record, detached, detached_contact, error)
-      call move_alloc(ensemble, simulation%contacts)
+      arrays%record => record
+      arrays%detached => detached
+      arrays%detached_contact => detached_contact
+      ! Without a bond contacts know nothing of each other, wherever they are.
+      if (bond > 0.0_wp) then
+         allocate (neighbours)
+         call new_contact_lattice(neighbours, parameters, &
+            & interaction_type(bond, lattice, columns, lattice_rows), arrays, error)
+         neighbours%track%columns = columns
+         neighbours%track%rows = lattice_rows
+         neighbours%track%contact => track
+         call move_alloc(neighbours, simulation%contacts)
+      else
+         allocate (ensemble)
+         call new_contact_ensemble(ensemble, parameters, arrays, error)
+         ensemble%track%columns = columns
+         ensemble%track%rows = lattice_rows
+         ensemble%track%contact => track
+         call move_alloc(ensemble, simulation%contacts)
+      end if
    case (engine_master_equation)
       allocate (all)
       call new_contact_populations(all, parameters, resolution, population, packet, error)
@@ -157,6 +207,11 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
          & base_damping=base(3), solver=solver, relative=tolerances(1), absolute=tolerances(2))
       call elastic%attach(layer_state)
       call move_alloc(elastic, simulation%slider)
+   case (kind_quasistatic)
+      allocate (simulation%slider, source=slider_quasistatic_type(stiffness=spring))
+   case (kind_force)
+      allocate (simulation%slider, source=slider_quasistatic_type())
+      simulation%under_force = .true.
    case default
       status = status_invalid
       message = "unknown kind of slider"
@@ -172,6 +227,11 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    recorder_parameters%contacts = count
    simulation%recorder%parameters = recorder_parameters
    call simulation%recorder%attach(trace, slip_trace, slips, layer_trace)
+
+   simulation%avalanches%parameters%least_size = least_avalanche
+   simulation%avalanches%parameters%snapshot_size = snapshot_size
+   if (most_avalanches > 0) simulation%avalanches%parameters%most_avalanches = most_avalanches
+   call simulation%avalanches%attach(avalanches, snapshot_place, snapshot, snapshot_time)
 
    archive%reals = state_real
    archive%integers = state_integer
@@ -192,10 +252,14 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    detached_count = simulation%contacts%detached_count
    advances = simulation%advances
    energy = simulation%energy_balance()
-   if (simulation%finished) finished = 1
+   ending = simulation%ending
+   avalanche_total = simulation%avalanches%avalanches
+   avalanche_slip = simulation%avalanches%slip
+   displacement = simulation%slider%origin + simulation%slider%displacement
    if (.not. simulation%contacts%has_room()) full = 1
    rows = [simulation%recorder%trace_count, simulation%recorder%slip_trace_count, &
-      & simulation%recorder%slip_count]
+      & simulation%recorder%slip_count, simulation%avalanches%avalanche_count, &
+      & simulation%avalanches%snapshot_count]
    archive = archive_type(reals=state_real, integers=state_integer, saving=.true.)
    call simulation%exchange(archive)
    state_real = archive%reals
@@ -210,8 +274,8 @@ subroutine state_sizes(reals, integers)
    implicit none
    integer, intent(out) :: reals, integers
 
-   reals = 64
-   integers = 32
+   reals = 96
+   integers = 48
 end subroutine state_sizes
 
 !> Thresholds, densities or survival probabilities of a threshold law.

@@ -6,6 +6,7 @@ module mesoslip_contacts
    use mesoslip_kinds, only: i8, wp
    use mesoslip_accumulator, only: accumulator_type
    use mesoslip_archive, only: archive_type
+   use mesoslip_errors, only: error_type
    use mesoslip_contact_mechanics, only: coupling_scaled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_threshold_law, only: threshold_law_type
@@ -13,6 +14,13 @@ module mesoslip_contacts
    private
 
    public :: contacts_type, contact_parameters_type
+   public :: extent_length, snapshot_length
+
+   !> Numbers of an avalanche's extent: contacts that broke, columns and rows around them,
+   !> generations
+   integer, parameter :: extent_length = 4
+   !> Numbers of a contact in a snapshot: stretch, force over threshold, generation
+   integer, parameter :: snapshot_length = 3
 
    !> What the contacts are made of.
    type :: contact_parameters_type
@@ -46,6 +54,8 @@ module mesoslip_contacts
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
+      !> Set when the contacts cannot go on
+      type(error_type), allocatable :: failure
    contains
       !> Prepare the contacts for the start of a run
       procedure(initialize_interface), deferred :: initialize
@@ -65,6 +75,10 @@ module mesoslip_contacts
       procedure(exchange_interface), deferred :: exchange
       !> Make anew what is derived from the state, after it was taken from an archive
       procedure(rebuild_interface), deferred :: rebuild
+      !> Extent of the avalanche that is over; it is forgotten
+      procedure :: take_extent
+      !> How the contacts are
+      procedure :: snapshot
    end type contacts_type
 
    abstract interface
@@ -166,5 +180,29 @@ module mesoslip_contacts
          real(wp), intent(in) :: displacement
       end subroutine rebuild_interface
    end interface
+
+contains
+
+   !> Extent of the avalanche that is over; nothing for contacts without a place.
+   subroutine take_extent(self, extent)
+      !> The contacts
+      class(contacts_type), intent(inout) :: self
+      !> Numbers in the order of extent_length
+      integer, intent(out) :: extent(extent_length)
+
+      extent = 0
+   end subroutine take_extent
+
+   !> How the contacts are; nothing for contacts that are not followed one by one.
+   pure subroutine snapshot(self, displacement, values)
+      !> The contacts
+      class(contacts_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Of each contact the numbers in the order of snapshot_length, shape (snapshot_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      values = 0.0_wp
+   end subroutine snapshot
 
 end module mesoslip_contacts

@@ -4,6 +4,7 @@ module mesoslip_simulation
    use mesoslip_errors, only: error_type, raise, status_stalled
    use mesoslip_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_avalanche_recorder, only: avalanche_recorder_type
    use mesoslip_contacts, only: contacts_type
    use mesoslip_slider, only: slider_type
    use mesoslip_recorder, only: recorder_type, most_samples_in_step
@@ -12,10 +13,23 @@ module mesoslip_simulation
 
    public :: simulation_type
    public :: energy_length
+   public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
    !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
    integer, parameter :: energy_length = 8
+
+   !> Why a run is over: it is not; the drive came to its end; there were as many avalanches as
+   !> wanted; no contact is left to break; contacts break under a force without end
+   integer, parameter :: ending_none = 0, ending_drive = 1, ending_avalanches = 2, &
+      & ending_broken = 3, ending_slides = 4
+
+   !> Time at which nothing happens
+   real(wp), parameter :: never = huge(1.0_wp)
+
+   !> Breaks of each contact in one avalanche, on average, from which on a slider under a force is
+   !> taken to slide for ever.
+   real(wp), parameter :: most_lives = 1000.0_wp
 
    !> The origin of displacements follows the slider when it is this many breaking stretches ahead.
    real(wp), parameter :: farthest_stretches = 64.0_wp
@@ -30,14 +44,18 @@ module mesoslip_simulation
       class(contacts_type), allocatable :: contacts
       !> The recorder
       type(recorder_type) :: recorder
+      !> The recorder of avalanches and snapshots
+      type(avalanche_recorder_type) :: avalanches
       !> Ends of the stages of the drive, shape (number of stages) [s]
       real(wp), allocatable :: stage_end(:)
       !> Velocities of the drive, shape (number of stages) [m/s]
       real(wp), allocatable :: stage_velocity(:)
       !> Advances of the slider so far
       integer(i8) :: advances = 0
-      !> Whether the end of the last stage was reached
-      logical :: finished = .false.
+      !> Whether the drive is a force
+      logical :: under_force = .false.
+      !> Why the run is over, an ending_ code
+      integer :: ending = ending_none
 
       integer, private :: stage = 1
       !> Advances since time or displacement changed
@@ -52,7 +70,7 @@ module mesoslip_simulation
       procedure :: energy_balance
       !> Put the state into an archive or take it out
       procedure :: exchange
-      procedure, private :: advance, follow
+      procedure, private :: advance, follow, finish, is_broken
    end type simulation_type
 
 contains
@@ -74,6 +92,7 @@ contains
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
       call self%recorder%record(self%slider, 0.0_wp, 0.0_wp)
+      call self%avalanches%see_response(self%slider, self%contacts, self%contacts%law())
    end subroutine start
 
    !> Go on for some advances, or until the recorder is full, or until the end.
@@ -89,13 +108,18 @@ contains
       real(wp) :: time, displacement
 
       do advance = 1, most_advances
-         if (self%finished) exit
-         if (.not. (self%recorder%has_room() .and. self%contacts%has_room())) exit
+         if (self%ending /= ending_none) exit
+         if (.not. (self%recorder%has_room() .and. self%contacts%has_room() &
+            & .and. self%avalanches%has_room())) exit
          time = self%slider%time
          displacement = self%slider%displacement
          call self%advance()
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
+            return
+         end if
+         if (allocated(self%contacts%failure)) then
+            error = self%contacts%failure
             return
          end if
          if (self%slider%time > time &
@@ -123,6 +147,10 @@ contains
 
       before = self%slider%pose()
       call self%contacts%offer(before, law, window)
+      if (self%is_broken(law, window)) then
+         call self%finish(ending_broken)
+         return
+      end if
       sampling = self%recorder%parameters%interval
       if (self%recorder%parameters%slip_interval > 0.0_wp) then
          sampling = min(sampling, self%recorder%parameters%slip_interval)
@@ -133,21 +161,55 @@ contains
       call self%slider%advance(law, window)
       self%advances = self%advances + 1
       if (allocated(self%slider%failure)) return
+      if (self%slider%unbound) then
+         call self%finish(ending_broken)
+         return
+      end if
       call self%recorder%record(self%slider, self%contacts%detached_count, self%contacts%breaks)
+      call self%avalanches%see_advance(self%slider, self%contacts)
+      if (self%avalanches%avalanches >= self%avalanches%parameters%most_avalanches) then
+         call self%finish(ending_avalanches)
+         return
+      end if
 
       call self%contacts%respond(before, self%slider%pose())
+      call self%avalanches%see_response(self%slider, self%contacts, law)
 
-      if (self%slider%time >= self%stage_end(self%stage)) then
+      if (self%slider%time >= self%stage_end(self%stage) .and. .not. self%avalanches%size > 0.0_wp) &
+         & then
          if (self%stage == size(self%stage_end)) then
-            self%finished = .true.
-            call self%recorder%finish(self%slider, self%contacts%breaks)
+            call self%finish(ending_drive)
             return
          end if
          self%stage = self%stage + 1
          call self%slider%drive(self%stage_velocity(self%stage))
       end if
+      if (self%avalanches%size > most_lives * self%contacts%parameters%count &
+         & .and. self%under_force) call self%finish(ending_slides)
       call self%follow()
    end subroutine advance
+
+   !> Whether no contact is left to break, in a run that would go on until one does.
+   pure function is_broken(self, law, window)
+      class(simulation_type), intent(in) :: self
+      type(interface_law_type), intent(in) :: law
+      type(window_type), intent(in) :: window
+      logical :: is_broken
+
+      is_broken = .not. (law%stiffness > 0.0_wp .or. window%end_time < never &
+         & .or. self%stage_end(self%stage) < never)
+   end function is_broken
+
+   !> The run is over.
+   subroutine finish(self, ending)
+      class(simulation_type), intent(inout) :: self
+      !> An ending_ code
+      integer, intent(in) :: ending
+
+      call self%avalanches%close(self%slider, self%contacts, self%slider%displacement)
+      call self%recorder%finish(self%slider, self%contacts%breaks)
+      self%ending = ending
+   end subroutine finish
 
    !> Move the origin of displacements along with the slider.
    subroutine follow(self)
@@ -197,7 +259,8 @@ contains
       call archive%exchange(self%idle)
       call archive%exchange(self%start_energy)
       call archive%exchange(self%advances)
-      call archive%exchange(self%finished)
+      call archive%exchange(self%ending)
+      call self%avalanches%exchange(archive)
       if (.not. archive%saving) call self%contacts%rebuild(self%slider%displacement)
    end subroutine exchange
 

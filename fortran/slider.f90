@@ -49,6 +49,13 @@ module mesoslip_slider
       real(wp) :: step_time = 0.0_wp
       !> Work done by the drive, and lost in the drag of contacts and in the slider's damping [J]
       type(accumulator_type) :: drive_work, drag_loss, damping_loss
+      !> Whether it has no inertia, and jumps to its equilibrium while the drive stands still
+      logical :: instant = .false.
+      !> Whether it came to its equilibrium in the last advance, and where [m]
+      logical :: settled = .false.
+      real(wp) :: rest_displacement = 0.0_wp
+      !> Set when nothing holds it any more
+      logical :: unbound = .false.
       !> Set when the slider cannot go on
       type(error_type), allocatable :: failure
    contains
@@ -224,6 +231,7 @@ contains
       call archive%exchange(self%drive_work)
       call archive%exchange(self%drag_loss)
       call archive%exchange(self%damping_loss)
+      call archive%exchange(self%rest_displacement)
    end subroutine exchange_slider
 
 end module mesoslip_slider

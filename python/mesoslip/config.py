@@ -38,13 +38,16 @@ from mesoslip.units import to_si
 BYTES_PER_CONTACT = 150
 BYTES_PER_SAMPLE = 3 * 7 * 8
 
+# The same for a contact on a lattice, and for an avalanche in the catalogue.
+BYTES_PER_CONTACT_ON_LATTICE = 260
+BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
+
 # Tables and keys that the format knows and this version does not.
-NOT_YET_KEYS = {
-    "contacts": ("ageing",),
-    "drive": ("force_rate",),
-    "": ("interaction",),
-}
-NOT_YET_VALUES = {"slider.kind": ("quasistatic",)}
+NOT_YET_KEYS = {"contacts": ("ageing",)}
+
+# Stiffness of all bonds of a contact over its own, up to which its force keeps enough digits and
+# cascades of immediate rebirths come to an end.
+STRONGEST_BONDS = 1e6
 
 # Step of the master equation over the mean breaking stretch that can be followed.
 FINEST = 2e-5
@@ -53,7 +56,11 @@ FINEST = 2e-5
 MOST_SERIES_WORK = 1e11
 
 # Keys that exclude each other: laid over a base, one replaces the other.
-EXCLUSIVE = {"drive": ("velocity", "stage"), "slider": ("damping", "damping_ratio")}
+EXCLUSIVE = {
+    "run": ("duration", "drive_displacement", "avalanches"),
+    "drive": ("velocity", "stage", "force_rate"),
+    "slider": ("damping", "damping_ratio"),
+}
 
 
 def _quantity(unit: str, example: str) -> Any:
@@ -66,6 +73,7 @@ Mass = Annotated[float, _quantity("kg", "1.47 g")]
 Stiffness = Annotated[float, _quantity("N/m", "97 N/m")]
 Rate = Annotated[float, _quantity("1/s", "51.4 1/s")]
 Force = Annotated[float, _quantity("N", "18 uN")]
+ForceRate = Annotated[float, _quantity("N/s", "1 uN/s")]
 Area = Annotated[float, _quantity("m^2", "1e-10 m^2")]
 Length = Annotated[float, _quantity("m", "3.5 nm")]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3")]
@@ -84,10 +92,15 @@ def _problem(key: str, message: str) -> PydanticCustomError:
 
 
 class Run(Table):
-    """What is computed, for how long, and with which random numbers."""
+    """What is computed, for how long, and with which random numbers.
+
+    A run is over after its duration, or as soon as it has had as many avalanches as are wanted.
+    """
 
     engine: Literal["eq", "me"] = "eq"
     duration: Annotated[Time, Field(gt=0)] | None = None
+    drive_displacement: Annotated[Length, Field(gt=0)] | None = None
+    avalanches: Annotated[StrictInt, Field(ge=1, lt=2**62)] | None = None
     realizations: Annotated[StrictInt, Field(ge=1, lt=2**31)] = 1
     seed: Annotated[StrictInt, Field(ge=0, lt=2**63)] = 1
     resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
@@ -101,15 +114,22 @@ class Stage(Table):
 
 
 class Drive(Table):
-    """How the drive moves: one velocity, or stages one after another."""
+    """How the drive moves: one velocity, or stages one after another; or a force that grows."""
 
     velocity: Velocity | None = None
     stage: tuple[Stage, ...] | None = None
+    force_rate: ForceRate | None = None
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if (self.velocity is None) == (self.stage is None):
-            raise _problem("velocity", "give either a velocity or [[drive.stage]] tables")
+    def _one_of_them(self) -> Self:
+        if [self.velocity, self.stage, self.force_rate].count(None) != 2:
+            raise _problem(
+                "velocity",
+                "give either a velocity or [[drive.stage]] tables, or a force_rate to a "
+                "quasistatic slider",
+            )
+        if self.force_rate == 0:
+            raise _problem("force_rate", "must not be 0")
         if self.stage is not None and not self.stage:
             raise _problem("stage", "must have at least one stage")
         return self
@@ -250,10 +270,22 @@ class PrescribedSlider(Table):
     kind: Literal["prescribed"] = "prescribed"
 
 
+class QuasistaticSlider(Table):
+    """A block without inertia that follows the stable equilibrium of spring and contacts.
+
+    Its contacts attach at once and bear no drag, whatever their delay and film. A drive by force
+    needs no spring.
+    """
+
+    kind: Literal["quasistatic"] = "quasistatic"
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+
+
 SLIDERS: dict[str, type[Table]] = {
     "rigid": RigidSlider,
     "layered": LayeredSlider,
     "prescribed": PrescribedSlider,
+    "quasistatic": QuasistaticSlider,
 }
 
 
@@ -266,7 +298,8 @@ def _slider_kind(value: Any) -> Any:
 Slider = Annotated[
     Annotated[RigidSlider, Tag("rigid")]
     | Annotated[LayeredSlider, Tag("layered")]
-    | Annotated[PrescribedSlider, Tag("prescribed")],
+    | Annotated[PrescribedSlider, Tag("prescribed")]
+    | Annotated[QuasistaticSlider, Tag("quasistatic")],
     Discriminator(_slider_kind),
 ]
 
@@ -364,13 +397,40 @@ class Contacts(Table):
         return self.contact_mass * self.drag_rate
 
 
+class Interaction(Table):
+    """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
+
+    strength: Annotated[Number, Field(ge=0)]
+    lattice: Literal["triangular", "square"] = "triangular"
+    columns: Annotated[StrictInt, Field(ge=2)]
+    rows: Annotated[StrictInt, Field(ge=2)]
+
+    @model_validator(mode="after")
+    def _rows_match(self) -> Self:
+        if self.lattice == "triangular" and self.rows % 2:
+            raise _problem(
+                "rows",
+                "must be even on a triangular lattice without edges, whose odd rows are half a "
+                f"place aside (is {self.rows})",
+            )
+        return self
+
+    @property
+    def neighbours(self) -> int:
+        """Number of neighbours of a contact."""
+        return {"triangular": 6, "square": 4}[self.lattice]
+
+
 class Output(Table):
-    """What is recorded; a prescribed slider has no slips, whatever ``slip_interval``."""
+    """What is recorded; sliders without inertia have no slips, whatever ``slip_interval``."""
 
     interval: Annotated[Time, Field(gt=0)] | None = None
     slip_interval: Annotated[Time, Field(gt=0)] | None = None
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
     layers: StrictBool = False
+    avalanche_size: Annotated[StrictInt, Field(ge=1)] | None = None
+    snapshots: tuple[Annotated[Time, Field(ge=0)], ...] = ()
+    snapshot_size: Annotated[StrictInt, Field(ge=1)] | None = None
 
 
 class Curve(Table):
@@ -384,7 +444,8 @@ class Curve(Table):
 
 
 class DriveStage(NamedTuple):
-    """A stage of the drive as it is run."""
+    """A stage of the drive as it is run: its duration [s], and its velocity [m/s] or, for a drive
+    by force, the rate of the force [N/s]."""
 
     duration: float
     velocity: float
@@ -398,6 +459,7 @@ class Config(Table):
     drive: Drive
     slider: Slider
     contacts: Contacts
+    interaction: Interaction | None = None
     output: Output = Output()
     curve: Curve = Curve()
 
@@ -408,16 +470,56 @@ class Config(Table):
 
     @property
     def duration(self) -> float:
-        """Duration of the run [s]."""
+        """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
             return self.run.duration
-        return math.fsum(stage.duration for stage in self.drive.stage or ())
+        if self.run.drive_displacement is not None and self.drive.velocity:
+            return self.run.drive_displacement / abs(self.drive.velocity)
+        if self.drive.stage is not None:
+            return math.fsum(stage.duration for stage in self.drive.stage)
+        return math.inf
+
+    @property
+    def expected_duration(self) -> float:
+        """Duration of the run [s], or an estimate of it if only avalanches end it."""
+        if math.isfinite(self.duration):
+            return self.duration
+        contacts = self.contacts
+        if self.drive.force_rate is not None:
+            return contacts.static_force / abs(self.drive.force_rate)
+        stiffness = self.spring_stiffness
+        stretch = contacts.static_force / contacts.stiffness
+        loading = stretch + contacts.static_force / stiffness
+        # A break is followed by Nk/K others in the mean, or the slider would not keep up.
+        sliding = (self.run.avalanches or 0) * stretch / contacts.count
+        sliding *= 1 + contacts.stiffness / stiffness
+        return (loading + sliding) / abs(self.drive.velocity or math.nan)
+
+    @property
+    def bond_stiffness(self) -> float:
+        """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without interaction."""
+        contacts = self.contacts
+        if self.interaction is None or contacts.area is None:
+            return 0.0
+        spacing = math.sqrt(contacts.area / contacts.count)
+        return 3 * self.interaction.strength * contacts.contact_static_force / spacing
+
+    @property
+    def spring_stiffness(self) -> float:
+        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
+        return getattr(self.slider, "stiffness", math.inf) or 0.0
+
+    @property
+    def has_avalanches(self) -> bool:
+        """Whether avalanches are recorded: breaks may bring about others at once."""
+        return self.interaction is not None or isinstance(self.slider, QuasistaticSlider)
 
     @property
     def drive_stages(self) -> tuple[DriveStage, ...]:
         """Stages of the drive; the last one ends with the run."""
         if self.drive.stage is None:
-            return (DriveStage(self.duration, self.drive.velocity or 0.0),)
+            rate = self.drive.velocity if self.drive.force_rate is None else self.drive.force_rate
+            return (DriveStage(self.duration, rate or 0.0),)
         stages = []
         left = self.duration
         for stage, is_last in zip(
@@ -433,7 +535,7 @@ class Config(Table):
     @property
     def output_interval(self) -> float:
         """Interval of the trace [s]; a ten-thousandth of the run unless given."""
-        return self.output.interval or self.duration / 10000
+        return self.output.interval or self.expected_duration / 10000
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
@@ -494,9 +596,11 @@ class Config(Table):
 
 def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
     """What is wrong between tables: key, message, value."""
-    if config.duration <= 0:
-        yield "run.duration", "needed, as the drive has no stages", None
+    problems = [*_drive_checks(config)]
+    if problems:
+        yield from problems
         return
+    yield from _interaction_checks(config)
     interval = config.output_interval
     if interval > config.duration:
         yield "output.interval", f"must not exceed the duration, {config.duration:g} s", interval
@@ -550,13 +654,24 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
     for key, needed, value in (
         (
             "contacts.count",
-            BYTES_PER_CONTACT * config.contacts.count * together * (config.run.engine == "eq"),
+            (BYTES_PER_CONTACT if config.interaction is None else BYTES_PER_CONTACT_ON_LATTICE)
+            * config.contacts.count
+            * together
+            * (config.run.engine == "eq"),
             config.contacts.count,
+        ),
+        (
+            "output.snapshots",
+            BYTES_PER_CONTACT_IN_SNAPSHOT
+            * config.contacts.count
+            * len(config.output.snapshots)
+            * config.run.realizations,
+            f"{len(config.output.snapshots)} times",
         ),
         (
             "output.interval",
             (BYTES_PER_SAMPLE + 16 * getattr(config.slider, "layers", 0) * config.output.layers)
-            * config.duration
+            * config.expected_duration
             / interval
             * config.run.realizations,
             interval,
@@ -569,6 +684,110 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
                 f"{memory / 2**30:.3g} GiB",
                 value,
             )
+
+
+def _drive_checks(config: Config) -> Iterable[tuple[str, str, object]]:
+    """What is wrong with the drive and the length of the run: key, message, value."""
+    run, drive = config.run, config.drive
+    is_quasistatic = isinstance(config.slider, QuasistaticSlider)
+    if drive.force_rate is not None:
+        if not is_quasistatic:
+            yield "drive.force_rate", 'is for slider.kind = "quasistatic" only', drive.force_rate
+        elif config.slider.stiffness is not None:
+            yield (
+                "slider.stiffness",
+                "has no meaning with drive.force_rate, which acts on the slider without a spring",
+                config.slider.stiffness,
+            )
+    elif is_quasistatic and config.slider.stiffness is None:
+        yield "slider.stiffness", "missing; only a drive by force needs no spring", None
+    if run.drive_displacement is not None:
+        if not drive.velocity:
+            yield (
+                "run.drive_displacement",
+                "needs a drive.velocity that is not 0",
+                run.drive_displacement,
+            )
+        elif run.duration is not None:
+            yield (
+                "run.drive_displacement",
+                "give either this or run.duration",
+                run.drive_displacement,
+            )
+    if run.avalanches is not None:
+        if not config.has_avalanches:
+            yield (
+                "run.avalanches",
+                'needs [interaction] or slider.kind = "quasistatic": otherwise contacts break one '
+                "by one",
+                run.avalanches,
+            )
+        elif drive.velocity == 0:
+            yield "drive.velocity", "must not be 0 for a run that avalanches end", drive.velocity
+    if run.avalanches is None and config.duration == math.inf and run.drive_displacement is None:
+        if drive.force_rate is not None and not config.contacts.reattach:
+            return
+        yield "run.duration", "needed, as the drive has no stages", None
+    elif config.duration <= 0:
+        yield "run.duration", "needed, as the drive has no stages", None
+
+
+def _interaction_checks(config: Config) -> Iterable[tuple[str, str, object]]:
+    """What is wrong with interaction, avalanches and snapshots: key, message, value."""
+    contacts, interaction, output = config.contacts, config.interaction, config.output
+    if isinstance(config.slider, QuasistaticSlider) and config.run.engine == "me":
+        yield (
+            "slider.kind",
+            'needs engine "eq"; the force of infinitely many contacts over the displacement of a '
+            "slider without inertia is that of mesoslip curve",
+            config.slider.kind,
+        )
+    if interaction is None:
+        for key in ("snapshots", "snapshot_size"):
+            if getattr(output, key):
+                yield f"output.{key}", "needs [interaction], for the places of contacts", None
+        if output.avalanche_size is not None and not config.has_avalanches:
+            yield (
+                "output.avalanche_size",
+                'needs [interaction] or slider.kind = "quasistatic"',
+                output.avalanche_size,
+            )
+        return
+
+    if config.run.engine == "me":
+        yield (
+            "interaction",
+            'needs engine "eq": the master equation has no neighbours; in the mean, interaction '
+            "acts like a narrower law of thresholds (contacts.threshold.relative_width)",
+            None,
+        )
+    places = interaction.columns * interaction.rows
+    if places != contacts.count:
+        yield (
+            "interaction.columns",
+            f"times rows must be contacts.count: {interaction.columns} x {interaction.rows} = "
+            f"{places}, not {contacts.count}",
+            interaction.columns,
+        )
+    if contacts.area is None:
+        yield "contacts.area", "needed for the distance between neighbours, a = (A/N)^(1/2)", None
+    relative = interaction.neighbours * config.bond_stiffness / contacts.contact_stiffness
+    if relative > STRONGEST_BONDS:
+        strongest = interaction.strength * STRONGEST_BONDS / relative
+        yield (
+            "interaction.strength",
+            f"so strong that only {1 / relative:.1g} of a contact's force is not taken from its "
+            "neighbours: the force at which it attaches has no digits left, and a cascade of "
+            f"contacts that attach at once does not end; at most {strongest:.3g}",
+            interaction.strength,
+        )
+    times = output.snapshots
+    if list(times) != sorted(set(times)) or (times and times[-1] > config.duration):
+        yield (
+            "output.snapshots",
+            "must grow, up to the duration of the run",
+            list(times),
+        )
 
 
 def _problems(error: ValidationError, source: str) -> list[Problem]:
@@ -588,8 +807,10 @@ def _problem_of(details: ErrorDetails, source: str) -> Problem:
     if kind == "extra_forbidden":
         if name in NOT_YET_KEYS.get(table, ()):
             return Problem(source, _dotted(place), "not available in this version")
-        if table == "slider" and name in LayeredSlider.model_fields:
-            return Problem(source, _dotted(place), 'is for slider.kind = "layered" only')
+        kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
+        if table == "slider" and kinds:
+            named = " or ".join(f'"{kind}"' for kind in kinds)
+            return Problem(source, _dotted(place), f"is for slider.kind = {named} only")
         near = difflib.get_close_matches(name, _known_keys(place[:-1], details), 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         return Problem(source, _dotted(place), f"unknown key{hint}")
@@ -599,12 +820,7 @@ def _problem_of(details: ErrorDetails, source: str) -> Problem:
             expected = context["expected_tags"]
         else:
             expected = context["expected"]
-        not_yet = value in NOT_YET_VALUES.get(_dotted(place), ())
-        message = (
-            f"not available in this version; choose {expected}"
-            if not_yet
-            else (f"must be {expected}")
-        )
+        message = f"must be {expected}"
     elif kind == "value_error":
         message = str(context["error"])
     elif kind in {"model_type", "dict_type", "model_attributes_type", "union_tag_not_found"}:
@@ -634,6 +850,7 @@ def _known_keys(place: list[Any], details: ErrorDetails) -> list[str]:
         "solver": Solver,
         "cantilever": Cantilever,
         "contacts": Contacts,
+        "interaction": Interaction,
         "output": Output,
         "curve": Curve,
         "threshold": Threshold,

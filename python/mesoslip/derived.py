@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mesoslip.config import Config, LayeredSlider, PrescribedSlider, RigidSlider
+from mesoslip.config import Config, LayeredSlider, RigidSlider
 from mesoslip.contact_lives import scales
 
 
@@ -35,6 +35,8 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
 
 def _drive_speed(config: Config) -> float:
     """Speed of the first stage of the drive that moves [m/s]; 0 if none does."""
+    if config.drive.force_rate is not None:
+        return 0.0
     return next((abs(one.velocity) for one in config.drive_stages if one.velocity), 0.0)
 
 
@@ -42,7 +44,7 @@ def loading_rate(config: Config) -> float | None:
     """D1 = v_d √(KM)/F_s (S46) of the first stage that moves; None without one, or a spring."""
     slider = config.slider
     velocity = _drive_speed(config)
-    if velocity == 0 or isinstance(slider, PrescribedSlider):
+    if velocity == 0 or not isinstance(slider, RigidSlider | LayeredSlider):
         return None
     return velocity * math.sqrt(slider.stiffness * slider.mass) / config.contacts.static_force
 
@@ -102,7 +104,7 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
 
 def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
     slider, contacts = config.slider, config.contacts
-    if isinstance(slider, PrescribedSlider):
+    if not isinstance(slider, RigidSlider | LayeredSlider):
         return
     if isinstance(slider, LayeredSlider):
         yield from _layers(slider, contacts.count * contacts.contact_mass)

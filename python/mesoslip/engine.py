@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
-from mesoslip.config import LayeredSlider, PrescribedSlider, RigidSlider
+from mesoslip.config import LayeredSlider, QuasistaticSlider, RigidSlider
 from mesoslip.contact_lives import COUPLINGS, INITIAL_STATES
 from mesoslip.errors import RunError
 from mesoslip.threshold import LAWS
@@ -48,6 +48,19 @@ SLIP_COLUMNS = (
     "peak_velocity",
     "contacts_broken",
 )
+AVALANCHE_COLUMNS = (
+    "time",
+    "displacement",
+    "size",
+    "force_before",
+    "force_drop",
+    "slip",
+    "area",
+    "width",
+    "height",
+    "generations",
+)
+SNAPSHOT_COLUMNS = ("time", "displacement", "size")
 ENERGY_COLUMNS = (
     "drive_work",
     "slider_energy",
@@ -60,7 +73,15 @@ ENERGY_COLUMNS = (
 )
 
 ENGINES = {"eq": 1, "me": 2}
-SLIDERS = {"rigid": 1, "prescribed": 2, "layered": 3}
+SLIDERS = {"rigid": 1, "prescribed": 2, "layered": 3, "quasistatic": 4}
+FORCE_DRIVEN = 5
+LATTICES = {"triangular": 1, "square": 2}
+ENDINGS = {
+    1: "the drive came to its end",
+    2: "as many avalanches as wanted",
+    3: "no contact is left to break",
+    4: "contacts break under the force without end",
+}
 SOLVERS = {"series": 0, "adams": 1, "bdf": 2}
 
 # In a slip the slider exceeds the drive's velocity by this part of the scale Omega_S F_s/K.
@@ -69,12 +90,21 @@ SLIP_VELOCITY_RATIO = 0.02
 # Displacements below this part of the spring's extension under F_s do not matter to CVODE.
 TINY_STRETCH = 1e-6
 
+# The end of a drive that does not end: the greatest double.
+NEVER = float(np.finfo(np.float64).max)
+
 # Wall time of a segment, between two looks at progress and Ctrl-C [s].
 SEGMENT_SECONDS = 0.25
 SEGMENT_ADVANCES = 100_000
 # Rows of the buffers that a segment fills; each must hold the most samples of one advance twice.
 TRACE_ROWS = 20_000
 SLIP_ROWS = 2_000
+AVALANCHE_ROWS = 100_000
+# Numbers of contacts in the buffer of snapshots after avalanches, and most of them.
+SNAPSHOT_CONTACTS = 2_000_000
+SNAPSHOTS = 64
+# What no stretch can be: that of a detached contact.
+DETACHED = 1e300
 # Numbers kept for a population of the master equation, and for a packet of detached contacts.
 POPULATION_COLUMNS = 12
 PACKET_ROWS = 4
@@ -84,7 +114,7 @@ POPULATIONS = 4096
 
 def slip_velocity(config: Config) -> float:
     """Velocity above the drive's that makes a slip [m/s]; 0 for a slider without slips."""
-    if isinstance(config.slider, PrescribedSlider):
+    if not isinstance(config.slider, RigidSlider | LayeredSlider):
         return 0.0
     if config.output.slip_velocity is not None:
         return config.output.slip_velocity
@@ -98,17 +128,23 @@ class Realization:
 
     ``trace`` has shape (samples, 9) with the columns `TRACE_COLUMNS`, ``slips`` (slips, 7) with
     `SLIP_COLUMNS`, ``slip_trace`` (samples, 10): a trace and the number of the slip;
-    ``layer_trace`` (samples, layers) the displacements of layers, if the output asks for them.
+    ``layer_trace`` (samples, layers) the displacements of layers, if the output asks for them;
+    ``avalanches`` (avalanches, 10) with `AVALANCHE_COLUMNS`; ``snapshot_places`` (snapshots, 3) with
+    `SNAPSHOT_COLUMNS`, and ``snapshots`` (snapshots, contacts, 3): stretch, NaN if detached, force
+    over threshold, and generation in the avalanche that the snapshot was taken after.
     """
 
     config: Config
     number: int
     time: float = 0.0
-    finished: bool = False
+    ending: str = ""
     breaks: float = 0.0
     detached: float = 0.0
     advances: int = 0
     kernel_seconds: float = 0.0
+    avalanche_count: int = 0
+    avalanche_slip: float = 0.0
+    displacement: float = 0.0
     energy: Array = field(default_factory=lambda: np.full(len(ENERGY_COLUMNS), np.nan))
 
     def __post_init__(self) -> None:
@@ -116,6 +152,9 @@ class Realization:
         self._slip_traces: list[Array] = []
         self._slips: list[Array] = []
         self._layer_traces: list[Array] = []
+        self._avalanches: list[Array] = []
+        self._snapshot_places: list[Array] = []
+        self._snapshots: list[Array] = []
         self.integrator_counts = np.zeros(3, dtype=np.int64)
         self._started = False
         # Every segment orders the queue anew, which must cost little beside its advances.
@@ -151,6 +190,17 @@ class Realization:
         self._trace = np.empty((len(TRACE_COLUMNS), TRACE_ROWS), order="F")
         self._slip_trace = np.empty((len(TRACE_COLUMNS) + 1, TRACE_ROWS), order="F")
         self._slip = np.empty((len(SLIP_COLUMNS), SLIP_ROWS), order="F")
+        output = self.config.output
+        on_lattice = self.config.interaction is not None
+        self._track = np.zeros((2, count if on_lattice else 0), dtype=np.int32, order="F")
+        self._avalanche = np.empty(
+            (len(AVALANCHE_COLUMNS), AVALANCHE_ROWS if self.config.has_avalanches else 0), order="F"
+        )
+        room = 1 + len(output.snapshots)
+        if output.snapshot_size is not None:
+            room += min(SNAPSHOTS, SNAPSHOT_CONTACTS // count)
+        self._snapshot_place = np.empty((len(SNAPSHOT_COLUMNS), room), order="F")
+        self._snapshot = np.empty((3, count if on_lattice else 0, room), order="F")
 
     @property
     def _layers(self) -> int:
@@ -175,6 +225,9 @@ class Realization:
             self._population,
             self._packet,
             self._layer_trace,
+            self._track,
+            self._avalanche,
+            self._snapshot,
         )
 
     @property
@@ -201,6 +254,35 @@ class Realization:
         return np.concatenate([np.empty((0, layers)), *self._layer_traces])
 
     @property
+    def avalanches(self) -> Array:
+        return np.concatenate([np.empty((0, len(AVALANCHE_COLUMNS))), *self._avalanches])
+
+    @property
+    def snapshot_places(self) -> Array:
+        return np.concatenate([np.empty((0, len(SNAPSHOT_COLUMNS))), *self._snapshot_places])
+
+    @property
+    def snapshots(self) -> Array:
+        count = self.config.contacts.count
+        values = np.concatenate([np.empty((0, count, 3)), *self._snapshots])
+        values[values > DETACHED] = np.nan
+        return values
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over."""
+        return bool(self.ending)
+
+    @property
+    def part_done(self) -> float:
+        """Part of the run that is done, 0 to 1."""
+        if self.finished:
+            return 1.0
+        wanted = self.config.run.avalanches
+        by_avalanches = self.avalanche_count / wanted if wanted else 0.0
+        return min(1.0, max(by_avalanches, self.time / self.config.duration))
+
+    @property
     def energy_residual(self) -> float:
         """What the energy balance lacks, relative to the work of the drive or its largest term."""
         scale = abs(self.energy[0]) or float(np.max(np.abs(self.energy)))
@@ -220,9 +302,17 @@ class Realization:
         mass = spring = quiet_time = 1.0
         damping = layer_damping = 0.0
         base, tolerances, solver = (0.0, 0.0, 0.0), (1e-8, 1e-17), "series"
-        if not isinstance(slider, PrescribedSlider):
+        delay, drag = contacts.delay, contacts.contact_drag
+        kind, interaction, output = SLIDERS[slider.kind], config.interaction, config.output
+        if isinstance(slider, RigidSlider | LayeredSlider):
             mass, spring = slider.mass, slider.stiffness
             quiet_time = np.pi / slider.omega_s
+        if isinstance(slider, QuasistaticSlider):
+            delay, drag = 0.0, 0.0
+            if slider.stiffness is None:
+                kind = FORCE_DRIVEN
+            else:
+                spring = slider.stiffness
         if isinstance(slider, RigidSlider):
             damping = slider.damping_rate
         if isinstance(slider, LayeredSlider):
@@ -240,8 +330,8 @@ class Realization:
             count=contacts.count,
             static_force=contacts.contact_static_force,
             stiffness=contacts.contact_stiffness,
-            drag=contacts.contact_drag,
-            delay=contacts.delay,
+            drag=drag,
+            delay=delay,
             back_force_ratio=contacts.back_force_ratio,
             coupling=COUPLINGS[contacts.coupling],
             reattach=int(contacts.reattach),
@@ -250,7 +340,11 @@ class Realization:
             initial=INITIAL_STATES[contacts.initial],
             seed=config.run.seed,
             realization=self.number,
-            slider_kind=SLIDERS[slider.kind],
+            bond=config.bond_stiffness,
+            lattice=LATTICES[interaction.lattice] if interaction is not None else 0,
+            columns=interaction.columns if interaction is not None else 0,
+            lattice_rows=interaction.rows if interaction is not None else 0,
+            slider_kind=kind,
             mass=mass,
             spring=spring,
             damping=damping,
@@ -259,18 +353,23 @@ class Realization:
             base=np.array(base),
             solver=SOLVERS[solver],
             tolerances=np.array(tolerances),
-            stage_end=np.cumsum([stage.duration for stage in stages]),
+            stage_end=np.minimum(np.cumsum([stage.duration for stage in stages]), NEVER),
             stage_velocity=np.array([stage.velocity for stage in stages]),
             interval=config.output_interval,
             slip_interval=config.output.slip_interval or 0.0,
             slip_velocity=slip_velocity(config),
             quiet_time=quiet_time,
+            least_avalanche=float(output.avalanche_size or 1) * config.has_avalanches,
+            snapshot_size=float(output.snapshot_size or 0),
+            most_avalanches=config.run.avalanches or 0,
+            snapshot_time=np.array(output.snapshots, dtype=float),
             started=int(self._started),
             state_real=self._state_real,
             state_integer=self._state_integer,
             record=self._record,
             detached=self._detached,
             detached_contact=self._detached_contact,
+            track=self._track,
             resolution=config.run.resolution,
             population=self._population,
             packet=self._packet,
@@ -279,10 +378,14 @@ class Realization:
             trace=self._trace,
             slip_trace=self._slip_trace,
             slips=self._slip,
+            avalanches=self._avalanche,
+            snapshot_place=self._snapshot_place,
+            snapshot=self._snapshot,
             most_advances=segment,
         )
         seconds = time.perf_counter() - start
-        rows, finished, full, now, breaks, detached, made, counts, energy, status, message = results
+        rows, ending, full, now, breaks, detached, made, counts, energy = results[:9]
+        self.avalanche_count, self.avalanche_slip, self.displacement, status, message = results[9:]
         self.kernel_seconds += seconds
         # A segment may also end because a buffer is full; a longer one would be no use then.
         if self._grows and made - self.advances == segment and seconds < 0.5 * SEGMENT_SECONDS:
@@ -295,9 +398,12 @@ class Realization:
         self._layer_traces.append(self._layer_trace[:, : rows[0]].T.copy())
         self.integrator_counts += counts
         self._slips.append(self._slip[:, : rows[2]].T.copy())
+        self._avalanches.append(self._avalanche[:, : rows[3]].T.copy())
+        self._snapshot_places.append(self._snapshot_place[:, : rows[4]].T.copy())
+        self._snapshots.append(self._snapshot[:, :, : rows[4]].T.copy())
         if full:
             self._make_room()
-        self.finished = bool(finished)
+        self.ending = ENDINGS.get(ending, "")
         self.time, self.advances, self.energy = now, made, energy
         self.breaks = int(breaks) if self._is_exact else breaks
         self.detached = detached
@@ -349,7 +455,7 @@ def run_realizations(
 
     def report() -> None:
         if progress is not None:
-            progress(sum(one.time for one in realizations) / (config.duration * len(realizations)))
+            progress(sum(one.part_done for one in realizations) / len(realizations))
 
     with ThreadPoolExecutor(workers) as pool:
         pending = {pool.submit(finish, realization) for realization in realizations}

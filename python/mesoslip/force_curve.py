@@ -267,8 +267,8 @@ class ForceCurve:
 
     @property
     def _spring(self) -> float:
-        """K [N/m]; infinite for a prescribed slider."""
-        return float(getattr(self.config.slider, "stiffness", math.inf))
+        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
+        return self.config.spring_stiffness
 
     @cached_property
     def samples(self) -> Array:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mesoslip.catalogue import slips
-from mesoslip.config import Config, PrescribedSlider
+from mesoslip.config import Config
 from mesoslip.errors import FileError
 
 Array = NDArray[np.float64]
@@ -162,8 +162,8 @@ def force_curve(tree: xr.DataTree) -> Figure:
         slope.set_ylabel("$F'/Nk$")
         slope.set_xlabel("displacement $X k/f_s$")
         slope.set_xlim(0, x[-1])
-        if not isinstance(config.slider, PrescribedSlider):
-            spring = -config.slider.stiffness / contacts.stiffness
+        if np.isfinite(config.spring_stiffness):
+            spring = -config.spring_stiffness / contacts.stiffness
             slope.axhline(spring, color="tab:red", linestyle="--", label="$-K/Nk$")
             slope.legend(loc="lower right")
         if "X_c" in tree.attrs:

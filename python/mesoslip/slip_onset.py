@@ -138,7 +138,7 @@ def end_of_expansion(curve: ForceCurve) -> float:
     It is off by `EXPANSION_ERROR` of F_s there, unless the curve ends before.
     """
     critical = curve.critical_points[0]
-    spring = float(getattr(curve.config.slider, "stiffness", math.nan))
+    spring = curve.config.spring_stiffness
     start = critical.displacement
     x = curve.samples[curve.samples > start] - start
 

@@ -14,11 +14,11 @@ import numpy as np
 import xarray as xr
 
 from mesoslip import _build, _core, engine
-from mesoslip.config import Config, LayeredSlider
+from mesoslip.config import Config, Interaction, LayeredSlider, QuasistaticSlider
 from mesoslip.errors import FileError
 
 if TYPE_CHECKING:
-    from mesoslip.engine import Realization
+    from mesoslip.engine import Array, Realization
 
 # Name: units, long name.
 VARIABLES = {
@@ -43,6 +43,21 @@ VARIABLES = {
     "peak_velocity": ("m s-1", "greatest velocity of the slider in the slip"),
     "contacts_broken": ("1", "breaks of contacts in the slip"),
     "breaks": ("1", "breaks of contacts in the run"),
+    "avalanche_count": ("1", "number of avalanches in the run"),
+    "avalanche_slip": ("m", "displacement of the slider in avalanches, the drive standing still"),
+    "end_displacement": ("m", "displacement of the slider at the end of the run"),
+    "size": ("1", "breaks of contacts in the avalanche"),
+    "area": ("1", "contacts that broke in the avalanche, each counted once"),
+    "width": ("1", "columns of the smallest rectangle around the avalanche"),
+    "height": ("1", "rows of the smallest rectangle around the avalanche"),
+    "generations": ("1", "steps in which the contacts of the avalanche pushed over each other"),
+    "spans": ("1", "whether the avalanche leaves no column, or no row, untouched"),
+    "pinned": ("1", "whether the contact is pinned"),
+    "load": ("1", "force that breaks the contact over its threshold"),
+    "generation": ("1", "step of the avalanche in which the contact broke, 0 if it did not"),
+    "avalanche_size": ("1", "breaks in the avalanche before the snapshot, 0 at a chosen time"),
+    "x": ("m", "place of the contact along a row"),
+    "y": ("m", "place of the contact across the rows"),
     "energy_residual": ("1", "what the energy balance lacks, relative to the work of the drive"),
     "kernel_seconds": ("s", "computing time of the kernel"),
     "drive_work": ("J", "work done by the drive"),
@@ -73,6 +88,15 @@ VARIABLES = {
     "asymptote": ("1", "change of the spring force at short times over static force"),
 }
 
+
+# What some variables mean in the catalogue of avalanches.
+AVALANCHE_NAMES = {
+    "time": "time at which the first contact broke",
+    "displacement": "displacement of the slider at which the first contact broke",
+    "force_before": "contact force before the avalanche",
+    "force_drop": "drop of the contact force in the avalanche",
+    "slip": "displacement of the slider in the avalanche",
+}
 
 # What the output of each command holds.
 SUMMARIES = {
@@ -124,7 +148,8 @@ def build(
             "kernel_seconds": variable(
                 "kernel_seconds", each, [one.kernel_seconds for one in realizations]
             ),
-        },
+        }
+        | (avalanche_totals(realizations) if config.has_avalanches else {}),
         coords={
             "realization": variable("realization", each, [one.number for one in realizations]),
             "time": variable("time", ("time",), longest[:, 0]),
@@ -139,6 +164,10 @@ def build(
     groups = {"slips": slip_catalogue(realizations), "energy": energy_balance(realizations)}
     if config.output.slip_interval is not None and engine.slip_velocity(config) > 0:
         groups["slip_traces"] = slip_traces(config, realizations)
+    if config.has_avalanches:
+        groups["avalanches"] = avalanche_catalogue(config, realizations)
+    if config.output.snapshots or config.output.snapshot_size:
+        groups["snapshots"] = snapshots(config, realizations)
     if config.run.engine == "eq":
         for group, name in (("slips", "contacts_broken"), ("slip_traces", "detached_contacts")):
             if group in groups:
@@ -186,6 +215,88 @@ def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
         | {name: variable(name, ("slip",), values[name]) for name in order}
         | {"contacts_broken": variable("contacts_broken", ("slip",), values["contacts_broken"])}
     ).set_coords("realization")
+
+
+def avalanche_totals(realizations: Sequence[Realization]) -> dict[str, xr.Variable]:
+    """What each realization had of avalanches, those among them that are not in the catalogue."""
+    return {
+        name: variable(name, ("realization",), [value(one) for one in realizations])
+        for name, value in (
+            ("avalanche_count", lambda one: one.avalanche_count),
+            ("avalanche_slip", lambda one: one.avalanche_slip),
+            ("end_displacement", lambda one: one.displacement),
+        )
+    }
+
+
+def avalanche_catalogue(config: Config, realizations: Sequence[Realization]) -> xr.Dataset:
+    """All avalanches of all realizations, dimension ``avalanche``."""
+    rows = np.concatenate([one.avalanches for one in realizations])
+    owner = np.concatenate([np.full(len(one.avalanches), one.number) for one in realizations])
+    names = ["time", "displacement", "size", "force_before", "force_drop"]
+    if isinstance(config.slider, QuasistaticSlider):
+        names.append("slip")
+    if config.interaction is not None:
+        names += ["area", "width", "height", "generations"]
+    data = {}
+    for column, name in enumerate(engine.AVALANCHE_COLUMNS):
+        if name in names:
+            is_count = name in {"size", "area", "width", "height", "generations"}
+            values = rows[:, column].astype(np.int64 if is_count else np.float64)
+            data[name] = variable(name, ("avalanche",), values)
+    # The slip of an avalanche is a way, other than the number of a slip elsewhere.
+    for name, long_name in AVALANCHE_NAMES.items():
+        if name in data:
+            data[name].attrs["long_name"] = long_name
+    if "slip" in data:
+        data["slip"].attrs["units"] = "m"
+    if config.interaction is not None:
+        spans = data["width"].values == config.interaction.columns
+        spans |= data["height"].values == config.interaction.rows
+        data["spans"] = variable("spans", ("avalanche",), spans.astype(np.int8))
+    data["realization"] = variable("realization", ("avalanche",), owner)
+    return xr.Dataset(data).set_coords(["realization"])
+
+
+def snapshots(config: Config, realizations: Sequence[Realization]) -> xr.Dataset:
+    """The contacts on their lattice, dimensions ``snapshot``, ``row``, ``column``."""
+    interaction = config.interaction
+    assert interaction is not None and config.contacts.area is not None
+    places = np.concatenate([one.snapshot_places for one in realizations])
+    owner = np.concatenate([np.full(len(one.snapshot_places), one.number) for one in realizations])
+    values = np.concatenate([one.snapshots for one in realizations])
+    shape = (len(values), interaction.rows, interaction.columns)
+    stretch, load, generation = (values[..., part].reshape(shape) for part in range(3))
+    pinned = np.isfinite(stretch)
+    spacing = np.sqrt(config.contacts.area / config.contacts.count)
+    x, y = lattice_places(interaction)
+    where = ("snapshot", "row", "column")
+    return xr.Dataset(
+        {
+            "stretch": variable("stretch", where, stretch),
+            "load": variable("load", where, np.where(pinned, load, np.nan)),
+            "pinned": variable("pinned", where, pinned.astype(np.int8)),
+            "generation": variable("generation", where, generation.astype(np.int32)),
+            "displacement": variable("displacement", ("snapshot",), places[:, 1]),
+            "avalanche_size": variable(
+                "avalanche_size", ("snapshot",), places[:, 2].astype(np.int64)
+            ),
+        },
+        coords={
+            "realization": variable("realization", ("snapshot",), owner),
+            "time": variable("time", ("snapshot",), places[:, 0]),
+            "x": variable("x", ("row", "column"), spacing * x),
+            "y": variable("y", ("row", "column"), spacing * y),
+        },
+    )
+
+
+def lattice_places(interaction: Interaction) -> tuple[Array, Array]:
+    """Places of the contacts in units of their distance, each of shape (rows, columns)."""
+    row, column = np.indices((interaction.rows, interaction.columns), dtype=float)
+    if interaction.lattice == "square":
+        return column, row
+    return column + 0.5 * (row % 2), row * np.sqrt(0.75)
 
 
 def slip_traces(config: Config, realizations: Sequence[Realization]) -> xr.Dataset:
@@ -239,6 +350,7 @@ def attributes(
             if complete
             else f"interrupted; every realization came to {reached:.6g} s",
             "break_count": sum(one.breaks for one in realizations),
+            "ending": "; ".join(sorted({one.ending for one in realizations})),
             "advance_count": sum(one.advances for one in realizations),
             "energy_residual": residual,
             "wall_seconds": wall_seconds,

@@ -2,8 +2,9 @@
 !> taken up again.
 program test_simulation
    use mesoslip_archive, only: archive_type
-   use mesoslip_contact_ensemble, only: contact_ensemble_type, detached_length, &
-      & new_contact_ensemble
+   use mesoslip_avalanche_recorder, only: avalanche_length, snapshot_place_length
+   use mesoslip_contact_ensemble, only: contact_ensemble_type, new_contact_ensemble
+   use mesoslip_contact_set, only: contact_arrays_type, detached_length
    use mesoslip_contact_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
       & initial_steady
    use mesoslip_contact_record, only: record_length, row_stiffness
@@ -12,7 +13,7 @@ program test_simulation
    use mesoslip_kinds, only: i8, wp
    use mesoslip_recorder, only: recorder_parameters_type, slip_length, slip_trace_length, &
       & trace_length
-   use mesoslip_simulation, only: energy_length, simulation_type
+   use mesoslip_simulation, only: ending_drive, energy_length, simulation_type
    use mesoslip_slider_layered, only: layered_parameters_type, slider_layered_type, &
       & solver_adams, solver_bdf, solver_series
    use mesoslip_slider_prescribed, only: slider_prescribed_type
@@ -21,12 +22,14 @@ program test_simulation
    use testing, only: check, check_close, finish
    implicit none
 
-   integer, parameter :: count = 200, rows = 30000, reals = 64, integers = 32
+   integer, parameter :: count = 200, rows = 30000, reals = 96, integers = 48
    integer(i8), parameter :: forever = 1000000000_i8
    real(wp), target :: record(record_length, count), detached(detached_length, count)
    integer, target :: detached_contact(count)
    real(wp), target :: trace(trace_length, rows), slip_trace(slip_trace_length, rows)
    real(wp), target :: slips(slip_length, rows), layers(0, rows)
+   real(wp), target :: avalanches(avalanche_length, 1), place(snapshot_place_length, 1)
+   real(wp), target :: snapshot(0, 0, 1)
 
    call closes("gaussian", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed, .true.)
    call closes("exponential", law_exponential, 1.0_wp, coupling_equal, initial_steady, .true.)
@@ -54,7 +57,7 @@ contains
       call simulation%start(initial)
       call simulation%run(forever, error)
       energy = simulation%energy_balance()
-      call check(.not. allocated(error) .and. simulation%finished, "a run ends: " // name)
+      call check(.not. allocated(error) .and. simulation%ending == ending_drive, "a run ends: " // name)
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, 1.0e-11_wp, &
          & "energy balance: " // name)
       call check(simulation%contacts%breaks > count, "contacts break: " // name)
@@ -88,7 +91,7 @@ contains
       call move_alloc(slider, simulation%slider)
       call simulation%start(initial_relaxed)
       call simulation%run(forever, error)
-      call check(.not. allocated(error) .and. simulation%finished, "layers come to the end: "//name)
+      call check(.not. allocated(error) .and. simulation%ending == ending_drive, "layers come to the end: "//name)
       energy = simulation%energy_balance()
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, tolerance, &
          & "energy balance of layers: " // name)
@@ -127,10 +130,10 @@ contains
          call build(next, law_gaussian, 0.1_wp, coupling_scaled, .true.)
          call next%exchange(archive)
          simulation = next
-         if (simulation%finished) exit
+         if (simulation%ending == ending_drive) exit
       end do
       pieces = simulation%energy_balance()
-      call check(simulation%finished .and. segment > 10, "the segments come to the end")
+      call check(simulation%ending == ending_drive .and. segment > 10, "the segments come to the end")
       call check(all(abs(pieces - whole) <= 0.0_wp), "a run in segments is the same to the bit")
    end subroutine goes_on
 
@@ -141,6 +144,7 @@ contains
       real(wp), intent(in) :: width
       logical, intent(in) :: rigid
 
+      type(contact_arrays_type) :: arrays
       type(contact_ensemble_type), allocatable :: contacts
       type(contact_parameters_type) :: parameters
       type(recorder_parameters_type) :: recorder
@@ -155,8 +159,11 @@ contains
       parameters%back_force_ratio = 0.1_wp
       parameters%coupling = coupling
       parameters%seed = 1_i8
+      arrays%record => record
+      arrays%detached => detached
+      arrays%detached_contact => detached_contact
       allocate (contacts)
-      call new_contact_ensemble(contacts, parameters, record, detached, detached_contact, error)
+      call new_contact_ensemble(contacts, parameters, arrays, error)
       call move_alloc(contacts, simulation%contacts)
       simulation%stage_end = [0.03_wp, 0.05_wp, 0.15_wp]
       simulation%stage_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
@@ -172,6 +179,7 @@ contains
       end if
       simulation%recorder%parameters = recorder
       call simulation%recorder%attach(trace, slip_trace, slips, layers)
+      call simulation%avalanches%attach(avalanches, place, snapshot, [real(wp) ::])
    end subroutine build
 
 end program test_simulation

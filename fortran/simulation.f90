@@ -197,7 +197,7 @@ contains
       logical :: is_broken
 
       is_broken = .not. (law%stiffness > 0.0_wp .or. window%end_time < never &
-         & .or. self%stage_end(self%stage) < never)
+         & .or. self%stage_end(self%stage) < never .or. self%avalanches%size > 0.0_wp)
    end function is_broken
 
    !> The run is over.

@@ -94,6 +94,11 @@ class Contacts:
         self.due = np.full(count, np.nan)
         self.u = np.array([self.draw(contact) for contact in range(count)])
         self.sense = 1.0
+        self.bonds = np.zeros((count, count))
+        if self.config.interaction is not None:
+            self.bonds = bonds(self.config)
+        self.avalanches: list[tuple[float, list[int]]] = []
+        self.order: list[int] = []
 
     def draw(self, contact: int) -> float:
         seed = self.config.run.seed
@@ -133,23 +138,131 @@ class Contacts:
         stiffness, offset, drag = self.sums()
         return stiffness * x - offset + drag * v
 
+    def stretch(self, x: float) -> np.ndarray:
+        """Stretch of each contact, 0 for a detached one."""
+        return np.where(self.pinned, x - self.origin, 0.0)
+
+    def excess(self, x: float) -> np.ndarray:
+        """How far each contact is past where it breaks, its neighbours as they are [m]."""
+        step = self.config.contacts.static_force / self.config.contacts.stiffness
+        force = self.breaking_force(x)
+        rate = (self.breaking_force(x + step) - force) / step
+        over = np.abs(force) - self.u * self.config.contacts.contact_static_force
+        return np.where(self.pinned, over / np.where(self.pinned, rate, 1.0), -np.inf)
+
+    def breaking_force(self, x: float) -> np.ndarray:
+        """Force that breaks each contact, that of its neighbours included."""
+        stretch = self.stretch(x)
+        between = (self.bonds * (stretch[:, None] - stretch[None, :])).sum(axis=1)
+        return self.stiffness * stretch + between
+
     def act(self, x: float, v: float, time: float, slack: float = 0.0) -> None:
-        """Break and attach what is due at a displacement and time."""
+        """Break what is due at a displacement and time, and what that pushes over; attach."""
         contacts = self.config.contacts
         if v != 0:
             self.sense = math.copysign(1.0, v)
-        over = np.flatnonzero(self.pinned & (np.abs(x - self.origin) >= self.limit - slack))
-        for contact in over[np.argsort((self.limit - np.abs(x - self.origin))[over])]:
-            self.due[contact] = time + contacts.delay
-            self.events.append((time, int(contact)))
-        if not contacts.reattach:
-            return
-        for contact in np.flatnonzero(self.due <= time * (1 + 1e-15)):
-            self.renewal[contact] += 1
-            self.u[contact] = self.draw(contact)
-            back = contacts.back_force_ratio * contacts.contact_static_force
-            self.origin[contact] = x - self.sense * back / self.stiffness[contact]
-            self.due[contact] = np.nan
+        broken: list[int] = []
+        while True:
+            excess = self.excess(x)
+            over = np.flatnonzero(excess >= -slack)
+            if over.size:
+                # Those that break forward come first, then as far as they are past their places.
+                is_backward = self.breaking_force(x)[over] < 0
+                order = over[np.lexsort((-excess[over], is_backward))]
+                self.due[over] = time + contacts.delay
+                self.order += [int(contact) for contact in order]
+                broken += self.order[-len(order) :]
+                slack = 0.0
+                continue
+            is_due = self.due <= time * (1 + 1e-15)
+            if not (contacts.reattach and is_due.any()):
+                break
+            for contact in [contact for contact in self.order if is_due[contact]]:
+                self.order.remove(contact)
+                self.renewal[contact] += 1
+                self.u[contact] = self.draw(contact)
+                force = self.sense * contacts.back_force_ratio * contacts.contact_static_force
+                force += self.bonds[contact] @ self.stretch(x)
+                self.origin[contact] = x - force / (
+                    self.stiffness[contact] + self.bonds[contact].sum()
+                )
+                self.due[contact] = np.nan
+        self.events += [(time, contact) for contact in broken]
+        if broken:
+            self.avalanches.append((time, broken))
+
+
+def bonds(config: Config) -> np.ndarray:
+    """Stiffness of the bonds between contacts: G for each image of one at the distance a."""
+    interaction, contacts = config.interaction, config.contacts
+    height = math.sqrt(0.75) if interaction.lattice == "triangular" else 1.0
+    places = [
+        (column + (0.5 * (row % 2) if interaction.lattice == "triangular" else 0.0), row * height)
+        for row in range(interaction.rows)
+        for column in range(interaction.columns)
+    ]
+    spacing = math.sqrt(contacts.area / contacts.count)
+    bond = 3 * interaction.strength * contacts.contact_static_force / spacing
+    matrix = np.zeros((contacts.count, contacts.count))
+    for i, (x, y) in enumerate(places):
+        for j, (u, v) in enumerate(places):
+            for right in (-1, 0, 1):
+                for up in (-1, 0, 1):
+                    far = math.hypot(
+                        u - x + right * interaction.columns, v - y + up * interaction.rows * height
+                    )
+                    if abs(far - 1) < 1e-6:
+                        matrix[i, j] += bond
+    return matrix
+
+
+def quasistatic(config: Config, count: int) -> tuple[list[tuple[float, ...]], Contacts]:
+    """The first avalanches of a slider without inertia that moves forward.
+
+    For each the displacement of the drive (or its force), that of the slider at the start, breaks,
+    drop of the contact force, and slip.
+    """
+    at_once = config.contacts.model_copy(update={"delay": 0.0})
+    contacts = Contacts(config.model_copy(update={"contacts": at_once}))
+    spring = config.slider.stiffness or 0.0
+    is_force = config.slider.stiffness is None
+    drive = x = 0.0
+    avalanches = []
+
+    def crossing(low: float, high: float) -> float | None:
+        """Where the first contact breaks between two displacements."""
+        excess = contacts.excess(low), contacts.excess(high)
+        first = [
+            low + (high - low) * -a / (b - a)
+            for a, b in zip(*excess, strict=True)
+            if np.isfinite(a) and a < 0 <= b
+        ]
+        return min(first) if first else None
+
+    while len(avalanches) < count:
+        reach = 10 * config.contacts.static_force / config.contacts.stiffness
+        x = crossing(x, x + reach)
+        if x is None:
+            break
+        stiffness, offset, _ = contacts.sums()
+        drive = ((spring + stiffness) * x - offset) / (1 if is_force else spring)
+        before, start, broken = contacts.force(x, 0.0), x, 0
+        while x is not None:
+            contacts.act(x, 1.0, 0.0, slack=1e-12 * reach)
+            broken += len(contacts.avalanches[-1][1])
+            stiffness, offset, _ = contacts.sums()
+            pull = drive if is_force else spring * drive
+            if spring + stiffness == 0:
+                x = None
+                break
+            rest = (pull + offset) / (spring + stiffness)
+            x = crossing(x, rest)
+        if spring + stiffness == 0:
+            avalanches.append((drive, start, broken, before, np.nan))
+            break
+        x = rest
+        avalanches.append((drive, start, broken, before - contacts.force(x, 0.0), x - start))
+    return avalanches, contacts
 
 
 def matrix(config: Config, sums: tuple[float, float, float], velocity: float) -> np.ndarray:
@@ -216,10 +329,7 @@ def exact_events(config: Config, scan: float) -> Contacts:
 
         def excess(at: float, start=state, since=time, system=system) -> float:
             x = (linalg.expm(system * (at - since)) @ start)[0]
-            pinned = contacts.pinned
-            if not pinned.any():
-                return -1.0
-            return float(np.max(np.abs(x - contacts.origin)[pinned] - contacts.limit[pinned]))
+            return max(-1.0, float(np.max(contacts.excess(x))))
 
         if excess(end) >= 0:
             end = optimize.brentq(excess, time, end, xtol=1e-15, rtol=1e-15)

@@ -19,7 +19,7 @@ SOURCES := meson.build meson.options pyproject.toml \
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
 # Figures need the outputs of runs, but for S18, and two of other commands.
 FIGURE_RUNS := $(filter-out out/S18.nc,\
-  $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/S*.toml runs/limit-*.toml)))
+  $(patsubst runs/%.toml,out/%.nc,$(wildcard $(addprefix runs/,S*.toml limit-*.toml sizes-*.toml avalanche.toml bundle.toml))))
 FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc out/S19a.onset.nc out/S19b.onset.nc
 
 # meson and meson-python find ninja here.
@@ -97,6 +97,7 @@ $(FIGURE_OUTPUTS): runs/klein.toml
 out/S19a-me.nc: runs/S19a.toml
 out/S19b-me.nc: runs/S19b.toml
 $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/limit-*.toml)): runs/limit-me.toml
+out/avalanche.nc: runs/S25d.toml
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)

@@ -5,16 +5,16 @@
 !> Run N contacts, or infinitely many, for some advances of the slider.
 subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, &
    & coupling, reattach, law, relative_width, initial, seed, realization, bond, lattice, columns, &
-   & lattice_rows, slider_kind, mass, spring, damping, layers, layer_damping, base, solver, tolerances, stages, stage_end, &
-   & stage_velocity, interval, slip_interval, slip_velocity, quiet_time, least_avalanche, &
-   & snapshot_size, most_avalanches, snapshot_times, snapshot_time, started, reals, integers, &
+   & lattice_rows, slider_kind, mass, spring, damping, layers, layer_damping, base, solver, &
+   & tolerances, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
+   & quiet_time, least_avalanche, snapshot_size, most_avalanches, snapshot_times, snapshot_time, started, reals, integers, &
    & state_real, state_integer, records, record, detached, detached_contact, tracked, track, &
    & resolution, &
    & populations, population, packets, packet, layer_state, trace_capacity, trace, &
    & slip_trace_capacity, slip_trace, layers_recorded, layer_trace, slip_capacity, slips, &
    & avalanche_capacity, avalanches, snapshot_capacity, snapshot_contacts, snapshot_place, &
-   & snapshot, most_advances, rows, ending, full, time, breaks, detached_count, advances, integrator, &
-   & energy, avalanche_total, avalanche_slip, displacement, status, message)
+   & snapshot, most_advances, rows, ending, full, time, breaks, detached_count, advances, &
+   & integrator, energy, avalanche_total, avalanche_slip, displacement, status, message)
    !f2py threadsafe
    use mesoslip_kinds, only: wp
    use mesoslip_errors, only: error_type, raise, status_invalid

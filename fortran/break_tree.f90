@@ -26,8 +26,8 @@ module mesoslip_break_tree
       private
       !> Number of levels of nodes, and the place before the first of each; level 0 is the contacts
       integer :: levels = 0, before(0:most_levels) = 0
-      !> Displacement at which a contact, or the first one below a node, breaks when the slider moves
-      !> forward, and minus that when it moves backward, shape (places, 2)
+      !> Displacement at which a contact, or the first one below a node, breaks when the slider
+      !> moves forward, and minus that when it moves backward, shape (places, 2)
       real(wp), allocatable :: least(:, :)
    contains
       !> Put a contact in, or change it
@@ -88,8 +88,10 @@ contains
       !> Displacements at which it breaks, above and below [m]
       real(wp), intent(in) :: upper, lower
 
-      call change(self%least(:, forward), self%before, self%levels, contact, upper)
-      call change(self%least(:, backward), self%before, self%levels, contact, -lower)
+      associate (places => size(self%least, 1))
+         call change(places, self%least(:, forward), self%before, self%levels, contact, upper)
+         call change(places, self%least(:, backward), self%before, self%levels, contact, -lower)
+      end associate
    end subroutine set
 
    !> Take a contact out.
@@ -99,13 +101,13 @@ contains
       !> Number of the contact
       integer, intent(in) :: contact
 
-      call change(self%least(:, forward), self%before, self%levels, contact, never)
-      call change(self%least(:, backward), self%before, self%levels, contact, never)
+      call self%set(contact, never, -never)
    end subroutine remove
 
    !> Change a contact, and the nodes above for which that matters.
-   pure subroutine change(least, before, levels, contact, coordinate)
-      real(wp), intent(inout) :: least(*)
+   pure subroutine change(places, least, before, levels, contact, coordinate)
+      integer, intent(in) :: places
+      real(wp), intent(inout) :: least(places)
       integer, intent(in) :: before(0:most_levels), levels, contact
       real(wp), intent(in) :: coordinate
 
@@ -121,7 +123,8 @@ contains
          was_least = least(before(level) + node)
          if (.not. new < was_least) then
             if (old > was_least) return
-            new = least_of(least(before(level - 1) + (node - 1) * branches + 1))
+            new = least_of(least(before(level - 1) + (node - 1) * branches + 1: &
+               & before(level - 1) + node * branches))
             if (.not. (new < was_least .or. new > was_least)) return
          end if
          old = was_least
@@ -227,7 +230,7 @@ contains
 
    !> The contact that breaks first, in one direction.
    pure function first_of(least, before, levels) result(contact)
-      real(wp), intent(in) :: least(*)
+      real(wp), intent(in), contiguous :: least(:)
       integer, intent(in) :: before(0:most_levels), levels
       integer :: contact
 

@@ -70,16 +70,16 @@ contains
 
       neighbours = coordination(interaction%lattice)
       if (neighbours == 0 .or. interaction%columns * interaction%rows /= parameters%count) then
-         call raise(error, status_invalid, "columns times rows of the lattice must be the number "// &
-            & "of contacts")
+         call raise(error, status_invalid, "columns times rows of the lattice must be the number " &
+            & // "of contacts")
          return
       end if
       self%parameters = parameters
       self%arrays = arrays
       self%bond = interaction%bond
       self%bonds = real(neighbours, wp) * interaction%bond
-      allocate (self%neighbour(neighbours, parameters%count), self%generation(parameters%count), &
-         & stat=stat)
+      allocate (self%neighbour(neighbours, parameters%count), stat=stat)
+      if (stat == 0) allocate (self%generation(parameters%count), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the neighbours of contacts")
          return
@@ -138,9 +138,9 @@ contains
          call self%cascade(after%displacement, after%time)
          if (self%next_attachment > after%time) exit
          if (self%breaks - breaks > most_lives * self%parameters%count) then
-            call raise(self%failure, status_stalled, "a cascade of contacts that break and attach "// &
-               & "at once does not end: a delay (contacts.delay) or a weaker interaction "// &
-               & "(interaction.strength) would end it")
+            call raise(self%failure, status_stalled, "a cascade of contacts that break and " // &
+               & "attach at once does not end: a delay (contacts.delay) or a weaker " // &
+               & "interaction (interaction.strength) would end it")
             exit
          end if
          call self%attach_due(after%displacement, after%time, after%sense)
@@ -205,11 +205,11 @@ contains
 
       ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
       if (size(self%neighbour, 1) == 6) then
-         call refresh_all(self%neighbour(:, contact), 6, self%arrays%record, self%neighbour, &
-            & self%bond, self%tree)
+         call refresh_all(self%neighbour(:, contact), 6, self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, self%tree)
       else
-         call refresh_all(self%neighbour(:, contact), 4, self%arrays%record, self%neighbour, &
-            & self%bond, self%tree)
+         call refresh_all(self%neighbour(:, contact), 4, self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, self%tree)
       end if
    end subroutine refresh_neighbours
 
@@ -220,17 +220,17 @@ contains
 
       real(wp) :: centre, limit
 
-      call bearing(contact, size(self%neighbour, 1), self%arrays%record, self%neighbour, &
-         & self%bond, centre, limit)
+      call bearing(contact, size(self%neighbour, 1), self%parameters%count, self%arrays%record, &
+         & self%neighbour, self%bond, centre, limit)
       call self%tree%set(contact, centre + limit, centre - limit)
    end subroutine refresh
 
    !> Find out where the pinned ones of some contacts break.
-   pure subroutine refresh_all(contact, sides, record, neighbour, bond, tree)
-      !> Contacts, as many as a contact has neighbours
-      integer, intent(in) :: sides, contact(sides)
-      real(wp), intent(in) :: record(record_length, *)
-      integer, intent(in) :: neighbour(sides, *)
+   pure subroutine refresh_all(contact, sides, count, record, neighbour, bond, tree)
+      !> Contacts, as many as a contact has neighbours, of so many in all
+      integer, intent(in) :: sides, count, contact(sides)
+      real(wp), intent(in) :: record(record_length, count)
+      integer, intent(in) :: neighbour(sides, count)
       real(wp), intent(in) :: bond
       type(break_tree_type), intent(inout) :: tree
 
@@ -239,16 +239,16 @@ contains
 
       do side = 1, sides
          if (.not. record(row_stiffness, contact(side)) > 0.0_wp) cycle
-         call bearing(contact(side), sides, record, neighbour, bond, centre, limit)
+         call bearing(contact(side), sides, count, record, neighbour, bond, centre, limit)
          call tree%set(contact(side), centre + limit, centre - limit)
       end do
    end subroutine refresh_all
 
    !> Displacement at which a pinned contact bears no force, and how far from there it breaks.
-   pure subroutine bearing(contact, sides, record, neighbour, bond, centre, limit)
-      integer, intent(in) :: contact, sides
-      real(wp), intent(in) :: record(record_length, *)
-      integer, intent(in) :: neighbour(sides, *)
+   pure subroutine bearing(contact, sides, count, record, neighbour, bond, centre, limit)
+      integer, intent(in) :: contact, sides, count
+      real(wp), intent(in) :: record(record_length, count)
+      integer, intent(in) :: neighbour(sides, count)
       real(wp), intent(in) :: bond
       real(wp), intent(out) :: centre, limit
 
@@ -297,8 +297,8 @@ contains
       call self%tree%clear()
       do contact = 1, self%parameters%count
          if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(contact, size(self%neighbour, 1), self%arrays%record, self%neighbour, &
-            & self%bond, centre, limit)
+         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, centre, limit)
          call self%tree%put(contact, centre + limit, centre - limit)
       end do
       call self%tree%arrange()
@@ -320,8 +320,8 @@ contains
       call snapshot_set(self, displacement, values)
       do contact = 1, self%parameters%count
          if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(contact, size(self%neighbour, 1), self%arrays%record, self%neighbour, &
-            & self%bond, centre, limit)
+         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, centre, limit)
          values(2, contact) = (displacement - centre) / limit
       end do
    end subroutine snapshot

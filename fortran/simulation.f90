@@ -175,8 +175,9 @@ contains
       call self%contacts%respond(before, self%slider%pose())
       call self%avalanches%see_response(self%slider, self%contacts, law)
 
-      if (self%slider%time >= self%stage_end(self%stage) .and. .not. self%avalanches%size > 0.0_wp) &
-         & then
+      ! An avalanche under a slider without inertia has to end before a stage does.
+      if (self%slider%time >= self%stage_end(self%stage) &
+         & .and. .not. self%avalanches%size > 0.0_wp) then
          if (self%stage == size(self%stage_end)) then
             call self%finish(ending_drive)
             return

@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING, Any
 from mesoslip.errors import ConfigError, FileError, MesoslipError, RunError
 
 if TYPE_CHECKING:
-    from mesoslip.api import curve, figures, info, onset, plot, read, run, slips
+    from mesoslip.api import (
+        avalanche_summary,
+        avalanches,
+        curve,
+        figures,
+        info,
+        onset,
+        plot,
+        read,
+        run,
+        slips,
+    )
     from mesoslip.config import Config
     from mesoslip.force_curve import ForceCurve
     from mesoslip.threshold import ThresholdLaw
@@ -26,6 +37,8 @@ __all__ = [
     "MesoslipError",
     "RunError",
     "ThresholdLaw",
+    "avalanche_summary",
+    "avalanches",
     "curve",
     "figures",
     "info",
@@ -41,6 +54,8 @@ _LAZY = {
     "Config": "config",
     "ForceCurve": "force_curve",
     "ThresholdLaw": "threshold",
+    "avalanche_summary": "api",
+    "avalanches": "api",
     "curve": "api",
     "figures": "api",
     "info": "api",

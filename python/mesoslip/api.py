@@ -136,21 +136,95 @@ def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
     return catalogue.slips(_as_tree(output))
 
 
-def plot(output: PathLike | xr.DataTree, figure: PathLike) -> None:
-    """Draw an output of any command.
+def avalanches(
+    output: PathLike | xr.DataTree, *, after: float = 0.0, force_above: float | None = None
+) -> xr.Dataset:
+    """The catalogue of avalanches of an output, dimension ``avalanche``.
 
-    Of a run: spring force with one slip in an inset, velocity, detached contacts; of a force curve:
-    the force and its slope; of an onset of slip: the drop of the spring force.
+    See `mesoslip.avalanche_summary` for their statistics, and `mesoslip.avalanche_statistics` for
+    fits and histograms of sizes.
+
+    Parameters
+    ----------
+    output
+        Output of a run.
+    after
+        Only those that start after this time [s].
+    force_above
+        Only those before the greatest contact force, at more than this part of it.
 
     Raises
     ------
     FileError
-        If the output cannot be read or the figure not be written.
+        If the output cannot be read or has no avalanches.
     """
-    from mesoslip import plots
+    from mesoslip import avalanche_catalogue
+
+    return avalanche_catalogue.avalanches(_as_tree(output), after=after, force_above=force_above)
+
+
+def avalanche_summary(
+    output: PathLike | xr.DataTree,
+    *,
+    after: float = 0.0,
+    force_above: float | None = None,
+    smallest: int | None = None,
+) -> dict[str, float | None]:
+    """Statistics of the avalanches of an output, in SI, by the names that ``mesoslip avalanches``
+    explains.
+
+    Parameters
+    ----------
+    output, after, force_above
+        See `avalanches`.
+    smallest
+        Least size that a power law is fitted to; chosen by default.
+    """
+    from mesoslip import avalanche_catalogue
+
+    return avalanche_catalogue.statistics(
+        _as_tree(output), after=after, force_above=force_above, smallest=smallest
+    )
+
+
+def plot(
+    output: PathLike | xr.DataTree,
+    figure: PathLike,
+    *,
+    view: str | None = None,
+    snapshot: int | None = None,
+) -> None:
+    """Draw an output of any command.
+
+    Of a run: spring force with one slip in an inset, velocity, detached contacts; of a slider
+    without inertia: force and avalanches; of a force curve: the force and its slope; of an onset of
+    slip: the drop of the spring force.
+
+    Parameters
+    ----------
+    output
+        The output.
+    figure
+        The file. If its name ends in ``.gif`` it is an animation of the lattice: of the avalanche
+        that spreads before a snapshot, or of all snapshots.
+    view
+        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot.
+    snapshot
+        Number of the snapshot; that after the largest avalanche by default.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or does not have what is to be drawn, or the figure cannot be
+        written.
+    """
+    from mesoslip import avalanche_plots, plots
 
     tree = output if isinstance(output, xr.DataTree) else read(output)
-    plots.save(plots.draw(tree), Path(figure))
+    if Path(figure).suffix == ".gif":
+        avalanche_plots.animate(tree, Path(figure), snapshot)
+    else:
+        plots.save(plots.draw(tree, view, snapshot), Path(figure))
 
 
 def figures(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -78,12 +79,32 @@ def write_csv(tree: xr.DataTree, path: Path) -> None:
         If it cannot be written.
     """
     data = slips(tree)
-    header = {name: f"{name} [{data[name].attrs.get('units', '1')}]" for name in COLUMNS}
+    units = {name: data[name].attrs.get("units", "1") for name in COLUMNS}
+    write_table(rows(tree), units, path)
+
+
+def write_table(rows: Iterable[Mapping[str, Any]], units: Mapping[str, str], path: Path) -> None:
+    """Write a table as comma-separated values.
+
+    Parameters
+    ----------
+    rows
+        A dictionary for each row.
+    units
+        Unit of each column, for the header.
+    path
+        The file.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, COLUMNS)
-            writer.writerow(header)
-            writer.writerows(rows(tree))
+            writer = csv.DictWriter(file, list(units))
+            writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
+            writer.writerows(rows)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}") from error

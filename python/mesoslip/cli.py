@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,15 @@ import typer
 from mesoslip.errors import MesoslipError
 
 INTERRUPTED = 130
+
+
+class View(StrEnum):
+    """Pictures of a run."""
+
+    RUN = "run"
+    AVALANCHES = "avalanches"
+    LATTICE = "lattice"
+
 
 app = typer.Typer(
     name="mesoslip",
@@ -88,8 +98,11 @@ def run(
         raise typer.Exit(INTERRUPTED)
     store.write(tree, path)
     if not quiet:
+        found = f"{tree['slips'].sizes['slip']} slips"
+        if "avalanche_count" in tree.data_vars:
+            found = f"{int(tree.to_dataset()['avalanche_count'].sum())} avalanches, {found}"
         typer.echo(
-            f"{path}: {tree.attrs['break_count']:.0f} breaks, {tree['slips'].sizes['slip']} slips, "
+            f"{path}: {tree.attrs['break_count']:.0f} breaks, {found}, "
             f"energy balance to {abs(tree.attrs['energy_residual']):.0e}, "
             f"{tree.attrs['wall_seconds']:.2f} s",
             err=True,
@@ -230,18 +243,105 @@ def slips(
 
 
 @app.command()
+def avalanches(
+    output: OutputArgument,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
+    ] = None,
+    as_json: JsonOption = False,
+    smallest: Annotated[
+        int | None,
+        typer.Option(min=1, help="Least size for the fit; chosen by default", metavar="SIZE"),
+    ] = None,
+    after: Annotated[
+        str, typer.Option(help="Only those after a time, such as '2 s'", metavar="TIME")
+    ] = "0 s",
+    force_above: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            max=1,
+            help="Only those before the greatest contact force, at more than this part of it",
+            metavar="PART",
+        ),
+    ] = None,
+) -> None:
+    """Show sizes of avalanches: their distribution, and the law that fits it."""
+    from mesoslip import avalanche_catalogue, store
+    from mesoslip.avalanche_statistics import logarithmic_bins
+
+    tree = store.read_run(output)
+    start = _time(after, "--after")
+    data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)
+    if table is not None:
+        avalanche_catalogue.write_csv(data, table)
+    statistics = avalanche_catalogue.statistics(
+        tree, after=start, force_above=force_above, smallest=smallest
+    )
+    bins = logarithmic_bins(data["size"].values)
+    columns = (bins.edges[:, 0] + 0.5, bins.edges[:, 1] - 0.5, bins.count)
+    distribution = [
+        {"from": int(low), "to": int(high), "count": int(count), "density": density, "error": error}
+        for low, high, count, density, error in zip(
+            *columns, bins.density.tolist(), bins.density_error.tolist(), strict=True
+        )
+    ]
+    if as_json:
+        typer.echo(json.dumps({"statistics": statistics, "distribution": distribution}, indent=2))
+        return
+    typer.echo("       from         to      count        P(s)       error")
+    for one in distribution:
+        typer.echo(
+            f"{one['from']:11d}{one['to']:11d}{one['count']:11d}{one['density']:12.4g}"
+            f"{one['error']:12.2g}"
+        )
+    for name, value in statistics.items():
+        _show(name, value, *avalanche_catalogue.SUMMARY[name])
+
+
+def _time(text: str, option: str) -> float:
+    """A time given to an option [s]."""
+    from mesoslip.errors import ConfigError, Problem
+    from mesoslip.units import to_si
+
+    try:
+        return to_si(text, "s", "2 s")
+    except ValueError as error:
+        raise ConfigError([Problem("", option, str(error), text)]) from None
+
+
+@app.command()
 def plot(
     output: OutputArgument,
     figure: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Picture; beside the output by default", metavar="FIG"),
+        typer.Option(
+            "-o",
+            "--output",
+            help="Picture; beside the output by default; a .gif shows the lattice in motion",
+            metavar="FIG",
+        ),
+    ] = None,
+    view: Annotated[
+        View | None,
+        typer.Option(
+            help="Of a run: what happened, sizes of avalanches, contacts on their lattice"
+        ),
+    ] = None,
+    snapshot: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            help="Which snapshot of the lattice; that after the largest avalanche by default",
+            metavar="NUMBER",
+        ),
     ] = None,
 ) -> None:
     """Draw an output."""
-    from mesoslip import plots, store
+    from mesoslip import api
 
     path = figure or output.with_suffix(".png")
-    plots.save(plots.draw(store.read(output)), path)
+    api.plot(output, path, view=view.value if view is not None else None, snapshot=snapshot)
     typer.echo(str(path), err=True)
 
 

@@ -45,8 +45,8 @@ BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
 # Tables and keys that the format knows and this version does not.
 NOT_YET_KEYS = {"contacts": ("ageing",)}
 
-# Stiffness of all bonds of a contact over its own, up to which its force keeps enough digits and
-# cascades of immediate rebirths come to an end.
+# Stiffness of all bonds of a contact over its own, beyond which the force that breaks it, the
+# difference of what it and what its neighbours pull, has fewer than ten digits.
 STRONGEST_BONDS = 1e6
 
 # Step of the master equation over the mean breaking stretch that can be followed.
@@ -400,10 +400,21 @@ class Contacts(Table):
 class Interaction(Table):
     """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
 
-    strength: Annotated[Number, Field(ge=0)]
+    strength: Number
     lattice: Literal["triangular", "square"] = "triangular"
     columns: Annotated[StrictInt, Field(ge=2)]
     rows: Annotated[StrictInt, Field(ge=2)]
+
+    @model_validator(mode="after")
+    def _contacts_attach(self) -> Self:
+        if self.strength < 0:
+            raise _problem(
+                "strength",
+                "must not be negative, as neighbours repel each other: where they attract, "
+                "k + G z may be negative, and no stretch has the force at which a contact attaches "
+                f"(is {self.strength:g})",
+            )
+        return self
 
     @model_validator(mode="after")
     def _rows_match(self) -> Self:
@@ -689,18 +700,18 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
 def _drive_checks(config: Config) -> Iterable[tuple[str, str, object]]:
     """What is wrong with the drive and the length of the run: key, message, value."""
     run, drive = config.run, config.drive
-    is_quasistatic = isinstance(config.slider, QuasistaticSlider)
-    if drive.force_rate is not None:
-        if not is_quasistatic:
-            yield "drive.force_rate", 'is for slider.kind = "quasistatic" only', drive.force_rate
-        elif config.slider.stiffness is not None:
+    if isinstance(config.slider, QuasistaticSlider):
+        spring = config.slider.stiffness
+        if drive.force_rate is None and spring is None:
+            yield "slider.stiffness", "missing; only a drive by force needs no spring", None
+        elif drive.force_rate is not None and spring is not None:
             yield (
                 "slider.stiffness",
                 "has no meaning with drive.force_rate, which acts on the slider without a spring",
-                config.slider.stiffness,
+                spring,
             )
-    elif is_quasistatic and config.slider.stiffness is None:
-        yield "slider.stiffness", "missing; only a drive by force needs no spring", None
+    elif drive.force_rate is not None:
+        yield "drive.force_rate", 'is for slider.kind = "quasistatic" only', drive.force_rate
     if run.drive_displacement is not None:
         if not drive.velocity:
             yield (
@@ -776,9 +787,9 @@ def _interaction_checks(config: Config) -> Iterable[tuple[str, str, object]]:
         strongest = interaction.strength * STRONGEST_BONDS / relative
         yield (
             "interaction.strength",
-            f"so strong that only {1 / relative:.1g} of a contact's force is not taken from its "
-            "neighbours: the force at which it attaches has no digits left, and a cascade of "
-            f"contacts that attach at once does not end; at most {strongest:.3g}",
+            "so strong that a contact cannot attach: the force at which it does, (k + G z) x less "
+            f"the pull of its neighbours, is a difference of terms {relative:.1g} times as large, "
+            f"without digits enough; at most {strongest:.3g}",
             interaction.strength,
         )
     times = output.snapshots

@@ -129,9 +129,9 @@ class Realization:
     ``trace`` has shape (samples, 9) with the columns `TRACE_COLUMNS`, ``slips`` (slips, 7) with
     `SLIP_COLUMNS`, ``slip_trace`` (samples, 10): a trace and the number of the slip;
     ``layer_trace`` (samples, layers) the displacements of layers, if the output asks for them;
-    ``avalanches`` (avalanches, 10) with `AVALANCHE_COLUMNS`; ``snapshot_places`` (snapshots, 3) with
-    `SNAPSHOT_COLUMNS`, and ``snapshots`` (snapshots, contacts, 3): stretch, NaN if detached, force
-    over threshold, and generation in the avalanche that the snapshot was taken after.
+    ``avalanches`` (avalanches, 10) with `AVALANCHE_COLUMNS`; ``snapshot_places`` (snapshots, 3)
+    with `SNAPSHOT_COLUMNS`, and ``snapshots`` (snapshots, contacts, 3): stretch, NaN if detached,
+    force over threshold, and generation in the avalanche that the snapshot was taken after.
     """
 
     config: Config

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mesoslip.avalanche_catalogue import NO_AVALANCHES
 from mesoslip.catalogue import slips
 from mesoslip.config import Config
 from mesoslip.errors import FileError
@@ -225,17 +228,43 @@ def slip_onset(tree: xr.DataTree) -> Figure:
     return figure
 
 
-def draw(tree: xr.DataTree) -> Figure:
-    """A picture of an output of any command."""
-    if "spring_force" in tree.data_vars:
-        return overview(tree)
-    if "slope" in tree.data_vars:
-        return force_curve(tree)
-    return slip_onset(tree)
+def draw(tree: xr.DataTree, view: str | None = None, snapshot: int | None = None) -> Figure:
+    """A picture of an output of any command.
+
+    Parameters
+    ----------
+    tree
+        The output.
+    view
+        Of a run: "run", "avalanches" or "lattice"; by default what tells most.
+    snapshot
+        Number of the snapshot of a lattice; that after the largest avalanche by default.
+
+    Raises
+    ------
+    FileError
+        If the output does not have what is to be drawn.
+    """
+    from mesoslip import avalanche_plots
+
+    if "spring_force" not in tree.data_vars:
+        if view is not None:
+            raise FileError(f"the output is not one of mesoslip run: it has no view {view!r}")
+        return force_curve(tree) if "slope" in tree.data_vars else slip_onset(tree)
+    if view == "lattice":
+        return avalanche_plots.lattice(tree, snapshot)
+    if view == "avalanches":
+        if "avalanches" not in tree.children:
+            raise FileError(NO_AVALANCHES)
+        return avalanche_plots.distribution(tree)
+    if Config.from_toml(tree.attrs["configuration"]).slider.kind == "quasistatic":
+        return avalanche_plots.overview(tree)
+    return overview(tree)
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Save a figure; its name appears only when it is whole.
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """A file to write in the place of another, whose name appears only when it is whole.
 
     Raises
     ------
@@ -245,10 +274,22 @@ def save(figure: Figure, path: Path) -> None:
     part = path.with_name(f".part.{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(part)
+        yield part
         part.replace(path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"{path}: cannot be written: {reason}") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Save a figure.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written, or its ending names no kind of picture.
+    """
+    with written_whole(path) as part:
+        figure.savefig(part)

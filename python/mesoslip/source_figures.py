@@ -10,10 +10,11 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mesoslip import plots, store
+from mesoslip import avalanche_catalogue, avalanche_plots, avalanche_statistics, plots, store
 from mesoslip.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
 
@@ -267,6 +268,118 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+def interactions(trees: Sequence[xr.DataTree]) -> Figure:
+    """S25: the spring force for different strengths of the interaction."""
+    figure = Figure(figsize=(6.5, 1.4 * len(trees) + 0.5))
+    panels = _panels(figure, len(trees), 1)[:, 0]
+    for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
+        plots.draw_series(axes, tree, "spring_force", color="black")
+        axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
+        axes.set_ylabel("$F_d$ (µN)")
+        axes.set_xlim(0, tree["time"].max().item())
+    panels[-1].set_xlabel("time (s)")
+    return figure
+
+
+def detaching(trees: Sequence[xr.DataTree]) -> Figure:
+    """S26: detached contacts in the first slip for different strengths of the interaction."""
+    figure = Figure(figsize=(6.5, 4.2))
+    for letter, axes, tree in zip("abcd", figure.subplots(2, 2).flat, trees, strict=True):
+        plots.draw_series(
+            axes, tree, "detached_contacts", window=_first_slip(tree), time_unit=1e-3, color="black"
+        )
+        sizes = tree.children["avalanches"].to_dataset(inherit=False)["size"].values
+        axes.set_title(f"({letter}) {_strength(tree)}; largest: {sizes.max()}", loc="left")
+        axes.set_ylabel("$N_d$")
+        axes.set_xlabel("time in the first slip (ms)")
+    return figure
+
+
+def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
+    """S27: spring force and contact force in the first slip for each strength of interaction."""
+    figure = Figure(figsize=(6.5, 4.2))
+    all_axes = figure.subplots(2, 2).flat
+    for letter, axes, tree in zip("abcd", all_axes, trees, strict=True):
+        window = _first_slip(tree)
+        plots.draw_series(
+            axes, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT
+        )
+        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING)
+        axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
+        axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
+        axes.set_ylabel("force (µN)")
+        axes.set_xlabel("time in the first slip (ms)")
+    all_axes[0].legend()
+    return figure
+
+
+def _strength(tree: xr.DataTree) -> str:
+    interaction = configuration(tree).interaction
+    return rf"$\xi$ = {interaction.strength if interaction is not None else 0:g}"
+
+
+def _first_slip(tree: xr.DataTree) -> tuple[float, float]:
+    """Window from 2 ms before to 30 ms after the start of the first slip [s]."""
+    start = tree.children["slips"].to_dataset(inherit=False)["start_time"].values[0]
+    return start - 2e-3, start + 3e-2
+
+
+def spreading_avalanche(trees: Sequence[xr.DataTree]) -> Figure:
+    """An avalanche through the whole system as it spreads over the lattice, a part of it at each
+    stage."""
+    (tree,) = trees
+    snapshot = avalanche_plots.chosen_snapshot(tree)
+    generation = snapshot["generation"].values.astype(float)
+    stages = np.quantile(generation[generation > 0], (0.02, 0.2, 0.5, 1.0)).astype(int)
+    figure = Figure(figsize=(6.5, 6.2))
+    panels = figure.subplots(2, 2)
+    for axes, stage in zip(panels.flat, stages, strict=True):
+        broken = np.where((generation > 0) & (generation <= stage), generation, np.nan)
+        drawn = avalanche_plots.draw_contacts(
+            axes, snapshot, broken, cmap="inferno_r", norm=Normalize(1, generation.max())
+        )
+        count = np.count_nonzero(np.isfinite(broken))
+        axes.set_title(f"generation {stage}: {count} contacts", loc="left")
+    figure.colorbar(drawn, ax=panels, shrink=0.6, label="generation in which a contact breaks")
+    return figure
+
+
+def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
+    """Sizes of avalanches without interaction: a slider without inertia, and a fibre bundle."""
+    *sliders, bundle = trees
+    figure = Figure(figsize=(6.5, 3.2))
+    stationary, failing = figure.subplots(1, 2)
+    for tree, color in zip(sliders, ("tab:green", "tab:orange", "tab:red"), strict=True):
+        config = configuration(tree)
+        sizes = avalanche_catalogue.avalanches(tree)["size"].values
+        fit = avalanche_statistics.fit_power_law(sizes, smallest=10, replicas=0)
+        label = f"$K/Nk$ = {config.spring_stiffness / config.contacts.stiffness:g}"
+        if fit is not None:
+            label += rf": $\tau$ = {fit.exponent:.3f}, $s_c$ = {fit.cutoff:.3g}"
+        avalanche_plots.draw_distribution(stationary, sizes, fit, color=color, label=label)
+    for tree, force_above, color, exponent in (
+        (bundle, None, "black", 2.5),
+        (bundle, 0.999, "tab:blue", 1.5),
+    ):
+        bursts = avalanche_catalogue.avalanches(tree, force_above=force_above)
+        sizes = bursts["size"].values[~avalanche_catalogue.failures(tree, bursts)]
+        label = "all bursts" if force_above is None else f"above {force_above:g} of the strength"
+        avalanche_plots.draw_distribution(failing, sizes, color=color, label=label)
+        over = np.array([1.0, 300.0])
+        failing.loglog(over, over**-exponent, ":", color=color, label=f"$s^{{-{exponent:g}}}$")
+    over = np.array([1.0, 1e4])
+    stationary.loglog(over, 0.3 * over**-1.5, ":", color="black", label="$s^{-3/2}$")
+    stationary.set_title("sliding, stationary", loc="left")
+    failing.set_title("fibre bundle", loc="left")
+    for axes in (stationary, failing):
+        axes.set_xlabel("avalanche size $s$")
+        axes.set_ylabel("$P(s)$")
+        axes.set_ylim(bottom=1e-10)
+        axes.set_xlim(0.7, 3e5 if axes is stationary else 2e4)
+        axes.legend(loc="lower left")
+    return figure
+
+
 @dataclass(frozen=True)
 class SourceFigure:
     """A figure of the source: the runs it needs, and the function that draws it."""
@@ -285,10 +398,15 @@ FIGURES = {
     "S22": SourceFigure(("S22a", "S22b", "S22c", "S22d"), delays),
     "S23": SourceFigure(("S23a", "S23b", "S23c"), dispersions),
     "S24": SourceFigure(("S24a", "S24b"), layers),
+    "S25": SourceFigure(("S25a", "S25b", "S25c", "S25d"), interactions),
+    "S26": SourceFigure(("S25a", "S25b", "S25c", "S25d"), detaching),
+    "S27": SourceFigure(("S25a", "S25b", "S25c", "S25d"), interacting_slips),
     "S28": SourceFigure(("S28a", "S28b", "S28c"), viscosities),
     "limit": SourceFigure(
         ("limit-me", *(f"limit-{power}" for power in range(2, 7))), limit_of_many_contacts
     ),
+    "avalanche": SourceFigure(("avalanche",), spreading_avalanche),
+    "sizes": SourceFigure(("sizes-2000", "sizes-200", "sizes-20", "bundle"), avalanche_sizes),
 }
 
 

@@ -158,7 +158,8 @@ def build(
     )
     if config.output.layers:
         root = root.merge(layer_displacements(realizations))
-    if complete and config.run.engine == "eq":
+    # Where realizations end at different times, the shorter ones are filled with NaN.
+    if config.run.engine == "eq" and np.isfinite(root["detached_contacts"]).all():
         root["detached_contacts"] = root["detached_contacts"].astype(np.int32)
 
     groups = {"slips": slip_catalogue(realizations), "energy": energy_balance(realizations)}
@@ -219,14 +220,12 @@ def slip_catalogue(realizations: Sequence[Realization]) -> xr.Dataset:
 
 def avalanche_totals(realizations: Sequence[Realization]) -> dict[str, xr.Variable]:
     """What each realization had of avalanches, those among them that are not in the catalogue."""
-    return {
-        name: variable(name, ("realization",), [value(one) for one in realizations])
-        for name, value in (
-            ("avalanche_count", lambda one: one.avalanche_count),
-            ("avalanche_slip", lambda one: one.avalanche_slip),
-            ("end_displacement", lambda one: one.displacement),
-        )
+    totals = {
+        "avalanche_count": [one.avalanche_count for one in realizations],
+        "avalanche_slip": [one.avalanche_slip for one in realizations],
+        "end_displacement": [one.displacement for one in realizations],
     }
+    return {name: variable(name, ("realization",), values) for name, values in totals.items()}
 
 
 def avalanche_catalogue(config: Config, realizations: Sequence[Realization]) -> xr.Dataset:
@@ -255,13 +254,14 @@ def avalanche_catalogue(config: Config, realizations: Sequence[Realization]) -> 
         spans |= data["height"].values == config.interaction.rows
         data["spans"] = variable("spans", ("avalanche",), spans.astype(np.int8))
     data["realization"] = variable("realization", ("avalanche",), owner)
-    return xr.Dataset(data).set_coords(["realization"])
+    return xr.Dataset(data).set_coords(["realization", "time"])
 
 
 def snapshots(config: Config, realizations: Sequence[Realization]) -> xr.Dataset:
     """The contacts on their lattice, dimensions ``snapshot``, ``row``, ``column``."""
     interaction = config.interaction
-    assert interaction is not None and config.contacts.area is not None
+    assert interaction is not None
+    assert config.contacts.area is not None
     places = np.concatenate([one.snapshot_places for one in realizations])
     owner = np.concatenate([np.full(len(one.snapshot_places), one.number) for one in realizations])
     values = np.concatenate([one.snapshots for one in realizations])

@@ -57,7 +57,8 @@ contains
       call simulation%start(initial)
       call simulation%run(forever, error)
       energy = simulation%energy_balance()
-      call check(.not. allocated(error) .and. simulation%ending == ending_drive, "a run ends: " // name)
+      call check(.not. allocated(error) .and. simulation%ending == ending_drive, &
+         & "a run ends: " // name)
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, 1.0e-11_wp, &
          & "energy balance: " // name)
       call check(simulation%contacts%breaks > count, "contacts break: " // name)
@@ -91,7 +92,8 @@ contains
       call move_alloc(slider, simulation%slider)
       call simulation%start(initial_relaxed)
       call simulation%run(forever, error)
-      call check(.not. allocated(error) .and. simulation%ending == ending_drive, "layers come to the end: "//name)
+      call check(.not. allocated(error) .and. simulation%ending == ending_drive, &
+         & "layers come to the end: " // name)
       energy = simulation%energy_balance()
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, tolerance, &
          & "energy balance of layers: " // name)
@@ -133,7 +135,8 @@ contains
          if (simulation%ending == ending_drive) exit
       end do
       pieces = simulation%energy_balance()
-      call check(simulation%ending == ending_drive .and. segment > 10, "the segments come to the end")
+      call check(simulation%ending == ending_drive .and. segment > 10, &
+         & "the segments come to the end")
       call check(all(abs(pieces - whole) <= 0.0_wp), "a run in segments is the same to the bit")
    end subroutine goes_on
 

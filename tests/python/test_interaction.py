@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import mesoslip
 import numpy as np
 import pytest
 from mesoslip import Config

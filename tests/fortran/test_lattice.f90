@@ -1,0 +1,280 @@
+!> Contacts with a place: who breaks first, who is next to whom, how far an avalanche reaches.
+program test_lattice
+   use mesoslip_avalanche_track, only: avalanche_track_type, track_length
+   use mesoslip_break_tree, only: break_tree_type, new_break_tree
+   use mesoslip_contact_lattice, only: contact_lattice_type, interaction_type, &
+      & new_contact_lattice
+   use mesoslip_contact_mechanics, only: coupling_equal, initial_uniform
+   use mesoslip_contact_record, only: record_length, row_stiffness
+   use mesoslip_contact_set, only: contact_arrays_type, detached_length
+   use mesoslip_contacts, only: contact_parameters_type, extent_length
+   use mesoslip_errors, only: error_type
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_kinds, only: i8, wp
+   use mesoslip_lattice, only: coordination, find_neighbours, lattice_square, lattice_triangular
+   use mesoslip_random, only: uniform_pair
+   use mesoslip_threshold_law, only: law_gaussian, new_threshold_law
+   use testing, only: check, check_close, finish
+   implicit none
+
+   integer :: draws = 0
+
+   call breaks_first(1)
+   call breaks_first(2)
+   call breaks_first(16)
+   call breaks_first(17)
+   call breaks_first(300)
+   call breaks_first(5000)
+   call have_neighbours(lattice_triangular, 2, 2)
+   call have_neighbours(lattice_triangular, 7, 4)
+   call have_neighbours(lattice_square, 2, 3)
+   call have_neighbours(lattice_square, 5, 6)
+   call check(coordination(0) == 0, "an unknown lattice has no neighbours")
+   call reach(7, 5)
+   call reach(40, 3)
+   call reach(2, 60)
+   call balances()
+   call ends_cascade()
+   call refuses()
+   call finish()
+
+contains
+
+   !> A uniform deviate.
+   function deviate()
+      real(wp) :: deviate
+
+      real(wp) :: uniform(2)
+
+      draws = draws + 1
+      call uniform_pair(7_i8, 0_i8, int(draws, i8), 0_i8, 0_i8, uniform)
+      deviate = uniform(1)
+   end function deviate
+
+   !> The tree against a plain search, while contacts come, change and go.
+   subroutine breaks_first(count)
+      integer, intent(in) :: count
+
+      type(break_tree_type) :: tree
+      type(error_type), allocatable :: error
+      real(wp) :: upper(count), lower(count), displacement
+      integer :: step, contact, expected
+      logical :: is_right
+
+      call new_break_tree(tree, count, error)
+      upper = huge(1.0_wp)
+      lower = -huge(1.0_wp)
+      is_right = .not. allocated(error) .and. tree%upper() >= huge(1.0_wp)
+      do step = 1, 4 * count + 50
+         contact = 1 + int(deviate() * count)
+         if (deviate() < 0.2_wp) then
+            upper(contact) = huge(1.0_wp)
+            lower(contact) = -huge(1.0_wp)
+            call tree%remove(contact)
+         else
+            ! Few different values, so that some are equal.
+            upper(contact) = real(int(50.0_wp * deviate()), wp)
+            lower(contact) = upper(contact) - 30.0_wp
+            call tree%set(contact, upper(contact), lower(contact))
+         end if
+         is_right = is_right .and. .not. abs(tree%upper() - minval(upper)) > 0.0_wp
+         is_right = is_right .and. .not. abs(tree%lower() - maxval(lower)) > 0.0_wp
+         displacement = 60.0_wp * deviate() - 20.0_wp
+         expected = 0
+         if (minval(upper) <= displacement) then
+            expected = minloc(upper, dim=1)
+         else if (maxval(lower) >= displacement) then
+            expected = maxloc(lower, dim=1)
+         end if
+         is_right = is_right .and. tree%due(displacement) == expected
+      end do
+      call check(is_right, "the first contact of a tree that changes")
+
+      call tree%clear()
+      do contact = 1, count
+         if (upper(contact) < huge(1.0_wp)) call tree%put(contact, upper(contact), lower(contact))
+      end do
+      call tree%arrange()
+      is_right = .not. (abs(tree%upper() - minval(upper)) > 0.0_wp &
+         & .or. abs(tree%lower() - maxval(lower)) > 0.0_wp)
+      displacement = minval(upper)
+      if (displacement < huge(1.0_wp)) is_right = is_right .and. &
+         & tree%due(displacement) == minloc(upper, dim=1)
+      call check(is_right, "the first contact of a tree made anew")
+   end subroutine breaks_first
+
+   !> Each bond is there from both ends, and none leads back to its start.
+   subroutine have_neighbours(lattice, columns, rows)
+      integer, intent(in) :: lattice, columns, rows
+
+      integer, allocatable :: neighbour(:, :)
+      integer :: place, side
+      logical :: is_mutual
+
+      allocate (neighbour(coordination(lattice), columns * rows))
+      call find_neighbours(lattice, columns, rows, neighbour)
+      is_mutual = .true.
+      do place = 1, columns * rows
+         do side = 1, size(neighbour, 1)
+            is_mutual = is_mutual .and. neighbour(side, place) /= place &
+               & .and. count(neighbour(:, neighbour(side, place)) == place) &
+               & == count(neighbour(:, place) == neighbour(side, place))
+         end do
+      end do
+      call check(is_mutual, "neighbours are neighbours of each other")
+   end subroutine have_neighbours
+
+   !> The rectangle around an avalanche is the smallest one, wherever it wraps around the edges.
+   subroutine reach(columns, rows)
+      integer, intent(in) :: columns, rows
+
+      type(avalanche_track_type) :: track
+      integer, target :: contact(track_length, columns * rows)
+      integer :: trial, number, place, width, height, size_wanted
+      logical :: is_smallest, column(0:columns - 1), row(0:rows - 1)
+
+      contact = 0
+      track%columns = columns
+      track%rows = rows
+      track%contact => contact
+      is_smallest = .true.
+      do trial = 1, 200
+         size_wanted = 1 + int(deviate()**3 * columns * rows)
+         column = .false.
+         row = .false.
+         track%generation = 1
+         do number = 1, size_wanted
+            ! Close to a corner, so that many wrap around it.
+            place = modulo(int((deviate() - 0.5_wp) * 0.7_wp * columns), columns) + 1 &
+               & + columns * modulo(int((deviate() - 0.5_wp) * 0.9_wp * rows), rows)
+            call track%add(place)
+            column(modulo(place - 1, columns)) = .true.
+            row((place - 1) / columns) = .true.
+         end do
+         is_smallest = is_smallest .and. track%area == count(contact(1, :) > 0)
+         call track%extent(width, height)
+         is_smallest = is_smallest .and. width == shortest(column) .and. height == shortest(row)
+         call track%clear()
+         is_smallest = is_smallest .and. all(contact(1, :) == 0) .and. track%area == 0
+      end do
+      call check(is_smallest, "the smallest rectangle around an avalanche")
+   end subroutine reach
+
+   !> Length of the shortest arc with all marks, by trying all arcs.
+   pure integer function shortest(mark)
+      logical, intent(in) :: mark(:)
+
+      integer :: start
+
+      do shortest = 1, size(mark)
+         do start = 1, size(mark)
+            associate (turned => cshift(mark, start))
+               if (.not. any(turned(shortest + 1:))) return
+            end associate
+         end do
+      end do
+   end function shortest
+
+   !> Contacts start able to bear their neighbours, and none is lost in moves forth and back.
+   subroutine balances()
+      integer, parameter :: columns = 12, rows = 10, number = columns * rows
+      type(contact_lattice_type) :: contacts
+      real(wp), target :: record(record_length, number), detached(detached_length, number)
+      integer, target :: detached_contact(number), track(track_length, number)
+      real(wp) :: displacement
+      integer :: step, extent(extent_length)
+      logical :: is_whole, bears
+
+      call build(contacts, columns, rows, 5.0_wp, 1.0e-3_wp, record, detached, detached_contact, &
+         & track)
+      call contacts%initialize(initial_uniform)
+      call check(contacts%detached_count > 0.0_wp .and. contacts%breaks <= 0.0_wp, &
+         & "what neighbours push over at the start is detached, and no break")
+      is_whole = .true.
+      bears = .true.
+      do step = 1, 400
+         displacement = 1.5_wp * sin(0.1_wp * step)
+         call contacts%respond(pose_type(), pose_type(time=1.0e-4_wp * step, &
+            & displacement=displacement, sense=sign(1.0_wp, cos(0.1_wp * step))))
+         is_whole = is_whole .and. nint(contacts%detached_count) &
+            & == count(.not. record(row_stiffness, :) > 0.0_wp)
+         bears = bears .and. bearing(contacts, displacement)
+         call contacts%take_extent(extent)
+      end do
+      call check(is_whole .and. contacts%breaks > 10 * number, "contacts are conserved")
+      call check(bears, "between events no contact is at its threshold")
+   end subroutine balances
+
+   !> Whether no contact is at its threshold or beyond.
+   function bearing(contacts, displacement)
+      type(contact_lattice_type), intent(in) :: contacts
+      real(wp), intent(in) :: displacement
+      logical :: bearing
+
+      real(wp) :: values(3, contacts%parameters%count)
+
+      call contacts%snapshot(displacement, values)
+      bearing = all(abs(values(2, :)) < 1.0_wp + 1.0e-12_wp)
+   end function bearing
+
+   !> Without a delay, and with bonds that keep nearly all force in the lattice, a cascade ends.
+   subroutine ends_cascade()
+      integer, parameter :: columns = 4, rows = 4, number = columns * rows
+      type(contact_lattice_type) :: contacts
+      real(wp), target :: record(record_length, number), detached(detached_length, number)
+      integer, target :: detached_contact(number), track(track_length, number)
+
+      call build(contacts, columns, rows, 1.0e5_wp, 0.0_wp, record, detached, detached_contact, &
+         & track)
+      call contacts%initialize(initial_uniform)
+      call contacts%respond(pose_type(), pose_type(displacement=3.0_wp))
+      call check(.not. allocated(contacts%failure), "a cascade without delay ends")
+      call check_close(contacts%detached_count, 0.0_wp, 0.0_wp, "all attach again at once")
+   end subroutine ends_cascade
+
+   !> A lattice that does not hold the contacts.
+   subroutine refuses()
+      type(contact_lattice_type) :: contacts
+      type(contact_parameters_type) :: parameters
+      type(contact_arrays_type) :: arrays
+      type(error_type), allocatable :: error
+
+      parameters%count = 10
+      call new_contact_lattice(contacts, parameters, &
+         & interaction_type(1.0_wp, lattice_square, 3, 3), arrays, error)
+      call check(allocated(error), "a lattice of another size is refused")
+   end subroutine refuses
+
+   !> Contacts of unit threshold and stiffness on a lattice.
+   subroutine build(contacts, columns, rows, bond, delay, record, detached, detached_contact, track)
+      type(contact_lattice_type), intent(out) :: contacts
+      integer, intent(in) :: columns, rows
+      real(wp), intent(in) :: bond, delay
+      real(wp), intent(inout), target, contiguous :: record(:, :), detached(:, :)
+      integer, intent(inout), target, contiguous :: detached_contact(:), track(:, :)
+
+      type(contact_parameters_type) :: parameters
+      type(contact_arrays_type) :: arrays
+      type(error_type), allocatable :: error
+
+      call new_threshold_law(parameters%law, law_gaussian, 0.2_wp, 0.1_wp, error)
+      parameters%count = columns * rows
+      parameters%static_force = 1.0_wp
+      parameters%stiffness = 1.0_wp
+      parameters%delay = delay
+      parameters%back_force_ratio = 0.1_wp
+      parameters%coupling = coupling_equal
+      parameters%seed = 1_i8
+      record = 0.0_wp
+      track = 0
+      arrays%record => record
+      arrays%detached => detached
+      arrays%detached_contact => detached_contact
+      call new_contact_lattice(contacts, parameters, &
+         & interaction_type(bond, lattice_square, columns, rows), arrays, error)
+      contacts%track%columns = columns
+      contacts%track%rows = rows
+      contacts%track%contact => track
+   end subroutine build
+
+end program test_lattice

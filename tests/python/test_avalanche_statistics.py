@@ -1,0 +1,411 @@
+"""Histograms and power laws of avalanche sizes against brute force, scipy and known laws."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mesoslip import avalanche_statistics
+from mesoslip.avalanche_statistics import ccdf, fit_power_law, logarithmic_bins
+from mesoslip.errors import MesoslipError
+from scipy import optimize, special, stats
+
+
+def weights(sizes, exponent: float, cutoff: float = math.inf):
+    """What the probability of sizes is proportional to."""
+    return sizes**-exponent * np.exp(-sizes / cutoff)
+
+
+def draw(count: int, seed: int, exponent: float, cutoff: float = math.inf, last: int = 10**6):
+    """Exact sizes, by the inverse of the tabulated cumulative sum."""
+    return draw_from(weights(np.arange(1.0, last + 1), exponent, cutoff), count, seed)
+
+
+def draw_from(table, count: int, seed: int):
+    total = np.cumsum(table)
+    part = np.random.default_rng(seed).random(count)
+    return np.searchsorted(total, part * total[-1], side="right") + 1
+
+
+@pytest.mark.parametrize("exponent", [0.2, 1.0, 1.5, 2.5, 6.0])
+@pytest.mark.parametrize("cutoff", [1.0, 30.0, 1e3, 1e5])
+@pytest.mark.parametrize(("smallest", "largest"), [(1, None), (40, None), (3, 3 + 777), (1, 9)])
+def test_norm_is_a_sum(exponent, cutoff, smallest, largest):
+    sizes = np.arange(smallest, largest + 1 if largest else smallest + 40 * cutoff + 1)
+    parts = (sizes / smallest) ** -exponent * np.exp(-(sizes - smallest) / cutoff)
+    rule = avalanche_statistics._rule(smallest, largest)
+    moments = avalanche_statistics._moments(rule, exponent, 1 / cutoff)
+    assert math.exp(moments.log_norm) == pytest.approx(math.fsum(parts), rel=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [1.01, 1.2, 2.0, 2.5, 6.0])
+@pytest.mark.parametrize("smallest", [1, 7, 1000])
+def test_norm_of_a_pure_law_is_a_zeta_function(exponent, smallest):
+    rule = avalanche_statistics._rule(smallest, None)
+    moments = avalanche_statistics._moments(rule, exponent, 0.0)
+    expected = special.zeta(exponent, smallest) * smallest**exponent
+    assert math.exp(moments.log_norm) == pytest.approx(expected, rel=1e-12)
+    h = 1e-3 * (exponent - 1)
+    low, mid, high = np.log(special.zeta(exponent + h * np.array([-1, 0, 1]), smallest))
+    log_mean = math.log(smallest) + moments.log_mean
+    assert log_mean == pytest.approx((low - high) / (2 * h), rel=1e-5)
+    assert moments.log_variance == pytest.approx((low - 2 * mid + high) / h**2, rel=1e-5)
+    if exponent > 2:
+        mean = special.zeta(exponent - 1, smallest) / special.zeta(exponent, smallest)
+        assert smallest + moments.mean == pytest.approx(mean, rel=1e-12)
+
+
+def test_pure_law_is_the_likeliest_of_scipy():
+    sizes = draw(3000, 1, 2.5)
+    fit = fit_power_law(sizes, 1, replicas=0)
+    best = optimize.minimize_scalar(
+        lambda exponent: -np.sum(stats.zipf.logpmf(sizes, exponent)),
+        bounds=(1.1, 6),
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
+    assert math.isinf(fit.cutoff)
+    assert math.isinf(fit.cutoff_error)
+    assert fit.exponent == pytest.approx(best.x, abs=1e-6)
+    assert fit.log_likelihood == pytest.approx(-best.fun, rel=1e-12)
+    # The curvature of the likelihood, by differences.
+    h = 1e-3
+    low, mid, high = (np.sum(stats.zipf.logpmf(sizes, best.x + shift)) for shift in (-h, 0.0, h))
+    assert fit.exponent_error == pytest.approx(h / math.sqrt(2 * mid - low - high), rel=1e-4)
+
+
+@pytest.mark.parametrize(("smallest", "largest"), [(1, None), (5, None), (2, 250)])
+def test_cut_law_is_the_likeliest_of_brute_force(smallest, largest):
+    sizes = draw(20000, 2, 1.5, 100.0)
+    fit = fit_power_law(sizes, smallest, largest, replicas=0)
+    every = np.arange(smallest, 20001.0 if largest is None else largest + 1.0)
+    kept = sizes[(sizes >= smallest) & (sizes <= every[-1])].astype(float)
+
+    def cost(exponent, rate):
+        norm = np.sum(weights(every, exponent, 1 / rate))
+        return np.sum(exponent * np.log(kept) + rate * kept) + len(kept) * np.log(norm)
+
+    best = optimize.minimize(
+        lambda at: cost(at[0], math.exp(at[1])),
+        [1.4, math.log(0.02)],
+        method="Nelder-Mead",
+        options={"xatol": 1e-9, "fatol": 1e-9},
+    )
+    rate = math.exp(best.x[1])
+    assert fit.count == len(kept)
+    assert (fit.smallest, fit.largest) == (smallest, largest)
+    assert fit.exponent == pytest.approx(best.x[0], rel=1e-5)
+    assert fit.cutoff == pytest.approx(1 / rate, rel=1e-5)
+    assert fit.log_likelihood == pytest.approx(-best.fun, rel=1e-12)
+    h = np.array([1e-3, rate / 100])
+    at = np.array([best.x[0], rate])
+    information = [
+        [
+            sum(
+                one * two * cost(*(at + one * h * first + two * h * second))
+                for one in (-1, 1)
+                for two in (-1, 1)
+            )
+            / (4 * h @ first * (h @ second))
+            for first in np.eye(2)
+        ]
+        for second in np.eye(2)
+    ]
+    errors = np.sqrt(np.diag(np.linalg.inv(information)))
+    assert fit.exponent_error == pytest.approx(errors[0], rel=1e-3)
+    assert fit.cutoff_error == pytest.approx(errors[1] / rate**2, rel=1e-3)
+    # The distance, at every integer.
+    law = np.cumsum(weights(every, fit.exponent, fit.cutoff))
+    part = np.searchsorted(np.sort(kept), every, side="right") / len(kept)
+    assert fit.distance == pytest.approx(np.max(np.abs(law / law[-1] - part)), rel=1e-6)
+
+
+@pytest.mark.parametrize(("count", "smallest"), [(12, 1), (40, 1), (200, 30)])
+def test_distance_of_few_sizes(count, smallest):
+    sizes = draw(count, count, 1.2, 3000.0)
+    kept = np.sort(sizes[sizes >= smallest])
+    fit = fit_power_law(sizes, smallest, 10**5, replicas=0)
+    every = np.arange(smallest, 10**5 + 1.0)
+    law = np.cumsum(weights(every, fit.exponent, fit.cutoff))
+    part = np.searchsorted(kept, every, side="right") / len(kept)
+    assert fit.distance == pytest.approx(np.max(np.abs(law / law[-1] - part)), rel=1e-6)
+
+
+def test_cutoff_significance_is_half_of_chi_squared():
+    sizes = draw(2000, 5, 2.0, 60.0)
+    fit = fit_power_law(sizes, 1, replicas=0)
+    pure = optimize.minimize_scalar(
+        lambda exponent: -np.sum(stats.zipf.logpmf(sizes, exponent)), bounds=(1.1, 6)
+    )
+    ratio = 2 * (fit.log_likelihood + pure.fun)
+    assert math.isfinite(fit.cutoff)
+    assert fit.cutoff_significance > 1e-12
+    assert fit.cutoff_significance == pytest.approx(stats.chi2.sf(ratio, 1) / 2, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("exponent", "cutoff"), [(0.7, 50.0), (1.2, 1e3), (1.5, 100.0), (1.5, 1e4), (2.5, 40.0)]
+)
+def test_known_laws_are_recovered(exponent, cutoff):
+    fit = fit_power_law(draw(100_000, 3, exponent, cutoff), 1, replicas=0)
+    assert abs(fit.exponent - exponent) < 4 * fit.exponent_error < 0.2
+    assert abs(fit.cutoff - cutoff) < 4 * fit.cutoff_error < 0.8 * cutoff
+    assert fit.cutoff_significance < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("exponent", "last", "largest"), [(1.5, 10**5, 10**5), (0.8, 300, 300), (2.5, 10**6, None)]
+)
+def test_a_pure_law_has_no_cutoff(exponent, last, largest):
+    fit = fit_power_law(draw(100_000, 4, exponent, last=last), 1, largest, replicas=0)
+    assert abs(fit.exponent - exponent) < 4 * fit.exponent_error < 0.1
+    assert math.isinf(fit.cutoff)
+    assert fit.cutoff_significance > 0.01
+
+
+def test_a_window_leaves_out_what_is_beyond():
+    # The end of the window is no cutoff; without the window it would be.
+    sizes = draw(100_000, 5, 1.5, last=10**4)
+    inside = fit_power_law(sizes, 10, 200, replicas=0)
+    assert abs(inside.exponent - 1.5) < 4 * inside.exponent_error
+    assert inside.count == np.sum((sizes >= 10) & (sizes <= 200))
+    assert math.isinf(inside.cutoff)
+    assert math.isfinite(fit_power_law(sizes[sizes <= 200], 10, replicas=0).cutoff)
+
+
+def test_errors_cover():
+    deviations = []
+    for seed in range(100):
+        fit = fit_power_law(draw(5000, seed, 1.5, 100.0, last=5000), 1, replicas=0)
+        rate_error = fit.cutoff_error / fit.cutoff**2
+        deviations.append(
+            [(fit.exponent - 1.5) / fit.exponent_error, (1 / fit.cutoff - 0.01) / rate_error]
+        )
+    inside = np.mean(np.abs(deviations) < 1, axis=0)
+    assert np.all((inside > 0.54) & (inside < 0.82))
+    assert np.std(deviations, axis=0) == pytest.approx(1, abs=0.25)
+
+
+def test_more_of_the_same_sizes_halve_the_errors():
+    sizes = draw(5000, 6, 1.5, 200.0)
+    once, four = (fit_power_law(np.tile(sizes, n), 1, replicas=0) for n in (1, 4))
+    assert four.exponent == pytest.approx(once.exponent, rel=1e-9)
+    assert four.cutoff == pytest.approx(once.cutoff, rel=1e-9)
+    assert four.exponent_error == pytest.approx(once.exponent_error / 2, rel=1e-6)
+    assert four.cutoff_error == pytest.approx(once.cutoff_error / 2, rel=1e-6)
+    assert four.distance == pytest.approx(once.distance, rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [1000, 60_000])
+def test_true_laws_are_accepted(count):
+    # The p value is uniform.
+    p_values = [
+        fit_power_law(draw(count, seed, 1.5, 300.0), 1, replicas=30, seed=seed).p_value
+        for seed in range(40)
+    ]
+    assert stats.kstest(p_values, "uniform").pvalue > 0.02
+
+
+def test_only_a_part_of_many_sizes_is_tested(monkeypatch):
+    # A deviation that few sizes do not show.
+    sizes = draw(500_000, 22, 1.5, 300.0)
+    sizes[(sizes == 7) & (np.random.default_rng(23).random(len(sizes)) < 0.1)] = 6
+    assert fit_power_law(sizes, 1, replicas=50).p_value > 0.1
+    monkeypatch.setattr(avalanche_statistics, "TEST_SIZES", 10**6)
+    assert fit_power_law(sizes, 1, replicas=50).p_value < 0.05
+
+
+def lognormal(count: int):
+    return np.ceil(np.random.default_rng(7).lognormal(3.0, 1.0, count))
+
+
+def two_geometric(count: int):
+    generator = np.random.default_rng(8)
+    return np.concatenate([generator.geometric(part, count // 2) for part in (0.5, 0.02)])
+
+
+@pytest.mark.parametrize("sizes", [lognormal(3000), two_geometric(3000), lognormal(100_000)])
+def test_other_laws_are_rejected(sizes):
+    assert fit_power_law(sizes, 1).p_value < 0.02
+
+
+def test_the_test_is_reproducible():
+    sizes = draw(50_000, 9, 1.5, 300.0)
+    first, again = (fit_power_law(sizes, 1, replicas=20, seed=3) for _ in range(2))
+    assert first == again
+    assert math.isnan(fit_power_law(sizes, 1, replicas=0).p_value)
+
+
+@pytest.mark.parametrize(
+    ("exponent", "cutoff", "largest"),
+    [(1.5, 1e4, None), (2.0, math.inf, None), (0.5, math.inf, 20_000), (1.5, 3.0, None)],
+)
+def test_synthetic_sizes_are_of_their_law(exponent, cutoff, largest):
+    rule = avalanche_statistics._rule(4, largest)
+    rate = 1 / cutoff
+    law = avalanche_statistics._Law(
+        4, largest, exponent, rate, avalanche_statistics._moments(rule, exponent, rate)
+    )
+    below = avalanche_statistics._Tally(np.array([1.0, 3.0]), np.array([30, 10]))
+    source = avalanche_statistics._Source(law, below, 0.2)
+    sizes, counts = source.draw(10**6, np.random.default_rng(10))
+    assert np.sum(counts) == 10**6
+    assert np.all(np.diff(sizes) > 0)
+    every = np.arange(1.0, 10**6 + 1.0 if largest is None else largest + 1.0)
+    parts = np.zeros_like(every)
+    parts[3:] = weights(every[3:], exponent, cutoff)
+    beyond = 0.0
+    if largest is None and math.isinf(cutoff):
+        beyond = special.zeta(exponent, every[-1] + 1)
+    parts *= 0.8 / (np.sum(parts) + beyond)
+    parts[[0, 2]] = 0.15, 0.05
+    edges = np.unique(np.rint(np.geomspace(1, every[-1] + 1, 300)))
+    expected = np.add.reduceat(parts, edges[:-1].astype(int) - 1) * 10**6
+    actual, _ = np.histogram(sizes, edges, weights=counts)
+    full = expected > 20
+    chi_squared = np.sum((actual - expected)[full] ** 2 / expected[full])
+    assert stats.chi2.sf(chi_squared, np.sum(full)) > 1e-3
+    assert np.all(actual[expected == 0] == 0)
+
+
+def test_smallest_is_where_the_law_begins():
+    sizes = draw(100_000, 11, 1.5, 300.0)
+    other = np.random.default_rng(12).integers(1, 5, len(sizes))
+    sizes = np.where(sizes < 5, other, sizes)
+    fit = fit_power_law(sizes, replicas=30)
+    assert 5 <= fit.smallest <= 13
+    assert abs(fit.exponent - 1.5) < 4 * fit.exponent_error
+    assert abs(fit.cutoff - 300) < 4 * fit.cutoff_error
+    assert fit.count == np.sum(sizes >= fit.smallest)
+    assert fit.p_value > 0.05
+    assert fit_power_law(sizes, 1, replicas=30).p_value < 0.05
+    distances = [fit_power_law(sizes, smallest, replicas=0).distance for smallest in range(1, 11)]
+    assert fit.distance <= min(distances)
+
+
+def test_smallest_leaves_enough():
+    for seed in range(20):
+        sizes = draw(300, seed, 1.5, 300.0)
+        assert np.sum(sizes >= fit_power_law(sizes, replicas=0).smallest) >= 50
+        few = sizes[:40]
+        assert fit_power_law(few, replicas=0).smallest == np.min(few)
+    many = draw(100_000, 24, 3.0)
+    assert np.sum(many >= fit_power_law(many, replicas=0).smallest) >= 1000
+
+
+def test_branching_process():
+    """Borel's law of the sizes of a branching process, with its mean offspring close to 1."""
+    offspring = 0.9
+    every = np.arange(1.0, 10**5 + 1)
+    table = np.exp(
+        -offspring * every + (every - 1) * np.log(offspring * every) - special.gammaln(every + 1)
+    )
+    assert np.sum(table) == pytest.approx(1, rel=1e-9)
+    fit = fit_power_law(draw_from(table, 300_000, 14), 10, replicas=30)
+    # Stirling's formula for the factorial.
+    assert abs(fit.exponent - 1.5) < 4 * fit.exponent_error < 0.1
+    cutoff = 1 / (offspring - 1 - math.log(offspring))
+    assert abs(fit.cutoff - cutoff) < 4 * fit.cutoff_error < 0.1 * cutoff
+    assert fit.p_value > 0.05
+
+
+def test_geometric_law_has_no_exponent():
+    sizes = np.random.default_rng(15).geometric(0.05, 50_000)
+    fit = fit_power_law(sizes, 1, replicas=0)
+    assert abs(fit.exponent) < 4 * fit.exponent_error < 0.1
+    assert abs(fit.cutoff + 1 / math.log(0.95)) < 4 * fit.cutoff_error < 5
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [[], [5], [3] * 100, [1, 2] * 50, range(1, 10)],
+    ids=["none", "one", "equal", "two different", "few"],
+)
+def test_too_little_is_not_fitted(sizes):
+    assert fit_power_law(sizes) is None
+    assert fit_power_law(sizes, 1) is None
+    assert fit_power_law([*sizes, *range(100, 200)], 1, 99) is None
+    assert fit_power_law(sizes, 7, 6) is None
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        [1] * 1000 + [2, 3],
+        [1] * 9 + [2, 2**50],
+        10**9 + np.random.default_rng(16).integers(0, 5, 100),
+        500 - np.random.default_rng(17).geometric(0.1, 100),
+        1 + np.random.default_rng(18).poisson(10**5, 100),
+    ],
+    ids=["steep", "far", "narrow", "rising", "peaked"],
+)
+@pytest.mark.parametrize("smallest", [None, 1])
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_awkward_sizes_are_fitted(sizes, smallest, is_cut):
+    fit = fit_power_law(sizes, smallest, int(np.max(sizes)) if is_cut else None, replicas=5)
+    numbers = [fit.exponent, fit.exponent_error, fit.log_likelihood, fit.distance, fit.p_value]
+    assert np.all(np.isfinite(numbers))
+    assert fit.exponent_error > 0
+    assert fit.cutoff_error > 0
+
+
+@pytest.mark.parametrize("sizes", [[0, 1, 2], [-3, 4], [1.5, 2], [1.0, math.nan], [2**53, 1]])
+@pytest.mark.parametrize("function", [fit_power_law, logarithmic_bins, ccdf])
+def test_sizes_are_positive_integers(sizes, function):
+    with pytest.raises(MesoslipError, match="positive integers"):
+        function(sizes)
+
+
+def test_smallest_is_positive():
+    with pytest.raises(MesoslipError, match="smallest"):
+        fit_power_law(range(1, 100), 0)
+
+
+@pytest.mark.parametrize("per_decade", [1, 4, 10, 50])
+def test_bins_hold_all_sizes(per_decade):
+    sizes = draw(30_000, 19, 1.5, 1e4)
+    bins = logarithmic_bins(sizes, per_decade)
+    lower, upper = bins.edges.T
+    assert np.all(lower % 1 == 0.5)
+    assert np.all(upper % 1 == 0.5)
+    assert np.all(upper - lower >= 1)
+    assert np.all(lower[1:] >= upper[:-1])
+    assert np.sum(bins.count) == len(sizes)
+    assert np.all(bins.count > 0)
+    for low, high, count in zip(lower, upper, bins.count, strict=True):
+        assert count == np.sum((sizes > low) & (sizes < high))
+    assert np.sum(bins.density * (upper - lower)) == pytest.approx(1, rel=1e-12)
+    np.testing.assert_allclose(bins.density_error / bins.density, bins.count**-0.5)
+    np.testing.assert_allclose(bins.centre, np.sqrt((lower + 0.5) * (upper - 0.5)))
+    # Each factor of ten has as many.
+    wide = lower > 10 * per_decade
+    np.testing.assert_allclose((upper / lower)[wide], 10 ** (1 / per_decade), rtol=0.05)
+
+
+def test_bins_of_a_known_law():
+    bins = logarithmic_bins(draw(200_000, 20, 2.0))
+    lower, upper = bins.edges.T
+    expected = (special.zeta(2.0, lower + 0.5) - special.zeta(2.0, upper + 0.5)) / special.zeta(2.0)
+    many = bins.count > 20
+    deviation = (bins.density - expected / (upper - lower)) / bins.density_error
+    assert np.max(np.abs(deviation[many])) < 4
+    assert np.std(deviation[many]) == pytest.approx(1, abs=0.35)
+
+
+def test_bins_are_left_out_where_there_is_nothing():
+    bins = logarithmic_bins([1, 1, 1000], 1)
+    np.testing.assert_array_equal(bins.edges, [[0.5, 1.5], [100.5, 1000.5]])
+    np.testing.assert_array_equal(bins.count, [2, 1])
+    np.testing.assert_allclose(bins.density, [2 / 3, 1 / 2700])
+    assert len(logarithmic_bins([]).density) == 0
+
+
+def test_ccdf():
+    sizes, part = ccdf([[3, 1], [3, 10**12]])
+    np.testing.assert_array_equal(sizes, [1, 3, 10**12])
+    np.testing.assert_array_equal(part, [1.0, 0.75, 0.25])
+    assert len(ccdf([])[0]) == 0
+    drawn = draw(1000, 21, 1.5, 100.0)
+    sizes, part = ccdf(drawn)
+    np.testing.assert_allclose(part, [np.mean(drawn >= size) for size in sizes])

@@ -22,6 +22,9 @@ def problems(tables) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
+LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
+
+
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
@@ -38,9 +41,14 @@ def problems(tables) -> list[str]:
         ("slider__damping", 5.0, ["slider.damping", "not both"]),
         ("slider__stifness", 97, ["slider.stifness", "unknown key", "'stiffness'"]),
         ("slider__layers", 16, ["slider.layers", 'for slider.kind = "layered" only']),
-        ("slider__kind", "quasistatic", ["slider.kind", "not available", "rigid", "layered"]),
+        ("slider", {"kind": "quasistatic"}, ["slider.stiffness", "missing", "by force"]),
+        (
+            "slider",
+            {"kind": "quasistatic", "stiffness": 97.0, "mass": 1.0},
+            ["slider.mass", 'is for slider.kind = "rigid" or "layered" only'],
+        ),
         ("slider", LAYERED | {"layers": 0}, ["slider.layers", "greater than or equal to 1"]),
-        ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", "unknown key"]),
+        ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", '"rigid" only']),
         ("slider", LAYERED | {"base": {"mass": 1.0}}, ["slider.base.stiffness", "missing"]),
         (
             "slider",
@@ -79,7 +87,11 @@ def problems(tables) -> list[str]:
         ("run__seed", -1, ["run.seed", "greater than or equal to 0"]),
         ("drive__velocity", "3 s", ["drive.velocity", "um/s"]),
         ("drive__velocity", None, ["drive.velocity", "either"]),
-        ("drive__force_rate", "1 uN/s", ["drive.force_rate", "not available in this version"]),
+        ("drive__force_rate", "1 uN/s", ["drive.velocity", "either", "force_rate"]),
+        ("drive", {"force_rate": "1 uN/s"}, ["drive.force_rate", '"quasistatic" only']),
+        ("drive", {"force_rate": 0.0}, ["drive.force_rate", "must not be 0"]),
+        ("run__drive_displacement", "1 um", ["run.drive_displacement", "run.duration"]),
+        ("run__avalanches", 10, ["run.avalanches", "[interaction]", "quasistatic"]),
         (
             "drive",
             {"stage": [{"duration": -1, "velocity": 0}]},
@@ -96,7 +108,29 @@ def problems(tables) -> list[str]:
         ("contacts__ageing", {}, ["contacts.ageing", "not available in this version"]),
         ("contacts__threshold__law", "cauchy", ["contacts.threshold.law", "gaussian"]),
         ("contacts__threshold__relative_width", 0, ["relative_width", "greater than 0"]),
-        ("interaction", {"strength": 0.3}, ["interaction", "not available in this version"]),
+        ("interaction", {"strength": 0.3, "columns": 60}, ["interaction.rows", "missing"]),
+        ("interaction", LATTICE | {"rows": 67}, ["interaction.rows", "even", "67"]),
+        ("interaction", LATTICE | {"rows": 1}, ["interaction.rows", "greater than or equal to 2"]),
+        (
+            "interaction",
+            LATTICE | {"rows": 60},
+            ["interaction.columns", "contacts.count", "60 x 60 = 3600, not 4080"],
+        ),
+        (
+            "interaction",
+            LATTICE | {"strength": -0.1},
+            ["interaction.strength", "negative", "attach", "-0.1"],
+        ),
+        (
+            "interaction",
+            LATTICE | {"strength": 1e9},
+            ["interaction.strength", "cannot attach", "digits", "at most 9.66e+05"],
+        ),
+        ("interaction", LATTICE | {"lattice": "cubic"}, ["interaction.lattice", "cubic", "square"]),
+        ("interaction", LATTICE | {"xi": 1}, ["interaction.xi", "unknown key"]),
+        ("output__snapshots", ["1 s"], ["output.snapshots", "[interaction]"]),
+        ("output__snapshot_size", 100, ["output.snapshot_size", "[interaction]"]),
+        ("output__avalanche_size", 2, ["output.avalanche_size", "[interaction]"]),
         ("output__interval", "20 s", ["output.interval", "duration"]),
         ("output__interval", 1e-12, ["output.interval", "GiB"]),
         ("output__slip_interval", 0.1, ["output.slip_interval", "interval"]),
@@ -109,6 +143,87 @@ def test_what_is_wrong_is_told(key, value, words):
     assert message.startswith("case.toml: ")
     for word in words:
         assert word in message
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"run__engine": "me", "interaction": LATTICE},
+            ["interaction", 'engine "eq"', "no neighbours", "narrower"],
+        ),
+        (
+            {"run__engine": "me", "slider": {"kind": "quasistatic", "stiffness": 97.0}},
+            ["slider.kind", 'engine "eq"', "mesoslip curve"],
+        ),
+        (
+            {"contacts__area": None, "contacts__drag_rate": None, "interaction": LATTICE},
+            ["contacts.area", "distance between neighbours"],
+        ),
+        (
+            {"slider": {"kind": "quasistatic", "stiffness": 1.0}, "drive": {"force_rate": 1.0}},
+            ["slider.stiffness", "drive.force_rate"],
+        ),
+        (
+            {"interaction": LATTICE, "output__snapshots": [3.0, 2.0]},
+            ["output.snapshots", "grow", "3"],
+        ),
+        ({"interaction": LATTICE, "output__snapshots": [13.0]}, ["output.snapshots", "duration"]),
+        (
+            {"run": {"drive_displacement": 1e-6}, "drive__velocity": 0.0},
+            ["run.drive_displacement", "drive.velocity", "not 0"],
+        ),
+        (
+            {"run": {"avalanches": 5}, "interaction": LATTICE, "drive__velocity": 0.0},
+            ["drive.velocity", "must not be 0"],
+        ),
+        (
+            {
+                "slider": {"kind": "quasistatic"},
+                "drive": {"force_rate": 1e-6},
+                "run": {},
+            },
+            ["run.duration", "needed"],
+        ),
+        (
+            {
+                "interaction": LATTICE | {"columns": 10_000, "rows": 10_000},
+                "contacts__count": 100_000_000,
+            },
+            ["contacts.count", "GiB"],
+        ),
+        (
+            {
+                "interaction": LATTICE | {"columns": 1000, "rows": 1000},
+                "contacts__count": 1_000_000,
+                "output__snapshots": [0.001 * number for number in range(12_000)],
+            },
+            ["output.snapshots", "12000 times", "GiB"],
+        ),
+    ],
+)
+def test_what_is_wrong_between_tables_is_told(changes, words):
+    (message,) = problems(klein_tables(**changes))
+    for word in words:
+        assert word in message
+
+
+def test_lengths_of_a_run():
+    """One laid over another replaces it; a run may end by avalanches, whatever its duration."""
+    quasistatic = {"kind": "quasistatic", "stiffness": 97.0}
+    tables = klein_tables(slider=quasistatic)
+    assert Config.from_dict(tables).duration == 12
+    text = Config.from_dict(tables).to_toml()
+    by_avalanches = Config.from_toml(text, overrides=["run.avalanches=100"])
+    assert by_avalanches.run.duration is None
+    assert by_avalanches.duration == math.inf
+    # 18 uN/97 N/m at 0.1 um/s, and 100 avalanches of 1 + 2000/97 contacts.
+    assert 1.8 < by_avalanches.expected_duration < 2.1
+    assert by_avalanches.output_interval == 1e-3
+    by_way = Config.from_toml(text, overrides=["run.drive_displacement=1 um"])
+    assert by_way.duration == pytest.approx(10)
+    both = Config.from_dict(klein_tables(slider=quasistatic, run__avalanches=5))
+    assert (both.duration, both.run.avalanches) == (12, 5)
 
 
 @pytest.mark.parametrize(("law", "width"), [("uniform", 0.6), ("exponential", 1.01)])

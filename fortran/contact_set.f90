@@ -20,13 +20,11 @@ module mesoslip_contact_set
    public :: detached_length
 
    !> Numbers kept for a detached contact
-   integer, parameter :: detached_length = 3
+   integer, parameter :: detached_length = 2
    !> When it attaches again [s]
    integer, parameter :: row_due = 1
    !> Its drag while it is detached [N s/m]
    integer, parameter :: row_drag = 2
-   !> The relative threshold it will have
-   integer, parameter :: row_threshold = 3
 
    !> Arrays of the caller that hold the state of the contacts.
    type :: contact_arrays_type
@@ -36,6 +34,9 @@ module mesoslip_contact_set
       real(wp), pointer, contiguous :: detached(:, :) => null()
       !> Numbers of the contacts in that ring, shape (count)
       integer, pointer, contiguous :: detached_contact(:) => null()
+      !> Stiffness [N/m] and breaking stretch [m] that each contact will have when it attaches the
+      !> next time, shape (2, count)
+      real(wp), pointer, contiguous :: next(:, :) => null()
    end type contact_arrays_type
 
    !> N contacts one by one.
@@ -65,6 +66,7 @@ module mesoslip_contact_set
       procedure, non_overridable :: take_hold
       !> Sum stiffness and offset anew, from the records
       procedure, non_overridable :: bear
+      procedure, non_overridable, private :: draw_next
       !> Move all origins
       procedure, non_overridable :: shift_records
    end type contact_set_type
@@ -112,6 +114,7 @@ contains
          self%arrays%record(row_stiffness, contact) = stiffness
          self%arrays%record(row_limit, contact) = limit
          self%arrays%record(row_renewal, contact) = 0.0_wp
+         call self%draw_next(contact, 1.0_wp)
       end do
       call self%bear()
    end subroutine draw
@@ -148,30 +151,26 @@ contains
       real(wp), intent(in) :: displacement, time
 
       integer :: place
-      real(wp) :: stiffness, origin, renewal, uniform(2), drag
+      real(wp) :: stiffness, origin, drag
 
       associate (record => self%arrays%record(:, contact))
          origin = record(row_origin)
          stiffness = record(row_stiffness)
-         renewal = record(row_renewal) + 1.0_wp
          record(row_stiffness) = 0.0_wp
-         record(row_renewal) = renewal
+         record(row_renewal) = record(row_renewal) + 1.0_wp
       end associate
 
       drag = self%parameters%drag
-      if (self%parameters%coupling == coupling_scaled) then
+      if (drag > 0.0_wp .and. self%parameters%coupling == coupling_scaled) then
          drag = drag * (stiffness / self%parameters%stiffness)**2
       end if
       call self%break_loss%add(0.5_wp * stiffness * (displacement - origin)**2)
       call self%stiffness%add(-stiffness)
       call self%offset%add(-stiffness * origin)
-      call self%drag%add(drag)
+      if (drag > 0.0_wp) call self%drag%add(drag)
       self%breaks = self%breaks + 1.0_wp
       call self%track%add(contact)
 
-      ! The next threshold is drawn now, while the contact's record is at hand.
-      call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
-         & int(renewal, i8), 0_i8, uniform)
       place = self%first_detached + self%waiting
       if (place >= self%parameters%count) place = place - self%parameters%count
       self%waiting = self%waiting + 1
@@ -182,7 +181,6 @@ contains
       self%arrays%detached_contact(place + 1) = contact
       self%arrays%detached(row_due, place + 1) = time + self%parameters%delay
       self%arrays%detached(row_drag, place + 1) = drag
-      self%arrays%detached(row_threshold, place + 1) = self%parameters%law%quantile(uniform(1))
       if (self%waiting == 1 .and. self%parameters%reattach) then
          self%next_attachment = self%arrays%detached(row_due, place + 1)
       end if
@@ -206,7 +204,8 @@ contains
 
       place = self%first_detached + 1
       contact = self%arrays%detached_contact(place)
-      call born(self%parameters, self%arrays%detached(row_threshold, place), stiffness, limit)
+      stiffness = self%arrays%next(1, contact)
+      limit = self%arrays%next(2, contact)
       origin = displacement - force / (stiffness + bond)
 
       call self%drag%add(-self%arrays%detached(row_drag, place))
@@ -227,8 +226,24 @@ contains
          record(row_origin) = origin
          record(row_stiffness) = stiffness
          record(row_limit) = limit
+         call self%draw_next(contact, record(row_renewal) + 1.0_wp)
       end associate
    end subroutine take_hold
+
+   !> Draw what a contact will be when it attaches the next time, so early that nothing waits for it.
+   subroutine draw_next(self, contact, renewal)
+      class(contact_set_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> How often it will have been born again then
+      real(wp), intent(in) :: renewal
+
+      real(wp) :: uniform(2)
+
+      call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
+         & int(renewal, i8), 0_i8, uniform)
+      call born(self%parameters, self%parameters%law%quantile(uniform(1)), &
+         & self%arrays%next(1, contact), self%arrays%next(2, contact))
+   end subroutine draw_next
 
    !> Move all origins.
    subroutine shift_records(self, shift)

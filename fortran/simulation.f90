@@ -27,6 +27,9 @@ module mesoslip_simulation
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
 
+   !> Jumps of a slider without inertia in one advance.
+   integer, parameter :: most_jumps = 1000
+
    !> Breaks of each contact in one avalanche, on average, from which on a slider under a force is
    !> taken to slide for ever.
    real(wp), parameter :: most_lives = 1000.0_wp
@@ -143,7 +146,8 @@ contains
       type(pose_type) :: before
       type(interface_law_type) :: law
       type(window_type) :: window
-      real(wp) :: sampling
+      real(wp) :: sampling, end_time
+      integer :: jump
 
       before = self%slider%pose()
       call self%contacts%offer(before, law, window)
@@ -155,11 +159,26 @@ contains
       if (self%recorder%parameters%slip_interval > 0.0_wp) then
          sampling = min(sampling, self%recorder%parameters%slip_interval)
       end if
-      window%end_time = min(window%end_time, self%stage_end(self%stage), &
+      end_time = min(self%stage_end(self%stage), &
          & self%slider%time + 0.5_wp * most_samples_in_step * sampling)
+      window%end_time = min(window%end_time, end_time)
 
       call self%slider%advance(law, window)
       self%advances = self%advances + 1
+      if (self%slider%instant) then
+         ! In the midst of an avalanche time stands still: there is nothing else to look at.
+         do jump = 1, most_jumps
+            if (self%slider%settled .or. self%slider%unbound) exit
+            before = self%slider%pose()
+            call self%contacts%respond(before, before)
+            call self%avalanches%see_response(self%slider, self%contacts, law)
+            if (allocated(self%contacts%failure)) return
+            call self%contacts%offer(before, law, window)
+            window%end_time = min(window%end_time, end_time)
+            call self%slider%advance(law, window)
+            self%advances = self%advances + 1
+         end do
+      end if
       if (allocated(self%slider%failure)) return
       if (self%slider%unbound) then
          call self%finish(ending_broken)

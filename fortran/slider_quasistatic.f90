@@ -26,7 +26,7 @@ module mesoslip_slider_quasistatic
       procedure :: observe
       procedure :: energy
       procedure :: shift_origin
-      procedure, private :: pull, is_force
+      procedure, non_overridable, private :: pull
    end type slider_quasistatic_type
 
 contains
@@ -41,7 +41,7 @@ contains
       self%law = law
       self%instant = .true.
       self%drive_displacement = law%stiffness * self%displacement - law%offset
-      if (.not. self%is_force()) self%drive_displacement = self%displacement &
+      if (self%stiffness > 0.0_wp) self%drive_displacement = self%displacement &
          & + self%drive_displacement / self%stiffness
       self%rest_displacement = self%displacement
    end subroutine start
@@ -77,14 +77,14 @@ contains
       if (abs(way) > 0.0_wp) then
          self%sense = sign(1.0_wp, way)
          call self%damping_loss%add(way * stiffness * (target - start - 0.5_wp * way))
-         if (self%is_force()) call self%drive_work%add(way * pull)
+         if (.not. self%stiffness > 0.0_wp) call self%drive_work%add(way * pull)
       end if
       if (.not. self%settled) return
 
       start = self%displacement
       self%rest_displacement = start
       rate = self%drive_velocity
-      if (.not. self%is_force()) rate = rate * self%stiffness
+      if (self%stiffness > 0.0_wp) rate = rate * self%stiffness
       self%velocity = rate / stiffness
       limit = window%upper
       if (self%velocity < 0.0_wp) limit = window%lower
@@ -101,7 +101,7 @@ contains
 
       way = self%displacement - start
       if (abs(way) > 0.0_wp) self%sense = sign(1.0_wp, way)
-      if (.not. self%is_force()) then
+      if (self%stiffness > 0.0_wp) then
          pull = pull - self%stiffness * start
          way = self%drive_velocity * (self%time - self%step_time)
          call self%drive_work%add(way * (pull + 0.5_wp * self%stiffness &
@@ -111,14 +111,6 @@ contains
       end if
    end subroutine advance
 
-   !> Whether the drive is a force.
-   pure function is_force(self)
-      class(slider_quasistatic_type), intent(in) :: self
-      logical :: is_force
-
-      is_force = .not. self%stiffness > 0.0_wp
-   end function is_force
-
    !> Force of the drive on a slider without displacement.
    pure function pull(self, time) result(force)
       class(slider_quasistatic_type), intent(in) :: self
@@ -126,7 +118,7 @@ contains
       real(wp) :: force
 
       force = self%drive_at(time)
-      if (.not. self%is_force()) force = force * self%stiffness
+      if (self%stiffness > 0.0_wp) force = force * self%stiffness
    end function pull
 
    !> The motion at a time of the last advance.
@@ -148,7 +140,7 @@ contains
       motion%spring_force = self%pull(time) - self%stiffness * displacement
       motion%elastic_force = motion%spring_force
       motion%drive_displacement = motion%displacement
-      if (.not. self%is_force()) motion%drive_displacement = self%origin + self%drive_at(time)
+      if (self%stiffness > 0.0_wp) motion%drive_displacement = self%origin + self%drive_at(time)
    end function observe
 
    !> Energy of the drive's spring.
@@ -159,7 +151,7 @@ contains
       real(wp) :: energy
 
       energy = 0.0_wp
-      if (.not. self%is_force()) then
+      if (self%stiffness > 0.0_wp) then
          energy = 0.5_wp * self%stiffness * (self%drive_at(self%time) - self%displacement)**2
       end if
    end function energy
@@ -175,7 +167,7 @@ contains
 
       force = self%drive_at(self%time)
       call shift_slider(self, shift)
-      if (self%is_force()) self%drive_displacement = force
+      if (.not. self%stiffness > 0.0_wp) self%drive_displacement = force
       self%rest_displacement = self%rest_displacement - shift
    end subroutine shift_origin
 

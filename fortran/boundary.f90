@@ -7,7 +7,8 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    & coupling, reattach, law, relative_width, initial, seed, realization, bond, lattice, columns, &
    & lattice_rows, slider_kind, mass, spring, damping, layers, layer_damping, base, solver, &
    & tolerances, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
-   & quiet_time, least_avalanche, snapshot_size, most_avalanches, snapshot_times, snapshot_time, started, reals, integers, &
+   & quiet_time, least_avalanche, snapshot_size, most_avalanches, snapshot_times, snapshot_time, &
+   & started, reals, integers, &
    & state_real, state_integer, records, record, detached, detached_contact, next_contact, &
    & tracked, track, &
    & resolution, &

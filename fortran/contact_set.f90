@@ -230,7 +230,7 @@ contains
       end associate
    end subroutine take_hold
 
-   !> Draw what a contact will be when it attaches the next time, so early that nothing waits for it.
+   !> Draw what a contact will be when it attaches the next time; so early, nothing waits for it.
    subroutine draw_next(self, contact, renewal)
       class(contact_set_type), intent(inout) :: self
       integer, intent(in) :: contact

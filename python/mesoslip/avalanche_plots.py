@@ -29,7 +29,7 @@ MOST_POLYGONS = 20_000
 MOST_FRAMES = 100
 FRAME_SECONDS = 0.08
 
-DETACHED_COLOR = "white"
+BLANK = "0.93"
 
 
 def overview(tree: xr.DataTree) -> Figure:
@@ -47,8 +47,8 @@ def overview(tree: xr.DataTree) -> Figure:
         sizes.semilogy(where, data["size"].values, ".", color="black", markersize=2)
         sizes.set_ylabel("avalanche size")
         sizes.set_ylim(0.8, 1.25 * max(config.contacts.count, data["size"].values.max(initial=1)))
-        sizes.axhline(config.contacts.count, color="tab:red", linewidth=0.6, label="all contacts")
-        sizes.legend(loc="upper left")
+        sizes.axhline(config.contacts.count, color="tab:red", linewidth=0.6)
+        sizes.set_title("red: as many as all contacts", loc="left")
         sizes.set_xlabel("displacement (µm)")
     return figure
 
@@ -90,7 +90,7 @@ def distribution(tree: xr.DataTree) -> Figure:
         cumulative.set_ylabel("$P(S \\geq s)$")
         fit = fit_power_law(sizes, replicas=0)
         draw_distribution(density, sizes, fit)
-        cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-post")
+        cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-pre")
         if fit is not None:
             label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
             label += f"{fit.exponent_error:.3f}"
@@ -102,7 +102,8 @@ def distribution(tree: xr.DataTree) -> Figure:
 
 
 def draw_contacts(axes: Axes, snapshots: xr.Dataset, values: Array, **style: Any) -> Any:
-    """Draw a value of each contact at its place, shape (rows, columns); NaN is left blank."""
+    """Draw a value of each contact at its place, shape (rows, columns); NaN in light grey."""
+    style["cmap"] = mpl.colormaps[style["cmap"]].with_extremes(bad=BLANK)
     x, y = snapshots["x"].values, snapshots["y"].values
     spacing = x[0, 1] - x[0, 0]
     axes.set_aspect("equal")
@@ -164,7 +165,7 @@ def lattice(tree: xr.DataTree, number: int | None = None) -> Figure:
             panels[0], snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
         )
         figure.colorbar(drawn, ax=panels[0], shrink=0.8, label="force over threshold")
-        panels[0].set_title(f"{snapshot['time'].item():.6g} s; blank: detached", loc="left")
+        panels[0].set_title(f"{snapshot['time'].item():.6g} s; grey: detached", loc="left")
         if size:
             draw_generations(figure, panels[1], snapshot)
             panels[1].set_title(f"an avalanche of {size} contacts", loc="left")

@@ -268,7 +268,7 @@ def avalanches(
 ) -> None:
     """Show sizes of avalanches: their distribution, and the law that fits it."""
     from mesoslip import avalanche_catalogue, store
-    from mesoslip.avalanche_statistics import logarithmic_bins
+    from mesoslip.avalanche_statistics import ccdf, logarithmic_bins
 
     tree = store.read_run(output)
     start = _time(after, "--after")
@@ -287,7 +287,10 @@ def avalanches(
         )
     ]
     if as_json:
-        typer.echo(json.dumps({"statistics": statistics, "distribution": distribution}, indent=2))
+        sizes, part = ccdf(data["size"].values)
+        cumulative = {"size": sizes.tolist(), "part_at_least": part.tolist()}
+        answer = {"statistics": statistics, "distribution": distribution, "ccdf": cumulative}
+        typer.echo(json.dumps(answer, indent=2))
         return
     typer.echo("       from         to      count        P(s)       error")
     for one in distribution:

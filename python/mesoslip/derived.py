@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mesoslip.config import Config, LayeredSlider, RigidSlider
+from mesoslip.config import Config, LayeredSlider, QuasistaticSlider, RigidSlider
 from mesoslip.contact_lives import scales
 
 
@@ -79,6 +79,16 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "N/m",
         "estimate of K*, above which sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48)",
     )
+    if config.interaction is not None:
+        bond = config.bond_stiffness
+        bonds = config.interaction.neighbours * bond
+        yield "bond_stiffness", bond, "N/m", "stiffness between neighbours, G = 3 xi f_s/a"
+        yield (
+            "bond_ratio",
+            bonds / stiffness,
+            "1",
+            "that of all bonds of a contact over its own, G z/k",
+        )
     lives = scales(config)
     yield (
         "mean_life",
@@ -104,6 +114,15 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
 
 def _slider(config: Config) -> Iterator[tuple[str, float, str, str]]:
     slider, contacts = config.slider, config.contacts
+    if isinstance(slider, QuasistaticSlider) and slider.stiffness is not None:
+        if contacts.reattach:
+            yield (
+                "mean_avalanche_size",
+                1 + contacts.stiffness / slider.stiffness,
+                "1",
+                "mean size of avalanches in stationary sliding without interaction, 1 + Nk/K",
+            )
+        return
     if not isinstance(slider, RigidSlider | LayeredSlider):
         return
     if isinstance(slider, LayeredSlider):

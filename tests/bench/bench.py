@@ -230,6 +230,84 @@ def layered_cost() -> None:
         step /= 2
 
 
+def interacting(count: int, columns: int, strength: float | None) -> Config:
+    """Klein's contacts at the same distance from each other, however many there are."""
+    tables = Config.load(KLEIN, [f"contacts.count={count}"]).to_dict()
+    tables["contacts"]["area"] = 1e-10 * count / 4080
+    tables["contacts"]["threshold"]["relative_width"] = 0.1
+    if strength is not None:
+        rows = count // columns
+        tables["interaction"] = {"strength": strength, "columns": columns, "rows": rows}
+    # Without the catalogue, which takes 80 bytes an avalanche.
+    tables["output"] = {"interval": 0.01}
+    if strength is not None:
+        tables["output"]["avalanche_size"] = 10**9
+    return Config.from_dict(tables)
+
+
+def interaction_cost() -> None:
+    """Nanoseconds for a break and the birth after it, among neighbours."""
+    print("\nCost of a break and rebirth with interaction, rigid slider, relative width 0.1")
+    print(
+        "  contacts   strength    breaks   ns/break   against 4080   bytes/contact   mean avalanche"
+    )
+    for strength in (None, 0.03, 0.1, 0.3):
+        reference = 0.0
+        for count, columns in ((4080, 60), (1_000_000, 1000)):
+            realization = Realization(interacting(count, columns, strength), 0)
+            before = memory_in_use()
+            while realization.breaks < count / 2 and not realization.finished:
+                realization.advance(20_000)
+            breaks, seconds = realization.breaks, realization.kernel_seconds
+            most = breaks + max(400_000, 3 * count)
+            while realization.breaks < most and not realization.finished:
+                realization.advance()
+            # Tree, neighbours and a list of contacts live in the kernel during a segment.
+            memory = (memory_in_use() - before) / count
+            memory += 36 if strength is None else 17 + 24 + 4
+            breaks = realization.breaks - breaks
+            cost = (realization.kernel_seconds - seconds) / breaks * 1e9
+            reference = reference or cost
+            mean = realization.breaks / max(realization.avalanche_count, 1)
+            print(
+                f"{count:10d} {strength or 0.0:10g} {breaks:9d} {cost:10.0f} "
+                f"{cost / reference:14.2f} {memory if count > 4080 else np.nan:15.0f} {mean:16.1f}",
+                flush=True,
+            )
+
+
+def quasistatic_cost() -> None:
+    """Nanoseconds a break of a slider without inertia, contacts attaching at once."""
+    print("\nCost of a break and rebirth under the quasi-static slider")
+    print("  contacts   K/Nk   strength    breaks   ns/break   mean avalanche")
+    for count, columns, spring, strength in (
+        (4080, 60, 200.0, None),
+        (4080, 60, 20.0, None),
+        (100_000, 250, 200.0, None),
+        (1_000_000, 1000, 200.0, None),
+        (4080, 60, 200.0, 0.1),
+        (1_000_000, 1000, 200.0, 0.1),
+    ):
+        tables = interacting(count, columns, strength).to_dict()
+        tables["slider"] = {"kind": "quasistatic", "stiffness": spring}
+        tables["contacts"]["threshold"]["relative_width"] = 0.3
+        del tables["run"]["duration"]
+        tables["run"]["avalanches"] = int(4e6 * spring / (2000 + spring))
+        realization = Realization(Config.from_dict(tables), 0)
+        while realization.breaks < count and not realization.finished:
+            realization.advance(20_000)
+        breaks, seconds = realization.breaks, realization.kernel_seconds
+        while not realization.finished:
+            realization.advance()
+        breaks = realization.breaks - breaks
+        cost = (realization.kernel_seconds - seconds) / breaks * 1e9
+        print(
+            f"{count:10d} {spring / 2000:6g} {strength or 0.0:10g} {breaks:9d} {cost:10.0f} "
+            f"{realization.breaks / realization.avalanche_count:16.1f}",
+            flush=True,
+        )
+
+
 def main() -> None:
     np.seterr(all="raise")
     whole = min((finish(Config.load(KLEIN)) for _ in range(3)), key=lambda one: one.kernel_seconds)
@@ -244,6 +322,8 @@ def main() -> None:
     curve_cost()
     master_equation_cost()
     layered_cost()
+    interaction_cost()
+    quasistatic_cost()
 
 
 if __name__ == "__main__":

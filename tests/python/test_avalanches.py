@@ -261,6 +261,7 @@ def test_commands(tmp_path, capsys, monkeypatch):
     assert answer["statistics"]["count"] == len(times) > 0
     assert sum(one["count"] for one in answer["distribution"]) == len(times)
     assert times.min() >= 2
+    assert answer["ccdf"]["part_at_least"][0] == 1
 
     for name, words in (
         ("run.png", ()),

@@ -28,7 +28,11 @@ SUMMARY = {
     "largest_size": ("1", "largest size"),
     "largest_part": ("1", "largest size over the number of contacts"),
     "triggered_share": ("1", "share of the breaks that others brought about"),
-    "slip_share": ("1", "share of the slider's displacement that happens in avalanches"),
+    "slip_share": (
+        "1",
+        "share of the slider's displacement that happens in avalanches, for a drive "
+        "in one direction",
+    ),
     "spanning_count": ("1", "avalanches that span the lattice"),
     "strength": ("N", "greatest contact force before an avalanche"),
     "failure_size": ("1", "mean size of the avalanches that broke all contacts that were left"),
@@ -109,8 +113,8 @@ def statistics(
     result["largest_size"] = float(sizes.max())
     result["largest_part"] = float(sizes.max() / config.contacts.count)
     result["triggered_share"] = float(1 - sizes.size / sizes.sum())
-    whole = after == 0 and force_above is None
-    if "slip" in data and whole:
+    directions = {math.copysign(1, one.velocity) for one in config.drive_stages if one.velocity}
+    if "slip" in data and after == 0 and force_above is None and len(directions) == 1:
         root = tree.to_dataset()
         moved = float(np.abs(root["end_displacement"]).sum())
         if moved > 0:

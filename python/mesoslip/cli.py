@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mesoslip.errors import MesoslipError
+
+if TYPE_CHECKING:
+    from mesoslip.config import Config
 
 INTERRUPTED = 130
 
@@ -155,6 +158,7 @@ def curve(
     checked = api.as_config(config, changes or ())
     if output is not None:
         store.check_writable(output)
+    _tell_without_interaction(checked)
     force_curve = ForceCurve(checked)
     if output is not None:
         store.write(force_curve.to_tree(), output)
@@ -189,6 +193,7 @@ def onset(
     checked = api.as_config(config, changes or ())
     if output is not None:
         store.check_writable(output)
+    _tell_without_interaction(checked)
     tree = api.onset(checked)
     if output is not None:
         store.write(tree, output)
@@ -200,6 +205,12 @@ def onset(
     for name, value in summary.items():
         _show(name, value, *SUMMARY[name])
     typer.echo(tree.attrs["comment"])
+
+
+def _tell_without_interaction(config: Config) -> None:
+    """The master equation has no neighbours: say so to who asks for some."""
+    if config.interaction is not None and config.interaction.strength > 0:
+        typer.echo("this is without [interaction], which the master equation cannot have", err=True)
 
 
 @app.command()

@@ -27,9 +27,6 @@ module mesoslip_simulation
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
 
-   !> Jumps of a slider without inertia in one advance.
-   integer, parameter :: most_jumps = 1000
-
    !> Breaks of each contact in one avalanche, on average, from which on a slider under a force is
    !> taken to slide for ever.
    real(wp), parameter :: most_lives = 1000.0_wp
@@ -73,7 +70,7 @@ module mesoslip_simulation
       procedure :: energy_balance
       !> Put the state into an archive or take it out
       procedure :: exchange
-      procedure, private :: advance, follow, finish, is_broken
+      procedure, private :: advance, follow, finish, is_broken, slides
    end type simulation_type
 
 contains
@@ -96,27 +93,29 @@ contains
          & + self%contacts%elastic_energy(self%slider%displacement)
       call self%recorder%record(self%slider, 0.0_wp, 0.0_wp)
       call self%avalanches%see_response(self%slider, self%contacts, self%contacts%law())
+      call self%avalanches%see_advance(self%slider, self%contacts)
    end subroutine start
 
    !> Go on for some advances, or until the recorder is full, or until the end.
    subroutine run(self, most_advances, error)
       !> The simulation
       class(simulation_type), intent(inout) :: self
-      !> Largest number of advances of the slider
+      !> Number of advances of the slider
       integer(i8), intent(in) :: most_advances
       !> Set if the motion makes no progress
       type(error_type), allocatable, intent(out) :: error
 
-      integer(i8) :: advance
+      integer(i8) :: last
       real(wp) :: time, displacement
 
-      do advance = 1, most_advances
+      last = self%advances + most_advances
+      do while (self%advances < last)
          if (self%ending /= ending_none) exit
          if (.not. (self%recorder%has_room() .and. self%contacts%has_room() &
             & .and. self%avalanches%has_room())) exit
          time = self%slider%time
          displacement = self%slider%displacement
-         call self%advance()
+         call self%advance(last)
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
             return
@@ -139,15 +138,16 @@ contains
       end do
    end subroutine run
 
-   !> One advance of the slider and the events at its end.
-   subroutine advance(self)
+   !> One advance of the slider and the events at its end, or several in the midst of an avalanche.
+   subroutine advance(self, last)
       class(simulation_type), intent(inout) :: self
+      !> Advances after which to stop
+      integer(i8), intent(in) :: last
 
       type(pose_type) :: before
       type(interface_law_type) :: law
       type(window_type) :: window
       real(wp) :: sampling, end_time
-      integer :: jump
 
       before = self%slider%pose()
       call self%contacts%offer(before, law, window)
@@ -167,21 +167,27 @@ contains
       self%advances = self%advances + 1
       if (self%slider%instant) then
          ! In the midst of an avalanche time stands still: there is nothing else to look at.
-         do jump = 1, most_jumps
+         do while (self%advances < last)
             if (self%slider%settled .or. self%slider%unbound) exit
             before = self%slider%pose()
             call self%contacts%respond(before, before)
             call self%avalanches%see_response(self%slider, self%contacts, law)
-            if (allocated(self%contacts%failure)) return
+            if (allocated(self%contacts%failure) .or. self%slides()) exit
+            call self%follow()
+            before = self%slider%pose()
             call self%contacts%offer(before, law, window)
             window%end_time = min(window%end_time, end_time)
             call self%slider%advance(law, window)
             self%advances = self%advances + 1
          end do
       end if
-      if (allocated(self%slider%failure)) return
+      if (allocated(self%slider%failure) .or. allocated(self%contacts%failure)) return
       if (self%slider%unbound) then
          call self%finish(ending_broken)
+         return
+      end if
+      if (self%slides()) then
+         call self%finish(ending_slides)
          return
       end if
       call self%recorder%record(self%slider, self%contacts%detached_count, self%contacts%breaks)
@@ -204,10 +210,17 @@ contains
          self%stage = self%stage + 1
          call self%slider%drive(self%stage_velocity(self%stage))
       end if
-      if (self%avalanches%size > most_lives * self%contacts%parameters%count &
-         & .and. self%under_force) call self%finish(ending_slides)
       call self%follow()
    end subroutine advance
+
+   !> Whether contacts break under a force without end.
+   pure function slides(self)
+      class(simulation_type), intent(in) :: self
+      logical :: slides
+
+      slides = self%under_force &
+         & .and. self%avalanches%size > most_lives * self%contacts%parameters%count
+   end function slides
 
    !> Whether no contact is left to break, in a run that would go on until one does.
    pure function is_broken(self, law, window)

@@ -260,7 +260,7 @@ class LayeredSlider(Table):
             stiffness = self.base.stiffness + config.contacts.stiffness
             rate += math.sqrt(stiffness / self.base.mass) + drag / self.base.mass
             rate += self.base.damping
-        work = config.duration * rate * (self.layers + 10)
+        work = config.expected_duration * rate * (self.layers + 10)
         return "series" if work < MOST_SERIES_WORK else "bdf"
 
 

@@ -90,6 +90,9 @@ SLIP_VELOCITY_RATIO = 0.02
 # Displacements below this part of the spring's extension under F_s do not matter to CVODE.
 TINY_STRETCH = 1e-6
 
+# Work of the drive over the energy of all contacts about to break, below which it does not count.
+LEAST_ENERGY = 1e-9
+
 # The end of a drive that does not end: the greatest double.
 NEVER = float(np.finfo(np.float64).max)
 
@@ -286,8 +289,11 @@ class Realization:
     @property
     def energy_residual(self) -> float:
         """What the energy balance lacks, relative to the work of the drive or its largest term."""
+        contacts = self.config.contacts
+        # A run in which hardly anything happens is measured by what may happen.
+        unit = contacts.static_force**2 / contacts.stiffness
         scale = abs(self.energy[0]) or float(np.max(np.abs(self.energy)))
-        return float(self.energy[-1] / scale) if scale else 0.0
+        return float(self.energy[-1] / max(scale, LEAST_ENERGY * unit))
 
     def advance(self, advances: int | None = None) -> None:
         """Go on for one segment: about a quarter of a second, or a number of advances.
@@ -390,7 +396,7 @@ class Realization:
         self.avalanche_count, self.avalanche_slip, self.displacement, status, message = results[9:]
         self.kernel_seconds += seconds
         # A segment may also end because a buffer is full; a longer one would be no use then.
-        if self._grows and made - self.advances == segment and seconds < 0.5 * SEGMENT_SECONDS:
+        if self._grows and made - self.advances >= segment and seconds < 0.5 * SEGMENT_SECONDS:
             self._segment *= 2
         self._started = True
         if status != 0:

@@ -78,7 +78,7 @@ def breaks(config: Config, most: int) -> list[tuple[float, int]]:
 @pytest.mark.parametrize("bonds", [0.3, 3.0])
 def test_events_are_those_of_forces_recomputed_at_every_event(klein, kind, size, changes, bonds):
     config = klein(**FAST | lattice(kind, *size, bonds) | changes)
-    oracle = exact_events(config, scan=4e-5)
+    oracle = exact_events(config, scan=1e-4)
     expected = [(time, sorted(contacts)) for time, contacts in oracle.avalanches]
     assert len(oracle.events) >= (3 if config.contacts.reattach else 0.5) * config.contacts.count
     assert max(len(contacts) for _, contacts in expected) > 1
@@ -301,10 +301,10 @@ def test_segments_and_snapshots_do_not_change_a_run(klein, slider):
 def test_the_load_of_a_snapshot_is_the_force_that_breaks(klein):
     """With contacts detached and attached, against the oracle's forces at the oracle's state."""
     changes = FAST | lattice("triangular", 4, 4, 0.3) | {"contacts__delay": 4e-3}
-    oracle = exact_events(klein(**changes), scan=4e-5)
+    oracle = exact_events(klein(**changes), scan=1e-4)
     time = 0.5 * (oracle.events[20][0] + oracle.events[21][0])
     changes["run__duration"] = time
-    oracle = exact_events(klein(**changes), scan=4e-5)
+    oracle = exact_events(klein(**changes), scan=1e-4)
     config = klein(**changes, output__snapshots=(time,))
     stretch, load, _ = finish(config).snapshots[0].T
     pinned = oracle.pinned

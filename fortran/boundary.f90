@@ -9,7 +9,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    & tolerances, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
    & quiet_time, least_avalanche, snapshot_size, most_avalanches, snapshot_times, snapshot_time, &
    & started, reals, integers, &
-   & state_real, state_integer, records, record, detached, detached_contact, next_contact, &
+   & state_real, state_integer, records, record, detached, detached_contact, &
    & tracked, track, &
    & resolution, &
    & populations, population, packets, packet, layer_state, trace_capacity, trace, &
@@ -74,8 +74,7 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    integer(8), intent(inout) :: state_integer(integers)
    !> Contacts, for engine 1: as many records as contacts
    integer, intent(in) :: records
-   real(8), intent(inout), target :: record(4, records), detached(2, records)
-   real(8), intent(inout), target :: next_contact(2, records)
+   real(8), intent(inout), target :: record(5, records), detached(2, records)
    integer, intent(inout), target :: detached_contact(records)
    !> Contacts of the present avalanche: as many as contacts when they are on a lattice, or none
    integer, intent(in) :: tracked
@@ -167,7 +166,6 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
       arrays%record => record
       arrays%detached => detached
       arrays%detached_contact => detached_contact
-      arrays%next => next_contact
       ! Without a bond contacts know nothing of each other, wherever they are.
       if (bond > 0.0_wp) then
          allocate (neighbours)

@@ -1,14 +1,14 @@
-!> The record of a contact: a column of four numbers, half a cache line.
+!> The record of a contact: a column of numbers, in one line of the cache or two.
 module mesoslip_contact_record
    use mesoslip_kinds, only: wp
    implicit none
    private
 
-   public :: record_length, row_origin, row_stiffness, row_limit, row_renewal
+   public :: record_length, row_origin, row_stiffness, row_limit, row_renewal, row_next
    public :: ahead_coordinate, behind_coordinate
 
    !> Numbers in a record
-   integer, parameter :: record_length = 4
+   integer, parameter :: record_length = 5
    !> Displacement of the slider at which the stretch is zero [m]
    integer, parameter :: row_origin = 1
    !> Stiffness [N/m]; zero while the contact is detached
@@ -17,6 +17,8 @@ module mesoslip_contact_record
    integer, parameter :: row_limit = 3
    !> How often the contact has been born again: a whole number
    integer, parameter :: row_renewal = 4
+   !> Relative threshold that the contact will have when it is born the next time
+   integer, parameter :: row_next = 5
 
 contains
 

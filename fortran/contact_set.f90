@@ -12,7 +12,8 @@ module mesoslip_contact_set
    use mesoslip_interface_law, only: interface_law_type
    use mesoslip_contacts, only: contact_parameters_type, contacts_type, extent_length
    use mesoslip_contact_mechanics, only: coupling_scaled, initial_steady, initial_uniform
-   use mesoslip_contact_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_contact_record, only: row_limit, row_next, row_origin, row_renewal, &
+      & row_stiffness
    implicit none
    private
 
@@ -34,9 +35,6 @@ module mesoslip_contact_set
       real(wp), pointer, contiguous :: detached(:, :) => null()
       !> Numbers of the contacts in that ring, shape (count)
       integer, pointer, contiguous :: detached_contact(:) => null()
-      !> Stiffness [N/m] and breaking stretch [m] that each contact will have when it attaches the
-      !> next time, shape (2, count)
-      real(wp), pointer, contiguous :: next(:, :) => null()
    end type contact_arrays_type
 
    !> N contacts one by one.
@@ -204,8 +202,7 @@ contains
 
       place = self%first_detached + 1
       contact = self%arrays%detached_contact(place)
-      stiffness = self%arrays%next(1, contact)
-      limit = self%arrays%next(2, contact)
+      call born(self%parameters, self%arrays%record(row_next, contact), stiffness, limit)
       origin = displacement - force / (stiffness + bond)
 
       call self%drag%add(-self%arrays%detached(row_drag, place))
@@ -230,7 +227,7 @@ contains
       end associate
    end subroutine take_hold
 
-   !> Draw what a contact will be when it attaches the next time; so early, nothing waits for it.
+   !> Draw the threshold of a contact at its next birth; so early that nothing waits for it.
    subroutine draw_next(self, contact, renewal)
       class(contact_set_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -241,8 +238,7 @@ contains
 
       call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
          & int(renewal, i8), 0_i8, uniform)
-      call born(self%parameters, self%parameters%law%quantile(uniform(1)), &
-         & self%arrays%next(1, contact), self%arrays%next(2, contact))
+      self%arrays%record(row_next, contact) = self%parameters%law%quantile(uniform(1))
    end subroutine draw_next
 
    !> Move all origins.

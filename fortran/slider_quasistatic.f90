@@ -102,10 +102,9 @@ contains
       way = self%displacement - start
       if (abs(way) > 0.0_wp) self%sense = sign(1.0_wp, way)
       if (self%stiffness > 0.0_wp) then
-         pull = pull - self%stiffness * start
-         way = self%drive_velocity * (self%time - self%step_time)
-         call self%drive_work%add(way * (pull + 0.5_wp * self%stiffness &
-            & * (way - self%displacement + start)))
+         ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
+         call self%drive_work%add(self%drive_velocity * (self%time - self%step_time) &
+            & * (law%stiffness * (start + 0.5_wp * way) - law%offset))
       else
          call self%drive_work%add(way * (pull + 0.5_wp * rate * (self%time - self%step_time)))
       end if

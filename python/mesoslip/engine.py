@@ -180,9 +180,8 @@ class Realization:
         reals, integers = _core.state_sizes()
         self._state_real = np.zeros(reals)
         self._state_integer = np.zeros(integers, dtype=np.int64)
-        self._record = np.zeros((4, count), order="F")
+        self._record = np.zeros((5, count), order="F")
         self._detached = np.zeros((2, count), order="F")
-        self._next_contact = np.zeros((2, count), order="F")
         self._detached_contact = np.zeros(count, dtype=np.int32)
         self._population = np.zeros((populations, POPULATION_COLUMNS), order="F")
         self._packet = np.zeros((PACKET_ROWS, populations), order="F")
@@ -221,7 +220,7 @@ class Realization:
 
     def release(self) -> None:
         """Give back the memory of the state, of a realization that will not go on."""
-        del self._record, self._detached, self._detached_contact, self._next_contact
+        del self._record, self._detached, self._detached_contact
         del (
             self._trace,
             self._slip_trace,
@@ -376,7 +375,6 @@ class Realization:
             record=self._record,
             detached=self._detached,
             detached_contact=self._detached_contact,
-            next_contact=self._next_contact,
             track=self._track,
             resolution=config.run.resolution,
             population=self._population,

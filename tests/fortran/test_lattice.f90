@@ -180,14 +180,13 @@ contains
       integer, parameter :: columns = 12, rows = 10, number = columns * rows
       type(contact_lattice_type) :: contacts
       real(wp), target :: record(record_length, number), detached(detached_length, number)
-      real(wp), target :: next(2, number)
       integer, target :: detached_contact(number), track(track_length, number)
       real(wp) :: displacement
       integer :: step, extent(extent_length)
       logical :: is_whole, bears
 
       call build(contacts, columns, rows, 5.0_wp, 1.0e-3_wp, record, detached, detached_contact, &
-         & next, track)
+         & track)
       call contacts%initialize(initial_uniform)
       call check(contacts%detached_count > 0.0_wp .and. contacts%breaks <= 0.0_wp, &
          & "what neighbours push over at the start is detached, and no break")
@@ -223,11 +222,10 @@ contains
       integer, parameter :: columns = 4, rows = 4, number = columns * rows
       type(contact_lattice_type) :: contacts
       real(wp), target :: record(record_length, number), detached(detached_length, number)
-      real(wp), target :: next(2, number)
       integer, target :: detached_contact(number), track(track_length, number)
 
       call build(contacts, columns, rows, 1.0e5_wp, 0.0_wp, record, detached, detached_contact, &
-         & next, track)
+         & track)
       call contacts%initialize(initial_uniform)
       call contacts%respond(pose_type(), pose_type(displacement=3.0_wp))
       call check(.not. allocated(contacts%failure), "a cascade without delay ends")
@@ -249,13 +247,12 @@ contains
 
    !> Contacts of unit threshold and stiffness on a lattice.
    subroutine build(contacts, columns, rows, bond, delay, record, detached, detached_contact, &
-      & next, track)
+      & track)
       type(contact_lattice_type), intent(out) :: contacts
       integer, intent(in) :: columns, rows
       real(wp), intent(in) :: bond, delay
       real(wp), intent(inout), target, contiguous :: record(:, :), detached(:, :)
       integer, intent(inout), target, contiguous :: detached_contact(:), track(:, :)
-      real(wp), intent(inout), target, contiguous :: next(:, :)
 
       type(contact_parameters_type) :: parameters
       type(contact_arrays_type) :: arrays
@@ -274,7 +271,6 @@ contains
       arrays%record => record
       arrays%detached => detached
       arrays%detached_contact => detached_contact
-      arrays%next => next
       call new_contact_lattice(contacts, parameters, &
          & interaction_type(bond, lattice_square, columns, rows), arrays, error)
       contacts%track%columns = columns

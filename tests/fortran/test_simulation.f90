@@ -26,7 +26,6 @@ program test_simulation
    integer(i8), parameter :: forever = 1000000000_i8
    real(wp), target :: record(record_length, count), detached(detached_length, count)
    integer, target :: detached_contact(count)
-   real(wp), target :: next(2, count)
    real(wp), target :: trace(trace_length, rows), slip_trace(slip_trace_length, rows)
    real(wp), target :: slips(slip_length, rows), layers(0, rows)
    real(wp), target :: avalanches(avalanche_length, 1), place(snapshot_place_length, 1)
@@ -166,7 +165,6 @@ contains
       arrays%record => record
       arrays%detached => detached
       arrays%detached_contact => detached_contact
-      arrays%next => next
       allocate (contacts)
       call new_contact_ensemble(contacts, parameters, arrays, error)
       call move_alloc(contacts, simulation%contacts)

@@ -725,6 +725,12 @@ def _drive_checks(config: Config) -> Iterable[tuple[str, str, object]]:
                 "give either this or run.duration",
                 run.drive_displacement,
             )
+        elif math.isinf(config.duration):
+            yield (
+                "run.drive_displacement",
+                f"takes for ever at {drive.velocity:g} m/s",
+                run.drive_displacement,
+            )
     if run.avalanches is not None:
         if not config.has_avalanches:
             yield (

@@ -394,7 +394,8 @@ class Realization:
         self.avalanche_count, self.avalanche_slip, self.displacement, status, message = results[9:]
         self.kernel_seconds += seconds
         # A segment may also end because a buffer is full; a longer one would be no use then.
-        if self._grows and made - self.advances >= segment and seconds < 0.5 * SEGMENT_SECONDS:
+        was_all_made = made - self.advances >= segment
+        if advances is None and self._grows and was_all_made and seconds < 0.5 * SEGMENT_SECONDS:
             self._segment *= 2
         self._started = True
         if status != 0:

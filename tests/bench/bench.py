@@ -261,7 +261,7 @@ def interaction_cost() -> None:
             breaks, seconds = realization.breaks, realization.kernel_seconds
             most = breaks + max(400_000, 3 * count)
             while realization.breaks < most and not realization.finished:
-                realization.advance()
+                realization.advance(1_000_000)
             # Tree, neighbours and a list of contacts live in the kernel during a segment.
             memory = (memory_in_use() - before) / count
             memory += 36 if strength is None else 17 + 24 + 4

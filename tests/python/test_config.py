@@ -174,6 +174,10 @@ def test_what_is_wrong_is_told(key, value, words):
             ["run.drive_displacement", "drive.velocity", "not 0"],
         ),
         (
+            {"run": {"drive_displacement": 1e10}, "drive__velocity": 1e-300},
+            ["run.drive_displacement", "takes for ever at 1e-300 m/s"],
+        ),
+        (
             {"run": {"avalanches": 5}, "interaction": LATTICE, "drive__velocity": 0.0},
             ["drive.velocity", "must not be 0"],
         ),

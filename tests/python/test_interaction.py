@@ -314,3 +314,12 @@ def test_the_load_of_a_snapshot_is_the_force_that_breaks(klein):
     np.testing.assert_allclose(x, x[0], rtol=1e-9)
     expected = oracle.breaking_force(x[0]) / (oracle.u * config.contacts.contact_static_force)
     np.testing.assert_allclose(load[pinned], expected[pinned], rtol=1e-7)
+
+
+def test_segments_of_a_given_length_do_not_grow(klein):
+    realization = Realization(klein(**QUASISTATIC, run__avalanches=10**6), 0)
+    usual = realization._segment
+    for segment in range(1, 200):
+        realization.advance(100)
+        assert realization.advances == 100 * segment
+    assert realization._segment == usual

@@ -91,7 +91,7 @@ contains
       call self%contacts%respond(self%slider%pose(), self%slider%pose())
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
-      call self%recorder%record(self%slider, 0.0_wp, 0.0_wp)
+      call self%recorder%record(self%slider, self%contacts%detached_count, 0.0_wp)
       call self%avalanches%see_response(self%slider, self%contacts, self%contacts%law())
       call self%avalanches%see_advance(self%slider, self%contacts)
    end subroutine start
@@ -106,16 +106,18 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       integer(i8) :: last
-      real(wp) :: time, displacement
+      real(wp) :: time, displacement, most_breaks
 
+      ! One advance may break very many contacts, and a segment must not last for minutes.
       last = self%advances + most_advances
-      do while (self%advances < last)
+      most_breaks = self%contacts%breaks + real(most_advances, wp)
+      do while (self%advances < last .and. self%contacts%breaks <= most_breaks)
          if (self%ending /= ending_none) exit
          if (.not. (self%recorder%has_room() .and. self%contacts%has_room() &
             & .and. self%avalanches%has_room())) exit
          time = self%slider%time
          displacement = self%slider%displacement
-         call self%advance(last)
+         call self%advance(last, most_breaks)
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
             return
@@ -139,10 +141,11 @@ contains
    end subroutine run
 
    !> One advance of the slider and the events at its end, or several in the midst of an avalanche.
-   subroutine advance(self, last)
+   subroutine advance(self, last, most_breaks)
       class(simulation_type), intent(inout) :: self
-      !> Advances after which to stop
+      !> Advances, and breaks, after which to stop
       integer(i8), intent(in) :: last
+      real(wp), intent(in) :: most_breaks
 
       type(pose_type) :: before
       type(interface_law_type) :: law
@@ -167,7 +170,7 @@ contains
       self%advances = self%advances + 1
       if (self%slider%instant) then
          ! In the midst of an avalanche time stands still: there is nothing else to look at.
-         do while (self%advances < last)
+         do while (self%advances < last .and. self%contacts%breaks <= most_breaks)
             if (self%slider%settled .or. self%slider%unbound) exit
             before = self%slider%pose()
             call self%contacts%respond(before, before)
@@ -239,7 +242,10 @@ contains
       !> An ending_ code
       integer, intent(in) :: ending
 
-      call self%avalanches%close(self%slider, self%contacts, self%slider%displacement)
+      ! A slide without end is no avalanche.
+      if (ending /= ending_slides) then
+         call self%avalanches%close(self%slider, self%contacts, self%slider%displacement)
+      end if
       call self%recorder%finish(self%slider, self%contacts%breaks)
       self%ending = ending
    end subroutine finish

@@ -16,6 +16,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mesoslip.avalanche_catalogue import failures
 from mesoslip.avalanche_statistics import PowerLawFit, ccdf, fit_power_law, logarithmic_bins
 from mesoslip.config import Config
 from mesoslip.errors import FileError
@@ -80,7 +81,7 @@ def draw_distribution(
 def distribution(tree: xr.DataTree) -> Figure:
     """Density and complementary cumulative distribution of the sizes of avalanches."""
     data = tree.children["avalanches"].to_dataset(inherit=False)
-    sizes = data["size"].values
+    sizes = data["size"].values[~failures(tree, data)]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.5, 3))
         density, cumulative = figure.subplots(1, 2)
@@ -168,7 +169,7 @@ def lattice(tree: xr.DataTree, number: int | None = None) -> Figure:
         panels[0].set_title(f"{snapshot['time'].item():.6g} s; grey: detached", loc="left")
         if size:
             draw_generations(figure, panels[1], snapshot)
-            panels[1].set_title(f"an avalanche of {size} contacts", loc="left")
+            panels[1].set_title(f"an avalanche of {size} breaks", loc="left")
     return figure
 
 
@@ -193,6 +194,8 @@ def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
     """
     snapshot = chosen_snapshot(tree, number)
     everything = tree.children["snapshots"].to_dataset(inherit=False)
+    mine = everything["realization"].values == snapshot["realization"].item()
+    everything = everything.isel(snapshot=np.flatnonzero(mine))
     spreads = bool(snapshot["avalanche_size"].item())
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(3.6, 3.4), dpi=120)

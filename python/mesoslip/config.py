@@ -40,6 +40,7 @@ BYTES_PER_SAMPLE = 3 * 7 * 8
 
 # The same for a contact on a lattice, and for an avalanche in the catalogue.
 BYTES_PER_CONTACT_ON_LATTICE = 260
+BYTES_PER_AVALANCHE = 3 * 10 * 8
 BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
 
 # Tables and keys that the format knows and this version does not.
@@ -57,7 +58,7 @@ MOST_SERIES_WORK = 1e11
 
 # Keys that exclude each other: laid over a base, one replaces the other.
 EXCLUSIVE = {
-    "run": ("duration", "drive_displacement", "avalanches"),
+    "run": ("duration", "drive_displacement"),
     "drive": ("velocity", "stage", "force_rate"),
     "slider": ("damping", "damping_ratio"),
 }
@@ -439,9 +440,9 @@ class Output(Table):
     slip_interval: Annotated[Time, Field(gt=0)] | None = None
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
     layers: StrictBool = False
-    avalanche_size: Annotated[StrictInt, Field(ge=1)] | None = None
+    avalanche_size: Annotated[StrictInt, Field(ge=1, lt=2**53)] | None = None
     snapshots: tuple[Annotated[Time, Field(ge=0)], ...] = ()
-    snapshot_size: Annotated[StrictInt, Field(ge=1)] | None = None
+    snapshot_size: Annotated[StrictInt, Field(ge=1, lt=2**53)] | None = None
 
 
 class Curve(Table):
@@ -611,6 +612,9 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
     if problems:
         yield from problems
         return
+    if not (config.expected_duration > 0 and math.isfinite(config.expected_duration)):
+        yield "drive", "so slow or so fast that the run has no finite duration", None
+        return
     yield from _interaction_checks(config)
     interval = config.output_interval
     if interval > config.duration:
@@ -670,6 +674,14 @@ def _cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
             * together
             * (config.run.engine == "eq"),
             config.contacts.count,
+        ),
+        (
+            "run.avalanches",
+            BYTES_PER_AVALANCHE
+            * (config.run.avalanches or 0)
+            * config.run.realizations
+            * (config.output.avalanche_size is None),
+            config.run.avalanches,
         ),
         (
             "output.snapshots",

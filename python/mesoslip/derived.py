@@ -100,7 +100,7 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         steady = lives.steady_force * contacts.static_force
         yield "F_steady", steady, "N", "force of stationary slow sliding"
         speed = _drive_speed(config)
-        if speed > 0:
+        if speed > 0 and not isinstance(config.slider, QuasistaticSlider):
             life = lives.mean_life * static / stiffness
             dragged = lives.mean_mass * contacts.contact_drag * contacts.count
             force = steady * life + dragged * speed**2 * contacts.delay

@@ -93,6 +93,11 @@ TINY_STRETCH = 1e-6
 # Work of the drive over the energy of all contacts about to break, below which it does not count.
 LEAST_ENERGY = 1e-9
 
+TOO_MUCH = (
+    "not enough memory for what is recorded: a larger output.avalanche_size or "
+    "output.snapshot_size, or a longer output.interval, takes less"
+)
+
 # The end of a drive that does not end: the greatest double.
 NEVER = float(np.finfo(np.float64).max)
 
@@ -470,7 +475,10 @@ def run_realizations(
             while pending:
                 done, pending = wait(pending, timeout=0.1, return_when="FIRST_EXCEPTION")
                 for future in done:
-                    future.result()
+                    try:
+                        future.result()
+                    except MemoryError:
+                        raise RunError(TOO_MUCH) from None
                 report()
         except KeyboardInterrupt:
             pass

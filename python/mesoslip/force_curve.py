@@ -340,7 +340,7 @@ class ForceCurve:
         force = float(self.force(displacement))
         second, third = (float(self.slope(displacement, order)) for order in (2, 3))
         unit = self._force_unit
-        extension = unit / self._spring
+        extension = unit / self._spring if self._spring > 0 else math.inf
         return CriticalPoint(
             displacement,
             force,

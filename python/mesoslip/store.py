@@ -93,8 +93,8 @@ VARIABLES = {
 AVALANCHE_NAMES = {
     "time": "time at which the first contact broke",
     "displacement": "displacement of the slider at which the first contact broke",
-    "force_before": "contact force before the avalanche",
-    "force_drop": "drop of the contact force in the avalanche",
+    "force_before": "force of the pinned contacts before the avalanche, without drag",
+    "force_drop": "drop of the force of the pinned contacts in the avalanche",
     "slip": "displacement of the slider in the avalanche",
 }
 

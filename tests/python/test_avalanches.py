@@ -164,6 +164,9 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_told():
     steady = mesoslip.info(Config.from_dict(tables))["F_steady"].value
     peak = mesoslip.avalanche_summary(tree)["strength"]
     assert 0.9 * steady < peak < 1.2 * steady
+    # The slide without end is no avalanche; and the force curve needs no spring.
+    assert mesoslip.avalanches(tree)["size"].values.max() < 1000 * 1000
+    assert np.isfinite(mesoslip.curve(Config.from_dict(tables)).attrs["K_star"])
 
 
 def test_runs_end_by_avalanches_or_by_the_drive():

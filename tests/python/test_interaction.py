@@ -323,3 +323,28 @@ def test_segments_of_a_given_length_do_not_grow(klein):
         realization.advance(100)
         assert realization.advances == 100 * segment
     assert realization._segment == usual
+
+
+def test_contacts_let_go_at_the_start_are_counted(klein):
+    places = {"strength": 0.3, "columns": 60, "rows": 68}
+    config = klein(
+        contacts__initial="uniform",
+        contacts__stiffness=200.0,
+        interaction=places,
+        run__duration=0.1,
+    )
+    realization = finish(config)
+    assert realization.trace[0, 6] > 1000
+    # They attach after the delay, half a sample later.
+    assert realization.trace[1, 6] < 100
+
+
+def test_segments_end_after_many_breaks(klein):
+    """However many contacts break in an advance."""
+    config = klein(**QUASISTATIC | lattice("triangular", 20, 12, 3.0), run__avalanches=2000)
+    realization = Realization(config, 0)
+    while not realization.finished:
+        breaks = realization.breaks
+        realization.advance(10)
+        assert realization.breaks - breaks <= 10 + 3 * 240
+    assert realization.breaks > 20 * realization.avalanche_count

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mesoslip.config import Config, LayeredSlider, QuasistaticSlider, RigidSlider
+from mesoslip.config import Config
+from mesoslip.config_tables import LayeredSlider, QuasistaticSlider, RigidSlider
 from mesoslip.contact_lives import scales
 
 

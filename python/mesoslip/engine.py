@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
-from mesoslip.config import LayeredSlider, QuasistaticSlider, RigidSlider
+from mesoslip.config_tables import LayeredSlider, QuasistaticSlider, RigidSlider
 from mesoslip.contact_lives import COUPLINGS, INITIAL_STATES
 from mesoslip.errors import RunError
 from mesoslip.threshold import LAWS

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from mesoslip import _core
-from mesoslip.config import RigidSlider
+from mesoslip.config_tables import RigidSlider
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.force_curve import ForceCurve
 from mesoslip.store import program_attributes, variable

@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 
 from mesoslip import _build, _core, engine
-from mesoslip.config import Config, Interaction, LayeredSlider, QuasistaticSlider
+from mesoslip.config import Config
+from mesoslip.config_tables import Interaction, LayeredSlider, QuasistaticSlider
 from mesoslip.errors import FileError
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ module mesoslip_contact_ensemble
    use mesoslip_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts, only: contact_parameters_type
-   use mesoslip_contact_set, only: contact_arrays_type, contact_set_type, exchange_set
+   use mesoslip_contact_set, only: contact_arrays_type, contact_set_type, exchange_set, &
+      & law_set
    use mesoslip_contact_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate, behind_coordinate
    use mesoslip_contact_queue, only: contact_queue_type, new_contact_queue
@@ -84,9 +85,7 @@ contains
       !> Where it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
-      law%stiffness = self%stiffness%total()
-      law%offset = self%offset%total()
-      law%drag = self%drag%total()
+      law = law_set(self)
       window%end_time = self%next_attachment
       if (self%direction > 0.0_wp) then
          window%upper = self%queue%first_key

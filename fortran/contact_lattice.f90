@@ -11,7 +11,8 @@ module mesoslip_contact_lattice
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts, only: contact_parameters_type
-   use mesoslip_contact_set, only: contact_arrays_type, contact_set_type, snapshot_set
+   use mesoslip_contact_set, only: contact_arrays_type, contact_set_type, law_set, &
+      & snapshot_set
    use mesoslip_contact_record, only: record_length, row_limit, row_origin, row_stiffness
    use mesoslip_lattice, only: coordination, find_neighbours
    implicit none
@@ -116,9 +117,7 @@ contains
       !> Where it holds
       type(window_type), intent(out) :: window
 
-      law%stiffness = self%stiffness%total()
-      law%offset = self%offset%total()
-      law%drag = self%drag%total()
+      law = law_set(self)
       window%end_time = self%next_attachment
       window%upper = self%tree%upper()
       window%lower = self%tree%lower()

@@ -17,7 +17,7 @@ module mesoslip_contact_set
    implicit none
    private
 
-   public :: contact_set_type, contact_arrays_type, exchange_set, snapshot_set
+   public :: contact_set_type, contact_arrays_type, exchange_set, law_set, snapshot_set
    public :: detached_length
 
    !> Numbers kept for a detached contact
@@ -50,7 +50,7 @@ module mesoslip_contact_set
       !> Number of contacts that are detached, and their first place in the ring
       integer :: waiting = 0, first_detached = 0
    contains
-      procedure :: law
+      procedure :: law => law_set
       procedure :: has_room
       procedure :: elastic_energy
       procedure :: exchange => exchange_set
@@ -118,7 +118,7 @@ contains
    end subroutine draw
 
    !> Contact force as a law.
-   pure function law(self)
+   pure function law_set(self) result(law)
       !> The contacts
       class(contact_set_type), intent(in) :: self
       !> The law that holds until a contact breaks or attaches
@@ -127,7 +127,7 @@ contains
       law%stiffness = self%stiffness%total()
       law%offset = self%offset%total()
       law%drag = self%drag%total()
-   end function law
+   end function law_set
 
    !> Whether there is room for one more step: the arrays have a place for each contact.
    pure function has_room(self)

@@ -231,7 +231,6 @@ contains
       call archive%exchange(self%drive_work)
       call archive%exchange(self%drag_loss)
       call archive%exchange(self%damping_loss)
-      call archive%exchange(self%rest_displacement)
    end subroutine exchange_slider
 
 end module mesoslip_slider

@@ -167,7 +167,6 @@ contains
       force = self%drive_at(self%time)
       call shift_slider(self, shift)
       if (.not. self%stiffness > 0.0_wp) self%drive_displacement = force
-      self%rest_displacement = self%rest_displacement - shift
    end subroutine shift_origin
 
 end module mesoslip_slider_quasistatic

@@ -13,6 +13,7 @@ import xarray as xr
 from mesoslip import catalogue, engine, store
 from mesoslip.config import Config
 from mesoslip.derived import Derived, derived_quantities
+from mesoslip.errors import FileError
 
 PathLike = str | os.PathLike[str]
 
@@ -222,6 +223,8 @@ def plot(
 
     tree = output if isinstance(output, xr.DataTree) else read(output)
     if Path(figure).suffix == ".gif":
+        if view not in {None, "lattice"}:
+            raise FileError(f"{figure}: only the lattice can be shown in motion, not {view!r}")
         avalanche_plots.animate(tree, Path(figure), snapshot)
     else:
         plots.save(plots.draw(tree, view, snapshot), Path(figure))

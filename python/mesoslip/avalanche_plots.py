@@ -145,7 +145,10 @@ def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
     data = tree.children["snapshots"].to_dataset(inherit=False)
     count = data.sizes["snapshot"]
     if count == 0:
-        raise FileError("there was no avalanche of output.snapshot_size: no snapshot")
+        raise FileError(
+            "the output has no snapshot: the run had no avalanche of output.snapshot_size, or "
+            "ended before the first time of output.snapshots"
+        )
     if number is None:
         sizes = data["avalanche_size"].values
         number = int(np.argmax(sizes)) if sizes.max() > 0 else count - 1
@@ -173,7 +176,7 @@ def lattice(tree: xr.DataTree, number: int | None = None) -> Figure:
     return figure
 
 
-def draw_generations(figure: Figure, axes: Axes, snapshot: xr.Dataset) -> Any:
+def draw_generations(figure: Figure, axes: Axes, snapshot: xr.Dataset) -> None:
     """Draw the order in which the contacts of an avalanche let go."""
     generation = snapshot["generation"].values.astype(float)
     generation[generation == 0] = np.nan
@@ -181,7 +184,6 @@ def draw_generations(figure: Figure, axes: Axes, snapshot: xr.Dataset) -> Any:
         axes, snapshot, generation, cmap="inferno_r", norm=Normalize(1, np.nanmax(generation))
     )
     figure.colorbar(drawn, ax=axes, shrink=0.8, label="generation")
-    return drawn
 
 
 def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:

@@ -88,6 +88,7 @@ def run(
 ) -> None:
     """Simulate, and write an output file."""
     from mesoslip import api, store
+    from mesoslip.engine import ENDINGS
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
@@ -110,6 +111,8 @@ def run(
             f"{tree.attrs['wall_seconds']:.2f} s",
             err=True,
         )
+        if tree.attrs["ending"] != ENDINGS[1]:
+            typer.echo(f"{path}: the run ended as follows: {tree.attrs['ending']}", err=True)
 
 
 @app.command()

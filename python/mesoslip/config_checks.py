@@ -225,7 +225,7 @@ def _interaction_checks(config: Config) -> Iterable[tuple[str, str, object]]:
         yield "contacts.area", "needed for the distance between neighbours, a = (A/N)^(1/2)", None
     relative = interaction.neighbours * config.bond_stiffness / contacts.contact_stiffness
     if relative > STRONGEST_BONDS:
-        strongest = interaction.strength * STRONGEST_BONDS / relative
+        strongest = interaction.strength * (STRONGEST_BONDS / relative)
         yield (
             "interaction.strength",
             "so strong that a contact cannot attach: the force at which it does, (k + G z) x less "

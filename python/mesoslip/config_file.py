@@ -71,12 +71,12 @@ def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") ->
 
 def override(tables: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
     """Lay changes such as "contacts.delay=1ms" over tables."""
-    for override in overrides:
-        tables = _merge(tables, _parseoverride(override))
+    for change in overrides:
+        tables = _merge(tables, _parse_change(change))
     return tables
 
 
-def _parseoverride(text: str) -> dict[str, Any]:
+def _parse_change(text: str) -> dict[str, Any]:
     """The tables of a change such as "contacts.delay=1ms"."""
     key, equals, value = text.partition("=")
     key, value = key.strip(), value.strip()

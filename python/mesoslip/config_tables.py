@@ -370,7 +370,7 @@ class Contacts(Table):
 class Interaction(Table):
     """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
 
-    strength: Number
+    strength: Annotated[Number, Field(le=1e100)]
     lattice: Literal["triangular", "square"] = "triangular"
     columns: Annotated[StrictInt, Field(ge=2)]
     rows: Annotated[StrictInt, Field(ge=2)]

@@ -271,7 +271,7 @@ class Realization:
 
     @property
     def snapshots(self) -> Array:
-        count = self.config.contacts.count
+        count = self.config.contacts.count if self.config.interaction is not None else 0
         values = np.concatenate([np.empty((0, count, 3)), *self._snapshots])
         values[values > DETACHED] = np.nan
         return values

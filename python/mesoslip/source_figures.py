@@ -194,12 +194,20 @@ def delays(trees: Sequence[xr.DataTree]) -> Figure:
 
 def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
     """S23: the spring force for different dispersions of the thresholds."""
+
+    def width(tree: xr.DataTree) -> str:
+        return rf"$\Delta f_s/f_s$ = {configuration(tree).contacts.threshold.relative_width:g}"
+
+    return _stacked(trees, width)
+
+
+def _stacked(trees: Sequence[xr.DataTree], title: Callable[[xr.DataTree], str]) -> Figure:
+    """The spring forces of runs, one below the other."""
     figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
     panels = _panels(figure, len(trees), 1)[:, 0]
     for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
         plots.draw_series(axes, tree, "spring_force", color="black")
-        width = configuration(tree).contacts.threshold.relative_width
-        axes.set_title(rf"({letter}) $\Delta f_s/f_s$ = {width:g}", loc="left")
+        axes.set_title(f"({letter}) {title(tree)}", loc="left")
         axes.set_ylabel("$F_d$ (µN)")
         axes.set_xlim(0, tree["time"].max().item())
     panels[-1].set_xlabel("time (s)")
@@ -270,15 +278,7 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
 
 def interactions(trees: Sequence[xr.DataTree]) -> Figure:
     """S25: the spring force for different strengths of the interaction."""
-    figure = Figure(figsize=(6.5, 1.4 * len(trees) + 0.5))
-    panels = _panels(figure, len(trees), 1)[:, 0]
-    for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
-        plots.draw_series(axes, tree, "spring_force", color="black")
-        axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
-        axes.set_ylabel("$F_d$ (µN)")
-        axes.set_xlim(0, tree["time"].max().item())
-    panels[-1].set_xlabel("time (s)")
-    return figure
+    return _stacked(trees, _strength)
 
 
 def detaching(trees: Sequence[xr.DataTree]) -> Figure:

@@ -49,19 +49,6 @@ def column(realization: Realization, name: str) -> np.ndarray:
     return realization.avalanches[:, AVALANCHE_COLUMNS.index(name)]
 
 
-def breaks(config: Config, most: int) -> list[tuple[float, int]]:
-    """Time and contact of each break, by advancing one event at a time."""
-    realization = Realization(config, 0)
-    renewals = np.zeros(config.contacts.count)
-    events: list[tuple[float, int]] = []
-    while not realization.finished and len(events) < most:
-        realization.advance(1)
-        now = realization.contacts["renewals"]
-        events += [(realization.time, int(contact)) for contact in np.flatnonzero(now > renewals)]
-        renewals = now
-    return events
-
-
 @pytest.mark.parametrize(
     ("kind", "size", "changes"),
     [

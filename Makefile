@@ -13,8 +13,8 @@ INSTALLED := $(VENV)/.installed
 
 # .git/logs/HEAD, as outputs tell the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
-  $(wildcard fortran/meson.build fortran/*.f90 fortran/*.inc python/meson.build python/f2cmap) \
-  $(wildcard python/mesoslip/*.py python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
+  $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* python/meson.build python/f2cmap) \
+  $(wildcard python/mesoslip/*.py python/mesoslip/*/*.py python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
 # Figures need the outputs of runs, but for S18, and two of other commands.

@@ -18,20 +18,20 @@ subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back
    & snapshot, most_advances, rows, ending, full, time, breaks, detached_count, advances, &
    & integrator, energy, avalanche_total, avalanche_slip, displacement, status, message)
    !f2py threadsafe
-   use mesoslip_kinds, only: wp
-   use mesoslip_errors, only: error_type, raise, status_invalid
-   use mesoslip_archive, only: archive_type
-   use mesoslip_threshold_law, only: new_threshold_law
-   use mesoslip_contact_ensemble, only: contact_ensemble_type, new_contact_ensemble
-   use mesoslip_contact_lattice, only: contact_lattice_type, interaction_type, new_contact_lattice
-   use mesoslip_contact_populations, only: contact_populations_type, new_contact_populations
-   use mesoslip_contact_set, only: contact_arrays_type
-   use mesoslip_contacts, only: contact_parameters_type
-   use mesoslip_slider_layered, only: layered_parameters_type, slider_layered_type
-   use mesoslip_slider_prescribed, only: slider_prescribed_type
-   use mesoslip_slider_quasistatic, only: slider_quasistatic_type
-   use mesoslip_slider_rigid, only: slider_rigid_type
-   use mesoslip_recorder, only: recorder_parameters_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_contacts_threshold_law, only: new_threshold_law
+   use mesoslip_contacts_ensemble, only: contact_ensemble_type, new_contact_ensemble
+   use mesoslip_contacts_lattice, only: contact_lattice_type, interaction_type, new_contact_lattice
+   use mesoslip_contacts_populations, only: contact_populations_type, new_contact_populations
+   use mesoslip_contacts_set, only: contact_arrays_type
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_sliders_layered, only: layered_parameters_type, slider_layered_type
+   use mesoslip_sliders_prescribed, only: slider_prescribed_type
+   use mesoslip_sliders_quasistatic, only: slider_quasistatic_type
+   use mesoslip_sliders_rigid, only: slider_rigid_type
+   use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_simulation, only: simulation_type
    implicit none
    !> 1 for N contacts, 2 for infinitely many
@@ -284,9 +284,9 @@ end subroutine state_sizes
 subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, argument, value, &
    & acceptance, status, message)
    !f2py threadsafe
-   use mesoslip_kinds, only: wp
-   use mesoslip_errors, only: error_type, status_invalid
-   use mesoslip_threshold_law, only: new_threshold_law, threshold_law_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type, status_invalid
+   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
    implicit none
    integer, intent(in) :: law
    real(8), intent(in) :: relative_width, minimum
@@ -330,7 +330,7 @@ end subroutine evaluate_threshold_law
 !> Philox 4x32-10, for its tests and for whoever wants the same numbers elsewhere.
 subroutine philox(length, counter, key, word)
    !f2py threadsafe
-   use mesoslip_random, only: philox4x32
+   use mesoslip_numerics_random, only: philox4x32
    implicit none
    integer, intent(in) :: length
    !> 32-bit words in 64-bit integers, shapes (4, length), (2, length)
@@ -347,7 +347,7 @@ end subroutine philox
 !> Version of the SUNDIALS library in use.
 subroutine sundials(version)
    !f2py threadsafe
-   use mesoslip_sundials_cvode, only: sundials_version
+   use mesoslip_numerics_sundials_cvode, only: sundials_version
    implicit none
    character(len=32), intent(out) :: version
 
@@ -358,9 +358,9 @@ end subroutine sundials
 subroutine contact_scales(law, relative_width, coupling, back_force_ratio, newborn_width, &
    & reattach, initial, scales, status, message)
    !f2py threadsafe
-   use mesoslip_kinds, only: wp
-   use mesoslip_errors, only: error_type
-   use mesoslip_contact_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_theory_lives, only: contact_lives_type, new_contact_lives
    implicit none
    !> Codes of threshold law, coupling and initial state; whether contacts attach again
    integer, intent(in) :: law, coupling, initial, reattach
@@ -396,10 +396,10 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    & reattach, initial, start, width, panels, points, point, breaks, slope, force, stiffness, &
    & pinned_part, mismatch, status, message)
    !f2py threadsafe
-   use mesoslip_kinds, only: wp
-   use mesoslip_errors, only: error_type
-   use mesoslip_contact_lives, only: contact_lives_type, new_contact_lives
-   use mesoslip_renewal, only: renewal_solution_type, solve_renewal
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_theory_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
    implicit none
    !> Codes of threshold law, coupling and initial state; whether contacts attach again
    integer, intent(in) :: law, coupling, initial, reattach
@@ -456,8 +456,8 @@ end subroutine force_curve
 subroutine onset(equation, coefficients, damping, drag, end_displacement, interval, tolerance, &
    & capacity, samples, length, ended, status, message)
    !f2py threadsafe
-   use mesoslip_errors, only: error_type
-   use mesoslip_onset, only: integrate_onset, onset_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_theory_onset, only: integrate_onset, onset_type
    implicit none
    !> 1 for S46, 2 for S47
    integer, intent(in) :: equation

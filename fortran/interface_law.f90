@@ -1,6 +1,6 @@
 !> What contacts offer a slider, a linear law of the contact force, and what they learn of it.
 module mesoslip_interface_law
-   use mesoslip_kinds, only: wp
+   use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 

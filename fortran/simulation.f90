@@ -1,13 +1,13 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_simulation
-   use mesoslip_kinds, only: i8, wp
-   use mesoslip_errors, only: error_type, raise, status_stalled
-   use mesoslip_archive, only: archive_type
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_errors, only: error_type, raise, status_stalled
+   use mesoslip_numerics_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_avalanche_recorder, only: avalanche_recorder_type
-   use mesoslip_contacts, only: contacts_type
-   use mesoslip_slider, only: slider_type
-   use mesoslip_recorder, only: recorder_type, most_samples_in_step
+   use mesoslip_recording_avalanches, only: avalanche_recorder_type
+   use mesoslip_contacts_base, only: contacts_type
+   use mesoslip_sliders_base, only: slider_type
+   use mesoslip_recording_recorder, only: recorder_type, most_samples_in_step
    implicit none
    private
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
         run,
         slips,
     )
-    from mesoslip.config import Config
-    from mesoslip.force_curve import ForceCurve
-    from mesoslip.threshold import ThresholdLaw
+    from mesoslip.configuration.config import Config
+    from mesoslip.configuration.threshold_law import ThresholdLaw
+    from mesoslip.theory.force_curve import ForceCurve
 
 __all__ = [
     "Config",
@@ -51,9 +51,9 @@ __all__ = [
 
 # What takes long to import is imported when it is asked for.
 _LAZY = {
-    "Config": "config",
-    "ForceCurve": "force_curve",
-    "ThresholdLaw": "threshold",
+    "Config": "configuration.config",
+    "ForceCurve": "theory.force_curve",
+    "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",
     "curve": "api",

@@ -1,5 +1,5 @@
 """``python -m mesoslip`` is the command line."""
 
-from mesoslip.cli import main
+from mesoslip.command_line.main import main
 
 main()

@@ -10,10 +10,12 @@ from typing import Any
 
 import xarray as xr
 
-from mesoslip import catalogue, engine, store
-from mesoslip.config import Config
-from mesoslip.derived import Derived, derived_quantities
+from mesoslip.analysis import slips as catalogue
+from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
+from mesoslip.output import store
+from mesoslip.simulation import engine
+from mesoslip.theory.derived import Derived, derived_quantities
 
 PathLike = str | os.PathLike[str]
 
@@ -97,7 +99,7 @@ def curve(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
     FileError, ConfigError
         If the configuration cannot be read or is wrong.
     """
-    from mesoslip.force_curve import ForceCurve
+    from mesoslip.theory.force_curve import ForceCurve
 
     return ForceCurve(as_config(config)).to_tree()
 
@@ -112,7 +114,7 @@ def onset(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
     RunError
         If an integration fails.
     """
-    from mesoslip.slip_onset import onset_of_slip
+    from mesoslip.theory.slip_onset import onset_of_slip
 
     return onset_of_slip(as_config(config))
 
@@ -159,7 +161,7 @@ def avalanches(
     FileError
         If the output cannot be read or has no avalanches.
     """
-    from mesoslip import avalanche_catalogue
+    from mesoslip.analysis import avalanches as avalanche_catalogue
 
     return avalanche_catalogue.avalanches(_as_tree(output), after=after, force_above=force_above)
 
@@ -181,7 +183,7 @@ def avalanche_summary(
     smallest
         Least size that a power law is fitted to; chosen by default.
     """
-    from mesoslip import avalanche_catalogue
+    from mesoslip.analysis import avalanches as avalanche_catalogue
 
     return avalanche_catalogue.statistics(
         _as_tree(output), after=after, force_above=force_above, smallest=smallest
@@ -219,7 +221,8 @@ def plot(
         If the output cannot be read or does not have what is to be drawn, or the figure cannot be
         written.
     """
-    from mesoslip import avalanche_plots, plots
+    from mesoslip.plots import avalanches as avalanche_plots
+    from mesoslip.plots import run as plots
 
     tree = output if isinstance(output, xr.DataTree) else read(output)
     if Path(figure).suffix == ".gif":
@@ -247,6 +250,6 @@ def figures(
     ConfigError
         If there is no figure of a name.
     """
-    from mesoslip import source_figures
+    from mesoslip.plots import source_figures
 
     return source_figures.draw(names, Path(outputs), Path(folder))

@@ -62,10 +62,11 @@ program test_cvode
    use fsundials_core_mod, only: FN_VDestroy, FSUNContext_Create, FSUNContext_Free, &
       & FSUNNonlinSolFree, N_Vector, SUN_COMM_NULL, SUNNonlinearSolver
    use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
-   use mesoslip_kinds, only: wp
-   use mesoslip_errors, only: error_type
-   use mesoslip_sundials_cvode, only: cvode_type, method_adams, method_bdf, sundials_version
-   use mesoslip_sundials_index, only: sunindextype
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf, &
+      & sundials_version
+   use mesoslip_numerics_sundials_index, only: sunindextype
    use oscillator, only: failing_rates, oscillator_type, right_side
    use testing, only: check, check_close, finish
    implicit none

@@ -1,23 +1,23 @@
 !> Quadrature, partial moments, lives of contacts, their renewal, and populations under a slider,
 !> under all run-time checks.
 program test_master_equation
-   use mesoslip_accumulator, only: accumulator_type
-   use mesoslip_contact_lives, only: contact_lives_type, new_contact_lives
-   use mesoslip_contact_mechanics, only: breaking_distance, broken_threshold, &
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_theory_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, &
       & broken_threshold_slope, coupling_equal, coupling_scaled, initial_relaxed, initial_steady, &
       & initial_uniform
-   use mesoslip_contact_populations, only: contact_populations_type, new_contact_populations, &
+   use mesoslip_contacts_populations, only: contact_populations_type, new_contact_populations, &
       & packet_length, population_length
-   use mesoslip_contacts, only: contact_parameters_type
-   use mesoslip_errors, only: error_type
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_kinds, only: wp
-   use mesoslip_partial_moments, only: new_partial_moments, partial_moments_type
-   use mesoslip_quadrature, only: barycentric_weights, gauss_legendre, integration_matrix, &
-      & lagrange_basis
-   use mesoslip_renewal, only: renewal_solution_type, solve_renewal
-   use mesoslip_threshold_law, only: law_exponential, law_gaussian, law_lognormal, law_uniform, &
-      & new_threshold_law, threshold_law_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
+   use mesoslip_numerics_quadrature, only: barycentric_weights, gauss_legendre, &
+      & integration_matrix, lagrange_basis
+   use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
+   use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian, law_lognormal, &
+      & law_uniform, new_threshold_law, threshold_law_type
    use testing, only: check, check_close, finish
    implicit none
 

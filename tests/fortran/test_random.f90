@@ -1,7 +1,7 @@
 !> Philox 4x32-10 against the known answers published with Random123, and the keying of draws.
 program test_random
-   use mesoslip_kinds, only: i8, wp
-   use mesoslip_random, only: philox4x32, uniform_pair
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_random, only: philox4x32, uniform_pair
    use testing, only: check, check_close, finish
    implicit none
 

@@ -1,24 +1,24 @@
 !> Whole runs under all run-time checks: energy, conservation, reversal, and a state put away and
 !> taken up again.
 program test_simulation
-   use mesoslip_archive, only: archive_type
-   use mesoslip_avalanche_recorder, only: avalanche_length, snapshot_place_length
-   use mesoslip_contact_ensemble, only: contact_ensemble_type, new_contact_ensemble
-   use mesoslip_contact_set, only: contact_arrays_type, detached_length
-   use mesoslip_contact_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_recording_avalanches, only: avalanche_length, snapshot_place_length
+   use mesoslip_contacts_ensemble, only: contact_ensemble_type, new_contact_ensemble
+   use mesoslip_contacts_set, only: contact_arrays_type, detached_length
+   use mesoslip_contacts_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
       & initial_steady
-   use mesoslip_contact_record, only: record_length, row_stiffness
-   use mesoslip_contacts, only: contact_parameters_type
-   use mesoslip_errors, only: error_type
-   use mesoslip_kinds, only: i8, wp
-   use mesoslip_recorder, only: recorder_parameters_type, slip_length, slip_trace_length, &
-      & trace_length
+   use mesoslip_contacts_record, only: record_length, row_stiffness
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_recording_recorder, only: recorder_parameters_type, slip_length, &
+      & slip_trace_length, trace_length
    use mesoslip_simulation, only: ending_drive, energy_length, simulation_type
-   use mesoslip_slider_layered, only: layered_parameters_type, slider_layered_type, &
+   use mesoslip_sliders_layered, only: layered_parameters_type, slider_layered_type, &
       & solver_adams, solver_bdf, solver_series
-   use mesoslip_slider_prescribed, only: slider_prescribed_type
-   use mesoslip_slider_rigid, only: slider_rigid_type
-   use mesoslip_threshold_law, only: law_exponential, law_gaussian, new_threshold_law
+   use mesoslip_sliders_prescribed, only: slider_prescribed_type
+   use mesoslip_sliders_rigid, only: slider_rigid_type
+   use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian, new_threshold_law
    use testing, only: check, check_close, finish
    implicit none
 

@@ -1,8 +1,8 @@
 !> The rigid slider against closed forms, and its ends of windows.
 program test_slider_rigid
    use mesoslip_interface_law, only: interface_law_type, window_type
-   use mesoslip_kinds, only: wp
-   use mesoslip_slider_rigid, only: slider_rigid_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_rigid, only: slider_rigid_type
    use testing, only: check, check_close, finish
    implicit none
 

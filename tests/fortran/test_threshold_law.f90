@@ -1,8 +1,8 @@
 !> Threshold laws: mean and width, and the three functions of a law against each other.
 program test_threshold_law
-   use mesoslip_errors, only: error_type
-   use mesoslip_kinds, only: wp
-   use mesoslip_threshold_law, only: inverse_normal, law_exponential, law_gaussian, &
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_contacts_threshold_law, only: inverse_normal, law_exponential, law_gaussian, &
       & law_lognormal, law_uniform, law_weibull, new_threshold_law, threshold_law_type
    use testing, only: check, check_close, finish
    implicit none

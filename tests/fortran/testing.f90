@@ -1,6 +1,6 @@
 !> A small frame for unit tests: checks are counted, failures are told, finish ends the program.
 module testing
-   use mesoslip_kinds, only: wp
+   use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 

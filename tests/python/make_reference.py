@@ -9,7 +9,7 @@ from pathlib import Path
 
 import mesoslip
 from conftest import klein_tables
-from mesoslip import store
+from mesoslip.output import store
 
 FOLDER = Path(__file__).parents[1] / "reference"
 

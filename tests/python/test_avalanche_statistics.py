@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from mesoslip import avalanche_statistics
-from mesoslip.avalanche_statistics import ccdf, fit_power_law, logarithmic_bins
+from mesoslip.analysis import avalanche_statistics
+from mesoslip.analysis.avalanche_statistics import ccdf, fit_power_law, logarithmic_bins
 from mesoslip.errors import MesoslipError
 from scipy import optimize, special, stats
 

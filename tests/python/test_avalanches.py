@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config
-from mesoslip.avalanche_catalogue import failures
-from mesoslip.avalanche_statistics import fit_power_law
+from mesoslip.analysis.avalanche_statistics import fit_power_law
+from mesoslip.analysis.avalanches import failures
 from scipy import integrate, special, stats
 
 
@@ -231,7 +231,7 @@ def test_stick_slip_by_interaction(klein):
 
 
 def test_commands(tmp_path, capsys, monkeypatch):
-    from mesoslip import cli
+    from mesoslip.command_line import main as cli
 
     def command(*words: object) -> str:
         monkeypatch.setattr("sys.argv", ["mesoslip", *map(str, words)])

@@ -15,7 +15,7 @@ import pytest
 import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables
-from mesoslip.cli import main
+from mesoslip.command_line.main import main
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_plot_and_figures(short, tmp_path, command):
 def test_start_up_is_quick():
     """No package that takes long is imported before it is needed."""
     code = (
-        "import sys, mesoslip.cli, mesoslip.config, mesoslip.derived\n"
+        "import sys, mesoslip.command_line.main, mesoslip.theory.derived\n"
         "slow = {'matplotlib', 'scipy', 'xarray', 'netCDF4', 'pint', 'rich'} & sys.modules.keys()\n"
         "assert not slow, slow"
     )

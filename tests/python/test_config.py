@@ -9,8 +9,8 @@ from conftest import ROOT, klein_tables
 from hypothesis import given
 from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError
-from mesoslip.derived import derived_quantities
-from mesoslip.units import to_si
+from mesoslip.configuration.units import to_si
+from mesoslip.theory.derived import derived_quantities
 
 LAYERED = {"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 4}
 

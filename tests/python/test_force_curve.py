@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip import ForceCurve, _core
-from mesoslip.contact_lives import COUPLINGS, INITIAL_STATES
-from mesoslip.threshold import LAWS
+from mesoslip.configuration.threshold_law import LAWS
+from mesoslip.theory.lives import COUPLINGS, INITIAL_STATES
 from oracles import frozen_law, stationary_force
 from scipy import integrate
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from mesoslip import Config
-from mesoslip.engine import AVALANCHE_COLUMNS, Realization
+from mesoslip.simulation.engine import AVALANCHE_COLUMNS, Realization
 from oracles import exact_events, quasistatic
 
 # Few contacts under a fast drive; the area makes the bonds a few times as stiff as the contacts.

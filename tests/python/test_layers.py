@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sksundae
-from mesoslip import store
-from mesoslip.derived import derived_quantities
-from mesoslip.engine import Realization
+from mesoslip.output import store
+from mesoslip.simulation.engine import Realization
+from mesoslip.theory.derived import derived_quantities
 from scipy import linalg
 
 MASS, STIFFNESS = 1.47e-3, 97.0

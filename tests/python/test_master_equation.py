@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip import ForceCurve
-from mesoslip.engine import Realization
+from mesoslip.simulation.engine import Realization
 from oracles import frozen_law, stationary_force
 
 FORCE = 18e-6
@@ -201,7 +201,7 @@ def test_segments_do_not_matter(klein):
 
 
 def test_arrays_grow(klein, monkeypatch):
-    from mesoslip import engine
+    from mesoslip.simulation import engine
 
     config = klein(run__engine="me", run__duration=2.2)
     whole = finish(config)

@@ -6,7 +6,7 @@ import mesoslip
 import numpy as np
 import pytest
 from mesoslip import ConfigError, ForceCurve
-from mesoslip.slip_onset import EXPANSION_ERROR, end_of_expansion, solve
+from mesoslip.theory.slip_onset import EXPANSION_ERROR, end_of_expansion, solve
 from scipy import integrate
 
 SOURCE = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip import engine
-from mesoslip.engine import ENERGY_COLUMNS, Realization
+from mesoslip.simulation import engine
+from mesoslip.simulation.engine import ENERGY_COLUMNS, Realization
 from oracles import stationary_force
 
 LAWS = {"gaussian": 0.2, "uniform": 0.3, "lognormal": 0.5, "weibull": 0.5, "exponential": 0.8}

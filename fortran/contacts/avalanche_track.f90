@@ -1,0 +1,141 @@
+!> The contacts of an avalanche on a lattice: which they are, in what order they let go, how far
+!> they reach.
+module mesoslip_contacts_avalanche_track
+   use mesoslip_numerics_archive, only: archive_type
+   implicit none
+   private
+
+   public :: avalanche_track_type
+   public :: track_length, row_generation, row_member
+
+   !> Numbers kept for a contact
+   integer, parameter :: track_length = 2
+   !> The generation in which the contact broke in the present avalanche, from 1; 0 if it did not
+   integer, parameter :: row_generation = 1
+   !> The contacts of the avalanche in the order of breaking: a list, unlike the row before
+   integer, parameter :: row_member = 2
+
+   !> Up to this number of contacts their columns and rows are sorted, beyond it they are marked.
+   integer, parameter :: few = 12
+
+   !> The contacts of the present avalanche.
+   type :: avalanche_track_type
+      !> Columns and rows of the lattice; no columns when contacts are not on one
+      integer :: columns = 0, rows = 0
+      !> Contacts that broke in it, each counted once
+      integer :: area = 0
+      !> Number of the present generation
+      integer :: generation = 0
+      !> State of the track, an array of the caller, shape (track_length, count)
+      integer, pointer, contiguous :: contact(:, :) => null()
+   contains
+      !> A contact breaks
+      procedure :: add
+      !> Columns and rows that the avalanche reaches over
+      procedure :: extent
+      !> Forget the avalanche
+      procedure :: clear
+      !> Put the state into an archive or take it out
+      procedure :: exchange
+   end type avalanche_track_type
+
+contains
+
+   !> A contact breaks; if it breaks again in the same avalanche it keeps its generation.
+   pure subroutine add(self, contact)
+      !> The track
+      class(avalanche_track_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+
+      if (self%columns == 0) return
+      if (self%contact(row_generation, contact) > 0) return
+      self%contact(row_generation, contact) = self%generation
+      self%area = self%area + 1
+      self%contact(row_member, self%area) = contact
+   end subroutine add
+
+   !> Columns and rows that the avalanche reaches over, on a lattice without edges.
+   pure subroutine extent(self, width, height)
+      !> The track
+      class(avalanche_track_type), intent(in) :: self
+      !> Columns of the smallest rectangle around the avalanche, and its rows
+      integer, intent(out) :: width, height
+
+      width = min(self%area, 1)
+      height = width
+      if (self%area < 2) return
+      associate (member => self%contact(row_member, :self%area) - 1)
+         width = arc(modulo(member, self%columns), self%columns)
+         height = arc(member / self%columns, self%rows)
+      end associate
+   end subroutine extent
+
+   !> Length of the shortest arc of a circle of places that holds all of some.
+   pure function arc(place, length)
+      !> Places, from 0
+      integer, intent(in) :: place(:)
+      !> Places on the circle
+      integer, intent(in) :: length
+      integer :: arc
+
+      logical, allocatable :: marked(:)
+      integer :: sorted(few), number, position, gap, previous, first
+
+      gap = 0
+      if (size(place) <= few) then
+         do number = 1, size(place)
+            do position = number, 2, -1
+               if (sorted(position - 1) <= place(number)) exit
+               sorted(position) = sorted(position - 1)
+            end do
+            sorted(position) = place(number)
+         end do
+         previous = sorted(size(place)) - length
+         do number = 1, size(place)
+            gap = max(gap, sorted(number) - previous - 1)
+            previous = sorted(number)
+         end do
+      else
+         allocate (marked(0:length - 1), source=.false.)
+         do number = 1, size(place)
+            marked(place(number)) = .true.
+         end do
+         first = findloc(marked, .true., dim=1) - 1
+         previous = first
+         do position = first + 1, length - 1
+            if (.not. marked(position)) cycle
+            gap = max(gap, position - previous - 1)
+            previous = position
+         end do
+         gap = max(gap, first + length - previous - 1)
+      end if
+      arc = length - gap
+   end function arc
+
+   !> Forget the avalanche.
+   pure subroutine clear(self)
+      !> The track
+      class(avalanche_track_type), intent(inout) :: self
+
+      integer :: place
+
+      do place = 1, self%area
+         self%contact(row_generation, self%contact(row_member, place)) = 0
+      end do
+      self%area = 0
+      self%generation = 0
+   end subroutine clear
+
+   !> Put the state into an archive or take it out; the array of the caller is the rest of it.
+   subroutine exchange(self, archive)
+      !> The track
+      class(avalanche_track_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange(self%area)
+      call archive%exchange(self%generation)
+   end subroutine exchange
+
+end module mesoslip_contacts_avalanche_track

@@ -1,0 +1,208 @@
+!> What every model of the contacts can do: offer a slider a law, and respond to its motion.
+!>
+!> Contacts know nothing about sliders but where they are. Displacements are relative to an origin
+!> that the caller moves along (see shift_origin).
+module mesoslip_contacts_base
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_contacts_mechanics, only: coupling_scaled
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_contacts_threshold_law, only: threshold_law_type
+   implicit none
+   private
+
+   public :: contacts_type, contact_parameters_type
+   public :: extent_length, snapshot_length
+
+   !> Numbers of an avalanche's extent: contacts that broke, columns and rows around them,
+   !> generations
+   integer, parameter :: extent_length = 4
+   !> Numbers of a contact in a snapshot: stretch, force over threshold, generation
+   integer, parameter :: snapshot_length = 3
+
+   !> What the contacts are made of.
+   type :: contact_parameters_type
+      !> Number of contacts N
+      integer :: count = 0
+      !> Mean static threshold f_s [N]
+      real(wp) :: static_force = 0.0_wp
+      !> Mean stiffness k [N/m]
+      real(wp) :: stiffness = 0.0_wp
+      !> Drag of a contact of mean mass, m eta [N s/m]
+      real(wp) :: drag = 0.0_wp
+      !> Delay between detaching and attaching [s]
+      real(wp) :: delay = 0.0_wp
+      !> Backward force over mean static threshold, f_b/f_s
+      real(wp) :: back_force_ratio = 0.0_wp
+      !> One of the coupling_ codes
+      integer :: coupling = coupling_scaled
+      !> Whether a broken contact attaches again
+      logical :: reattach = .true.
+      !> Law of the relative thresholds
+      type(threshold_law_type) :: law
+      !> Key of the random numbers
+      integer(i8) :: seed = 0, realization = 0
+   end type contact_parameters_type
+
+   !> The contacts of an interface: what is common to all models of them.
+   type, abstract :: contacts_type
+      !> What the contacts are made of
+      type(contact_parameters_type) :: parameters
+      !> Number of contacts that are detached, and breaks so far
+      real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
+      !> Elastic energy lost by breaking, and gained by attaching under back force [J]
+      type(accumulator_type) :: break_loss, birth_gain
+      !> Set when the contacts cannot go on
+      type(error_type), allocatable :: failure
+   contains
+      !> Prepare the contacts for the start of a run
+      procedure(initialize_interface), deferred :: initialize
+      !> Contact force as a law, for a slider that does not move
+      procedure(law_interface), deferred :: law
+      !> Contact force as a law, and where it holds
+      procedure(offer_interface), deferred :: offer
+      !> Break and attach contacts after a motion of the slider
+      procedure(respond_interface), deferred :: respond
+      !> Whether the caller's arrays have room for one more step
+      procedure(has_room_interface), deferred :: has_room
+      !> Move the origin of displacements
+      procedure(shift_origin_interface), deferred :: shift_origin
+      !> Elastic energy of the pinned contacts
+      procedure(elastic_energy_interface), deferred :: elastic_energy
+      !> Put the state into an archive or take it out; the arrays of the caller are the rest of it
+      procedure(exchange_interface), deferred :: exchange
+      !> Make anew what is derived from the state, after it was taken from an archive
+      procedure(rebuild_interface), deferred :: rebuild
+      !> Extent of the avalanche that is over; it is forgotten
+      procedure :: take_extent
+      !> How the contacts are
+      procedure :: snapshot
+   end type contacts_type
+
+   abstract interface
+      !> Prepare the contacts for the start of a run.
+      subroutine initialize_interface(self, state)
+         import :: contacts_type
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(inout) :: self
+         !> One of the initial_ codes
+         integer, intent(in) :: state
+      end subroutine initialize_interface
+
+      !> Contact force as a law, for a slider that does not move.
+      pure function law_interface(self) result(law)
+         import :: contacts_type, interface_law_type
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(in) :: self
+         !> The law
+         type(interface_law_type) :: law
+      end function law_interface
+
+      !> Contact force as a law, and where it holds.
+      subroutine offer_interface(self, pose, law, window)
+         import :: contacts_type, interface_law_type, pose_type, window_type
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(inout) :: self
+         !> Where the slider is
+         type(pose_type), intent(in) :: pose
+         !> The law
+         type(interface_law_type), intent(out) :: law
+         !> Where it holds
+         type(window_type), intent(out) :: window
+      end subroutine offer_interface
+
+      !> Break and attach contacts after a motion of the slider.
+      subroutine respond_interface(self, before, after)
+         import :: contacts_type, pose_type
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(inout) :: self
+         !> Where the slider was when it was offered a law, and where it is
+         type(pose_type), intent(in) :: before, after
+      end subroutine respond_interface
+
+      !> Whether the caller's arrays have room for one more step.
+      pure function has_room_interface(self) result(has_room)
+         import :: contacts_type
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(in) :: self
+         !> Whether they can respond once more
+         logical :: has_room
+      end function has_room_interface
+
+      !> Move the origin of displacements.
+      subroutine shift_origin_interface(self, shift, displacement)
+         import :: contacts_type, wp
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(inout) :: self
+         !> Displacement of the new origin [m]
+         real(wp), intent(in) :: shift
+         !> Displacement of the slider from the new origin [m]
+         real(wp), intent(in) :: displacement
+      end subroutine shift_origin_interface
+
+      !> Elastic energy of the pinned contacts.
+      pure function elastic_energy_interface(self, displacement) result(energy)
+         import :: contacts_type, wp
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(in) :: self
+         !> Displacement of the slider [m]
+         real(wp), intent(in) :: displacement
+         !> Energy [J]
+         real(wp) :: energy
+      end function elastic_energy_interface
+
+      !> Put the state into an archive or take it out.
+      subroutine exchange_interface(self, archive)
+         import :: archive_type, contacts_type
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(inout) :: self
+         !> The archive
+         type(archive_type), intent(inout) :: archive
+      end subroutine exchange_interface
+
+      !> Make anew what is derived from the state.
+      subroutine rebuild_interface(self, displacement)
+         import :: contacts_type, wp
+         implicit none
+         !> The contacts
+         class(contacts_type), intent(inout) :: self
+         !> Displacement of the slider [m]
+         real(wp), intent(in) :: displacement
+      end subroutine rebuild_interface
+   end interface
+
+contains
+
+   !> Extent of the avalanche that is over; nothing for contacts without a place.
+   subroutine take_extent(self, extent)
+      !> The contacts
+      class(contacts_type), intent(inout) :: self
+      !> Numbers in the order of extent_length
+      integer, intent(out) :: extent(extent_length)
+
+      extent = 0
+   end subroutine take_extent
+
+   !> How the contacts are; nothing for contacts that are not followed one by one.
+   pure subroutine snapshot(self, displacement, values)
+      !> The contacts
+      class(contacts_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Of each contact the numbers in the order of snapshot_length, shape (snapshot_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      values = 0.0_wp
+   end subroutine snapshot
+
+end module mesoslip_contacts_base

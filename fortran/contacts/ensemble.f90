@@ -1,0 +1,211 @@
+!> N contacts that know nothing of each other, in the order in which they break.
+!>
+!> The earthquake-like model without interaction. Contacts are queued for one direction of motion;
+!> what breaks on the way back is bounded, and the queue is ordered anew when the slider turns.
+module mesoslip_contacts_ensemble
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_set, only: contact_arrays_type, contact_set_type, exchange_set, &
+      & law_set
+   use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness, &
+      & ahead_coordinate, behind_coordinate
+   use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
+   implicit none
+   private
+
+   public :: contact_ensemble_type, new_contact_ensemble
+
+   !> A probability too small to meet among the keys of a ring of buckets.
+   real(wp), parameter :: rare = 1.0e-4_wp
+
+   !> An ensemble of contacts.
+   type, extends(contact_set_type) :: contact_ensemble_type
+      !> Bound on the coordinates at which contacts break on the way back [m]
+      real(wp) :: behind = -huge(1.0_wp)
+      !> Direction of motion for which the queue is kept, +1 or -1
+      real(wp) :: direction = 1.0_wp
+
+      type(contact_queue_type), private :: queue
+   contains
+      procedure :: initialize
+      procedure :: offer
+      procedure :: respond
+      procedure :: shift_origin
+      procedure :: exchange
+      procedure :: rebuild
+      procedure, private :: break_due, face, farthest_behind
+   end type contact_ensemble_type
+
+contains
+
+   !> Set up an ensemble on arrays of the caller.
+   subroutine new_contact_ensemble(self, parameters, arrays, error)
+      !> The ensemble
+      type(contact_ensemble_type), intent(out) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Arrays for the state
+      type(contact_arrays_type), intent(in) :: arrays
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
+
+      real(wp) :: longest
+
+      self%parameters = parameters
+      self%arrays = arrays
+      ! A contact attached while the slider moves back has the back force to lose as well.
+      longest = parameters%static_force / parameters%stiffness &
+         & * max(parameters%law%quantile(rare), 1.0_wp) * (1.0_wp + parameters%back_force_ratio)
+      call new_contact_queue(self%queue, parameters%count, 1.1_wp * longest, error)
+   end subroutine new_contact_ensemble
+
+   !> Draw all contacts for the start of a run.
+   subroutine initialize(self, state)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      call self%draw(state)
+      call self%rebuild(0.0_wp)
+      self%behind = self%farthest_behind()
+   end subroutine initialize
+
+   !> Contact force as a law, which holds until a contact breaks or attaches.
+   subroutine offer(self, pose, law, window)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds; a contact may break at its lower end if the motion is forward
+      type(window_type), intent(out) :: window
+
+      law = law_set(self)
+      window%end_time = self%next_attachment
+      if (self%direction > 0.0_wp) then
+         window%upper = self%queue%first_key
+         window%lower = self%behind
+      else
+         window%upper = -self%behind
+         window%lower = -self%queue%first_key
+      end if
+   end subroutine offer
+
+   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
+   subroutine respond(self, before, after)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      integer :: contact
+      real(wp) :: origin, limit, back_force
+
+      call self%break_due(after%displacement, after%time)
+      back_force = after%sense * self%parameters%back_force_ratio * self%parameters%static_force
+      do while (self%next_attachment <= after%time)
+         call self%take_hold(after%displacement, back_force, 0.0_wp, contact)
+         origin = self%arrays%record(row_origin, contact)
+         limit = self%arrays%record(row_limit, contact)
+         call self%queue%insert(contact, self%direction * origin + limit)
+         self%behind = max(self%behind, self%direction * origin - limit)
+      end do
+      self%detached_count = real(self%waiting, wp)
+   end subroutine respond
+
+   !> Break all contacts that are due.
+   subroutine break_due(self, displacement, time)
+      class(contact_ensemble_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement, time
+
+      integer :: contact
+
+      if (self%direction * displacement <= self%behind) then
+         ! The bound may be that of a contact which has broken since.
+         self%behind = self%farthest_behind()
+         if (self%direction * displacement <= self%behind) call self%face(displacement)
+      end if
+      if (self%queue%first_key > self%direction * displacement) return
+      self%track%generation = self%track%generation + 1
+      do while (self%queue%first_key <= self%direction * displacement)
+         call self%queue%pop(self%arrays%record, contact)
+         call self%let_go(contact, displacement, time)
+      end do
+   end subroutine break_due
+
+   !> Turn round: keep the queue for the other direction of motion.
+   subroutine face(self, displacement)
+      class(contact_ensemble_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement
+
+      self%direction = -self%direction
+      call self%rebuild(displacement)
+      self%behind = self%farthest_behind()
+   end subroutine face
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift, displacement)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+      !> Displacement of the slider from the new origin [m]
+      real(wp), intent(in) :: displacement
+
+      call self%shift_records(shift)
+      call self%rebuild(displacement)
+      self%behind = self%farthest_behind()
+   end subroutine shift_origin
+
+   !> Order the queue anew, from the records.
+   subroutine rebuild(self, displacement)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+
+      integer :: contact
+
+      call self%queue%clear(self%direction, self%direction * displacement)
+      do contact = 1, self%parameters%count
+         if (self%arrays%record(row_stiffness, contact) > 0.0_wp) then
+            call self%queue%insert(contact, &
+               & ahead_coordinate(self%arrays%record(:, contact), self%direction))
+         end if
+      end do
+   end subroutine rebuild
+
+   !> Greatest coordinate at which a pinned contact breaks on the way back.
+   pure function farthest_behind(self) result(coordinate)
+      class(contact_ensemble_type), intent(in) :: self
+      real(wp) :: coordinate
+
+      integer :: contact
+
+      coordinate = -huge(1.0_wp)
+      do contact = 1, self%parameters%count
+         if (self%arrays%record(row_stiffness, contact) > 0.0_wp) then
+            coordinate = max(coordinate, &
+               & behind_coordinate(self%arrays%record(:, contact), self%direction))
+         end if
+      end do
+   end function farthest_behind
+
+   !> Put the state into an archive or take it out; the arrays of the caller are the rest of it.
+   subroutine exchange(self, archive)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call exchange_set(self, archive)
+      call archive%exchange(self%behind)
+      call archive%exchange(self%direction)
+   end subroutine exchange
+
+end module mesoslip_contacts_ensemble

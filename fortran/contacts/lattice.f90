@@ -1,0 +1,329 @@
+!> Contacts on a lattice that push their neighbours over: when they break, and in what avalanches.
+!>
+!> The force that breaks a contact is f_i = k_i x_i + G sum_j (x_i - x_j) over its neighbours, with
+!> x_j = 0 for a detached one. While neighbours stay as they are it grows with the displacement at
+!> the rate k_i + G n_i, n_i of them being detached: breaks are events in the displacement, which
+!> move when a neighbour breaks or attaches.
+module mesoslip_contacts_lattice
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory, &
+      & status_stalled
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_contacts_break_tree, only: break_tree_type, new_break_tree
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_set, only: contact_arrays_type, contact_set_type, law_set, &
+      & snapshot_set
+   use mesoslip_contacts_record, only: record_length, row_limit, row_origin, row_stiffness
+   use mesoslip_contacts_neighbours, only: coordination, find_neighbours
+   implicit none
+   private
+
+   public :: contact_lattice_type, interaction_type, new_contact_lattice
+
+   !> Breaks of each contact in one cascade, on average, beyond which it is taken to have no end.
+   real(wp), parameter :: most_lives = 1000.0_wp
+
+   !> How contacts act on each other.
+   type :: interaction_type
+      !> Stiffness of the bond between neighbours, G [N/m]; 0 for none
+      real(wp) :: bond = 0.0_wp
+      !> One of the lattice_ codes
+      integer :: lattice = 0
+      !> Columns and rows of the lattice; no columns when contacts are not on one
+      integer :: columns = 0, rows = 0
+   end type interaction_type
+
+   !> Contacts on a lattice.
+   type, extends(contact_set_type) :: contact_lattice_type
+      !> Stiffness of a bond, and of all bonds of a contact [N/m]
+      real(wp), private :: bond = 0.0_wp, bonds = 0.0_wp
+      !> Neighbours of each contact, shape (neighbours, count)
+      integer, allocatable, private :: neighbour(:, :)
+      !> Contacts that let go together
+      integer, allocatable, private :: generation(:)
+      type(break_tree_type), private :: tree
+   contains
+      procedure :: initialize
+      procedure :: offer
+      procedure :: respond
+      procedure :: shift_origin
+      procedure :: rebuild
+      procedure :: snapshot
+      procedure, private, non_overridable :: cascade, attach_due, refresh, refresh_neighbours
+   end type contact_lattice_type
+
+contains
+
+   !> Set up contacts on a lattice, on arrays of the caller.
+   subroutine new_contact_lattice(self, parameters, interaction, arrays, error)
+      !> The contacts
+      type(contact_lattice_type), intent(out) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> How they act on each other
+      type(interaction_type), intent(in) :: interaction
+      !> Arrays for the state
+      type(contact_arrays_type), intent(in) :: arrays
+      !> Set if the lattice does not hold as many contacts, or there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: neighbours, stat
+
+      neighbours = coordination(interaction%lattice)
+      if (neighbours == 0 .or. interaction%columns * interaction%rows /= parameters%count) then
+         call raise(error, status_invalid, "columns times rows of the lattice must be the number " &
+            & // "of contacts")
+         return
+      end if
+      self%parameters = parameters
+      self%arrays = arrays
+      self%bond = interaction%bond
+      self%bonds = real(neighbours, wp) * interaction%bond
+      allocate (self%neighbour(neighbours, parameters%count), stat=stat)
+      if (stat == 0) allocate (self%generation(parameters%count), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the neighbours of contacts")
+         return
+      end if
+      call find_neighbours(interaction%lattice, interaction%columns, interaction%rows, &
+         & self%neighbour)
+      call new_break_tree(self%tree, parameters%count, error)
+   end subroutine new_contact_lattice
+
+   !> Draw all contacts for the start of a run, and let go those that cannot bear their neighbours.
+   subroutine initialize(self, state)
+      !> The contacts
+      class(contact_lattice_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      call self%draw(state)
+      call self%rebuild(0.0_wp)
+      call self%respond(pose_type(), pose_type())
+      call self%track%clear()
+      self%breaks = 0.0_wp
+      self%break_loss = accumulator_type()
+      self%birth_gain = accumulator_type()
+   end subroutine initialize
+
+   !> Contact force as a law, which holds until a contact breaks or attaches.
+   subroutine offer(self, pose, law, window)
+      !> The contacts
+      class(contact_lattice_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds
+      type(window_type), intent(out) :: window
+
+      law = law_set(self)
+      window%end_time = self%next_attachment
+      window%upper = self%tree%upper()
+      window%lower = self%tree%lower()
+   end subroutine offer
+
+   !> Break all contacts that are due and those that they push over, then attach what is to attach.
+   subroutine respond(self, before, after)
+      !> The contacts
+      class(contact_lattice_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: breaks
+
+      breaks = self%breaks
+      do
+         call self%cascade(after%displacement, after%time)
+         if (self%next_attachment > after%time) exit
+         if (self%breaks - breaks > most_lives * self%parameters%count) then
+            call raise(self%failure, status_stalled, "a cascade of contacts that break and " // &
+               & "attach at once does not end: a delay (contacts.delay) or a weaker " // &
+               & "interaction (interaction.strength) would end it")
+            exit
+         end if
+         call self%attach_due(after%displacement, after%time, after%sense)
+      end do
+      self%detached_count = real(self%waiting, wp)
+   end subroutine respond
+
+   !> Break all contacts that are due, then those that they push over, until none is left.
+   subroutine cascade(self, displacement, time)
+      class(contact_lattice_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement, time
+
+      integer :: contact, number, place
+
+      do
+         number = 0
+         do
+            contact = self%tree%due(displacement)
+            if (contact == 0) exit
+            call self%tree%remove(contact)
+            number = number + 1
+            self%generation(number) = contact
+         end do
+         if (number == 0) return
+         self%track%generation = self%track%generation + 1
+         do place = 1, number
+            call self%let_go(self%generation(place), displacement, time)
+         end do
+         do place = 1, number
+            call self%refresh_neighbours(self%generation(place))
+         end do
+      end do
+   end subroutine cascade
+
+   !> Attach all contacts that are to, in the order in which they broke.
+   subroutine attach_due(self, displacement, time, sense)
+      class(contact_lattice_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement, time, sense
+
+      integer :: contact, side
+      real(wp) :: pull, back_force
+
+      back_force = sense * self%parameters%back_force_ratio * self%parameters%static_force
+      do while (self%next_attachment <= time)
+         contact = self%arrays%detached_contact(self%first_detached + 1)
+         pull = 0.0_wp
+         do side = 1, size(self%neighbour, 1)
+            associate (record => self%arrays%record(:, self%neighbour(side, contact)))
+               if (record(row_stiffness) > 0.0_wp) pull = pull + (displacement - record(row_origin))
+            end associate
+         end do
+         call self%take_hold(displacement, back_force + self%bond * pull, self%bonds, contact)
+         call self%refresh(contact)
+         call self%refresh_neighbours(contact)
+      end do
+   end subroutine attach_due
+
+   !> Neighbours of a contact that broke or attached break elsewhere now.
+   subroutine refresh_neighbours(self, contact)
+      class(contact_lattice_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
+      if (size(self%neighbour, 1) == 6) then
+         call refresh_all(self%neighbour(:, contact), 6, self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, self%tree)
+      else
+         call refresh_all(self%neighbour(:, contact), 4, self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, self%tree)
+      end if
+   end subroutine refresh_neighbours
+
+   !> Find out where a pinned contact breaks.
+   subroutine refresh(self, contact)
+      class(contact_lattice_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      real(wp) :: centre, limit
+
+      call bearing(contact, size(self%neighbour, 1), self%parameters%count, self%arrays%record, &
+         & self%neighbour, self%bond, centre, limit)
+      call self%tree%set(contact, centre + limit, centre - limit)
+   end subroutine refresh
+
+   !> Find out where the pinned ones of some contacts break.
+   pure subroutine refresh_all(contact, sides, count, record, neighbour, bond, tree)
+      !> Contacts, as many as a contact has neighbours, of so many in all
+      integer, intent(in) :: sides, count, contact(sides)
+      real(wp), intent(in) :: record(record_length, count)
+      integer, intent(in) :: neighbour(sides, count)
+      real(wp), intent(in) :: bond
+      type(break_tree_type), intent(inout) :: tree
+
+      integer :: side
+      real(wp) :: centre, limit
+
+      do side = 1, sides
+         if (.not. record(row_stiffness, contact(side)) > 0.0_wp) cycle
+         call bearing(contact(side), sides, count, record, neighbour, bond, centre, limit)
+         call tree%set(contact(side), centre + limit, centre - limit)
+      end do
+   end subroutine refresh_all
+
+   !> Displacement at which a pinned contact bears no force, and how far from there it breaks.
+   pure subroutine bearing(contact, sides, count, record, neighbour, bond, centre, limit)
+      integer, intent(in) :: contact, sides, count
+      real(wp), intent(in) :: record(record_length, count)
+      integer, intent(in) :: neighbour(sides, count)
+      real(wp), intent(in) :: bond
+      real(wp), intent(out) :: centre, limit
+
+      integer :: side, other
+      real(wp) :: origin, relative, ahead, free, is_pinned, softness
+
+      origin = record(row_origin, contact)
+      relative = bond / record(row_stiffness, contact)
+      ! f_i = k_i [(X - Y_i) (1 + G n_i/k_i) + G/k_i sum (Y_j - Y_i)], the sum over the pinned.
+      ahead = 0.0_wp
+      free = 0.0_wp
+      do side = 1, sides
+         other = neighbour(side, contact)
+         is_pinned = merge(1.0_wp, 0.0_wp, record(row_stiffness, other) > 0.0_wp)
+         ahead = ahead + is_pinned * (record(row_origin, other) - origin)
+         free = free + (1.0_wp - is_pinned)
+      end do
+      softness = 1.0_wp / (1.0_wp + relative * free)
+      centre = origin - relative * ahead * softness
+      limit = record(row_limit, contact) * softness
+   end subroutine bearing
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift, displacement)
+      !> The contacts
+      class(contact_lattice_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+      !> Displacement of the slider from the new origin [m]
+      real(wp), intent(in) :: displacement
+
+      call self%shift_records(shift)
+      call self%rebuild(displacement)
+   end subroutine shift_origin
+
+   !> Make the order of breaking anew, from the records.
+   subroutine rebuild(self, displacement)
+      !> The contacts
+      class(contact_lattice_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+
+      integer :: contact
+      real(wp) :: centre, limit
+
+      call self%tree%clear()
+      do contact = 1, self%parameters%count
+         if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
+         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, centre, limit)
+         call self%tree%put(contact, centre + limit, centre - limit)
+      end do
+      call self%tree%arrange()
+   end subroutine rebuild
+
+   !> How the contacts are.
+   pure subroutine snapshot(self, displacement, values)
+      !> The contacts
+      class(contact_lattice_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Of each contact its stretch, huge if it is detached [m], force over threshold, and
+      !> generation in the present avalanche, shape (snapshot_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      integer :: contact
+      real(wp) :: centre, limit
+
+      call snapshot_set(self, displacement, values)
+      do contact = 1, self%parameters%count
+         if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
+         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
+            & self%arrays%record, self%neighbour, self%bond, centre, limit)
+         values(2, contact) = (displacement - centre) / limit
+      end do
+   end subroutine snapshot
+
+end module mesoslip_contacts_lattice

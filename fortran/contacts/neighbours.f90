@@ -1,0 +1,66 @@
+!> Lattices without edges: who is next to whom.
+module mesoslip_contacts_neighbours
+   implicit none
+   private
+
+   public :: lattice_triangular, lattice_square
+   public :: coordination, find_neighbours
+
+   !> Six neighbours; odd rows are half a place to the right of even ones, counted from 0
+   integer, parameter :: lattice_triangular = 1
+   !> Four neighbours
+   integer, parameter :: lattice_square = 2
+
+contains
+
+   !> Number of neighbours of each place; 0 for an unknown lattice.
+   elemental function coordination(lattice) result(number)
+      !> One of the lattice_ codes
+      integer, intent(in) :: lattice
+      !> Their number
+      integer :: number
+
+      number = 0
+      if (lattice == lattice_triangular) number = 6
+      if (lattice == lattice_square) number = 4
+   end function coordination
+
+   !> Neighbours of all places, numbered from 1, row by row.
+   !>
+   !> Where two rows or columns are all there is, a place is the neighbour of another twice.
+   pure subroutine find_neighbours(lattice, columns, rows, neighbour)
+      !> One of the lattice_ codes
+      integer, intent(in) :: lattice
+      !> Columns and rows; of a triangular lattice an even number of rows
+      integer, intent(in) :: columns, rows
+      !> Numbers of the neighbours, shape (coordination, columns rows)
+      integer, intent(out) :: neighbour(:, :)
+
+      integer :: column, row, place, slant
+
+      do row = 0, rows - 1
+         do column = 0, columns - 1
+            place = row * columns + column + 1
+            neighbour(:2, place) = [at(column - 1, row), at(column + 1, row)]
+            if (lattice == lattice_triangular) then
+               slant = modulo(row, 2) - 1
+               neighbour(3:, place) = [at(column + slant, row - 1), &
+                  & at(column + slant + 1, row - 1), at(column + slant, row + 1), &
+                  & at(column + slant + 1, row + 1)]
+            else
+               neighbour(3:, place) = [at(column, row - 1), at(column, row + 1)]
+            end if
+         end do
+      end do
+
+   contains
+
+      !> Number of a place.
+      pure integer function at(column, row)
+         integer, intent(in) :: column, row
+
+         at = modulo(row, rows) * columns + modulo(column, columns) + 1
+      end function at
+   end subroutine find_neighbours
+
+end module mesoslip_contacts_neighbours

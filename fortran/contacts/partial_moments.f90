@@ -1,0 +1,182 @@
+!> Partial moments of a threshold law, E[u^a; u > U]: what is left when all contacts below U broke.
+module mesoslip_contacts_partial_moments
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_quadrature, only: gauss_legendre
+   use mesoslip_contacts_threshold_law, only: law_lognormal, law_weibull, threshold_law_type
+   implicit none
+   private
+
+   public :: partial_moments_type, new_partial_moments
+
+   !> Cells of the table, and points of the rule in a cell
+   integer, parameter :: cells = 4096, points = 8
+   !> Probability that a threshold is outside of the table, on either side
+   real(wp), parameter :: outside = 1.0e-17_wp
+
+   !> Coordinates in which a table is uniform: u, its root for laws that come close to 0, where
+   !> moments may be singular, and its logarithm for laws that do so themselves
+   integer, parameter :: linear = 1, root = 2, logarithmic = 3
+   !> Least threshold of laws that do not come close to 0
+   real(wp), parameter :: close = 0.1_wp
+
+   !> Partial moments of some orders.
+   type :: partial_moments_type
+      !> Thresholds at or below do not occur, nor do those above
+      real(wp) :: least = 0.0_wp, greatest = 0.0_wp
+      type(threshold_law_type), private :: law
+      !> In which coordinate the table is uniform
+      integer, private :: coordinates = linear
+      real(wp), private :: first = 0.0_wp, step = 1.0_wp
+      !> Correction of the density for what the table leaves out
+      real(wp), private :: scale = 1.0_wp
+      real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
+      !> Exponents, shape (orders)
+      real(wp), allocatable, private :: exponent(:)
+      !> Moments above each knot and their slopes, shape (2, orders, cells + 1)
+      real(wp), allocatable, private :: table(:, :, :)
+   contains
+      !> Moments above a threshold, to rounding
+      procedure :: above
+      !> Moments above a threshold by interpolation, to about 1e-12
+      procedure :: interpolate
+      procedure, private :: coordinate, density
+   end type partial_moments_type
+
+contains
+
+   !> Tabulate the partial moments of a law.
+   subroutine new_partial_moments(self, law, exponent)
+      !> The moments
+      type(partial_moments_type), intent(out) :: self
+      !> The law
+      type(threshold_law_type), intent(in) :: law
+      !> Exponents a, shape (orders)
+      real(wp), intent(in) :: exponent(:)
+
+      real(wp) :: knot
+      integer :: cell, node
+
+      self%law = law
+      self%exponent = exponent
+      self%least = law%quantile(1.0_wp - epsilon(1.0_wp))
+      self%greatest = law%quantile(outside)
+      if (law%kind == law_lognormal .or. law%kind == law_weibull) then
+         self%coordinates = logarithmic
+      else if (self%least < close) then
+         self%coordinates = root
+      end if
+      self%first = self%coordinate(self%least)
+      self%step = (self%coordinate(self%greatest) - self%first) / cells
+      call gauss_legendre(self%point, self%weight)
+
+      allocate (self%table(2, size(exponent), cells + 1))
+      self%table(1, :, cells + 1) = 0.0_wp
+      do cell = cells, 1, -1
+         knot = self%first + (cell - 1) * self%step
+         self%table(1, :, cell) = self%table(1, :, cell + 1)
+         do node = 1, points
+            self%table(1, :, cell) = self%table(1, :, cell) + self%step * self%weight(node) &
+               & * self%density(knot + self%step * self%point(node))
+         end do
+      end do
+      ! All of a law is 1, to the last digit: what attaches over and over must not fade away.
+      do node = 1, size(exponent)
+         if (abs(exponent(node)) > 0.0_wp) cycle
+         self%scale = 1.0_wp / self%table(1, node, 1)
+         self%table(1, :, :) = self%table(1, :, :) * self%scale
+         exit
+      end do
+      do cell = 1, cells + 1
+         ! Slopes from within the support, at whose ends the density may be discontinuous.
+         knot = self%first + min(max(cell - 1.0_wp, 1.0e-9_wp), cells - 1.0e-9_wp) * self%step
+         self%table(2, :, cell) = -self%step * self%density(knot)
+      end do
+   end subroutine new_partial_moments
+
+   !> Coordinate of a threshold in which the table is uniform.
+   elemental function coordinate(self, threshold)
+      class(partial_moments_type), intent(in) :: self
+      real(wp), intent(in) :: threshold
+      real(wp) :: coordinate
+
+      coordinate = threshold
+      if (self%coordinates == root) coordinate = sqrt(threshold)
+      if (self%coordinates == logarithmic) coordinate = log(threshold)
+   end function coordinate
+
+   !> Density of each moment over the coordinate of the table.
+   pure function density(self, coordinate)
+      class(partial_moments_type), intent(in) :: self
+      real(wp), intent(in) :: coordinate
+      real(wp) :: density(size(self%exponent))
+
+      real(wp) :: threshold
+
+      threshold = coordinate
+      if (self%coordinates == root) threshold = coordinate**2
+      if (self%coordinates == logarithmic) threshold = exp(coordinate)
+      density = self%scale * self%law%density(threshold) * threshold**self%exponent
+      if (self%coordinates == root) density = density * 2.0_wp * coordinate
+      if (self%coordinates == logarithmic) density = density * threshold
+   end function density
+
+   !> Moments above a threshold.
+   pure function above(self, threshold) result(moment)
+      !> The moments
+      class(partial_moments_type), intent(in) :: self
+      !> Relative threshold U
+      real(wp), intent(in) :: threshold
+      !> E[u^a; u > U] of each exponent, shape (orders)
+      real(wp) :: moment(size(self%exponent))
+
+      real(wp) :: place, knot, length
+      integer :: cell, node
+
+      if (threshold >= self%greatest) then
+         moment = 0.0_wp
+         return
+      end if
+      place = 0.0_wp
+      if (threshold > self%least) place = (self%coordinate(threshold) - self%first) / self%step
+      cell = min(int(place), cells - 1) + 1
+      moment = self%table(1, :, cell + 1)
+      length = max(0.0_wp, cell - place) * self%step
+      knot = self%first + cell * self%step - length
+      do node = 1, points
+         moment = moment + length * self%weight(node) &
+            & * self%density(knot + length * self%point(node))
+      end do
+   end function above
+
+   !> Moments above a threshold by Hermite's interpolation.
+   pure subroutine interpolate(self, threshold, moment)
+      !> The moments
+      class(partial_moments_type), intent(in) :: self
+      !> Relative threshold U
+      real(wp), intent(in) :: threshold
+      !> E[u^a; u > U] of each exponent, shape (orders)
+      real(wp), intent(out), contiguous :: moment(:)
+
+      real(wp) :: place, t, s, weight(4)
+      integer :: cell, order
+
+      if (threshold <= self%least) then
+         moment = self%table(1, :, 1)
+      else if (threshold >= self%greatest) then
+         moment = 0.0_wp
+      else
+         place = (self%coordinate(threshold) - self%first) / self%step
+         cell = min(int(place), cells - 1)
+         t = place - cell
+         s = 1.0_wp - t
+         weight = [s**2 * (1.0_wp + 2.0_wp * t), s**2 * t, t**2 * (1.0_wp + 2.0_wp * s), -s * t**2]
+         do order = 1, size(moment)
+            moment(order) = weight(1) * self%table(1, order, cell + 1) &
+               & + weight(2) * self%table(2, order, cell + 1) &
+               & + weight(3) * self%table(1, order, cell + 2) &
+               & + weight(4) * self%table(2, order, cell + 2)
+         end do
+      end if
+   end subroutine interpolate
+
+end module mesoslip_contacts_partial_moments

@@ -1,0 +1,450 @@
+!> The queue of pinned contacts, in the order in which they break.
+!>
+!> Keys are coordinates along the direction of motion. They lie in a narrow window ahead of the
+!> slider, whose width is known, so contacts are thrown into a ring of buckets by key and only the
+!> foremost bucket is sorted. The cost of a contact does not grow with the number of contacts, and
+!> records are fetched a bucket at a time, which hides the latency of memory.
+module mesoslip_contacts_queue
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_contacts_record, only: ahead_coordinate
+   implicit none
+   private
+
+   public :: contact_queue_type, new_contact_queue, no_key
+
+   !> First key of an empty queue
+   real(wp), parameter :: no_key = huge(1.0_wp)
+
+   !> Contacts in a chunk of a bucket: 16 numbers of 4 bytes fill a cache line.
+   integer, parameter :: chunk_length = 16
+   !> Mean number of contacts in a bucket when keys are spread evenly.
+   integer, parameter :: bucket_load = 8
+   integer, parameter :: least_buckets = 64
+   !> Beyond this length sorting by insertion gives way to merging.
+   integer, parameter :: short_run = 16
+   !> Bound on bucket numbers, for keys far beyond any motion.
+   real(wp), parameter :: farthest_bucket = 1.0e15_wp
+
+   !> A priority queue of contacts by key, then by number.
+   type :: contact_queue_type
+      private
+      !> Least key in the queue; no_key when it is empty
+      real(wp), public :: first_key = no_key
+      !> Contacts in the queue
+      integer, public :: count = 0
+
+      !> Direction of motion, +1 or -1, and coordinate of the edge of bucket 0
+      real(wp) :: direction = 1.0_wp, edge = 0.0_wp
+      real(wp) :: inverse_width = 1.0_wp
+      !> The front: contacts with a bucket number up to this one; sorted when it was advanced, and
+      !> a heap of those that came later
+      integer(i8) :: front_bucket = -1
+      integer :: front_next = 1, front_count = 0, late_count = 0
+      real(wp), allocatable :: front_key(:), late_key(:)
+      integer, allocatable :: front_contact(:), late_contact(:)
+      !> The ring of buckets, each a chain of chunks with the last one first, and behind it one
+      !> bucket for contacts beyond the ring
+      integer(i8) :: ring_length = 0
+      integer :: ring_count = 0, overflow = 0
+      integer(i8) :: overflow_first = huge(1_i8)
+      integer, allocatable :: bucket_chunk(:), bucket_count(:)
+      integer, allocatable :: chunk_contact(:, :), chunk_next(:)
+      integer :: free_chunk = 0
+   contains
+      !> Forget all contacts
+      procedure :: clear
+      !> Put a contact in
+      procedure :: insert
+      !> Take the first contact out
+      procedure :: pop
+      procedure, private :: advance_front, take_overflow, bucket_of, append
+   end type contact_queue_type
+
+contains
+
+   !> Set up an empty queue.
+   subroutine new_contact_queue(self, capacity, span, error)
+      !> The queue
+      type(contact_queue_type), intent(out) :: self
+      !> Largest number of contacts
+      integer, intent(in) :: capacity
+      !> Distance ahead of the slider within which nearly all keys lie, positive [m]
+      real(wp), intent(in) :: span
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: buckets, chunks, stat
+
+      buckets = least_buckets
+      do while (buckets < capacity / bucket_load)
+         buckets = 2 * buckets
+      end do
+      chunks = capacity / chunk_length + buckets + 2
+      self%ring_length = int(buckets, i8)
+      self%overflow = buckets
+      self%inverse_width = real(buckets, wp) / span
+
+      allocate (self%front_key(capacity), self%front_contact(capacity), &
+         & self%late_key(capacity), self%late_contact(capacity), &
+         & self%bucket_chunk(0:buckets), self%bucket_count(0:buckets), &
+         & self%chunk_contact(chunk_length, chunks), self%chunk_next(chunks), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the queue of contacts")
+         return
+      end if
+      call self%clear(1.0_wp, 0.0_wp)
+   end subroutine new_contact_queue
+
+   !> Forget all contacts.
+   pure subroutine clear(self, direction, coordinate)
+      !> The queue
+      class(contact_queue_type), intent(inout) :: self
+      !> Direction of motion, +1 or -1
+      real(wp), intent(in) :: direction
+      !> Coordinate of the slider, direction times displacement [m]
+      real(wp), intent(in) :: coordinate
+
+      integer :: chunk
+
+      self%first_key = no_key
+      self%count = 0
+      self%direction = direction
+      self%edge = coordinate
+      self%front_bucket = -1
+      self%front_next = 1
+      self%front_count = 0
+      self%late_count = 0
+      self%ring_count = 0
+      self%overflow_first = huge(1_i8)
+      self%bucket_chunk = 0
+      self%bucket_count = 0
+      do chunk = 1, size(self%chunk_next)
+         self%chunk_next(chunk) = chunk - 1
+      end do
+      self%free_chunk = size(self%chunk_next)
+   end subroutine clear
+
+   !> Put a contact in.
+   subroutine insert(self, contact, key)
+      !> The queue
+      class(contact_queue_type), intent(inout) :: self
+      !> Number of the contact, not in the queue
+      integer, intent(in) :: contact
+      !> Coordinate at which it breaks [m]
+      real(wp), intent(in) :: key
+
+      integer(i8) :: bucket
+
+      bucket = self%bucket_of(key)
+      if (self%count == 0) then
+         self%front_bucket = max(self%front_bucket, bucket - self%ring_length / 2)
+      end if
+      if (bucket <= self%front_bucket) then
+         self%late_count = self%late_count + 1
+         call push(self%late_key, self%late_contact, self%late_count, key, contact)
+      else if (bucket <= self%front_bucket + self%ring_length) then
+         call self%append(int(iand(bucket, self%ring_length - 1)), contact)
+         self%ring_count = self%ring_count + 1
+      else
+         call self%append(self%overflow, contact)
+         self%overflow_first = min(self%overflow_first, bucket)
+      end if
+      self%count = self%count + 1
+      self%first_key = min(self%first_key, key)
+   end subroutine insert
+
+   !> Take the first contact out.
+   subroutine pop(self, record, contact)
+      !> The queue, not empty
+      class(contact_queue_type), intent(inout) :: self
+      !> Records of all contacts, shape (record_length, number of contacts)
+      real(wp), intent(in), contiguous :: record(:, :)
+      !> Number of the contact with the least key
+      integer, intent(out) :: contact
+
+      logical :: from_late
+
+      if (self%front_next > self%front_count .and. self%late_count == 0) then
+         call self%advance_front(record)
+      end if
+      from_late = self%late_count > 0
+      if (from_late .and. self%front_next <= self%front_count) then
+         from_late = before(self%late_key(1), self%late_contact(1), &
+            & self%front_key(self%front_next), self%front_contact(self%front_next))
+      end if
+      if (from_late) then
+         contact = self%late_contact(1)
+         call remove_first(self%late_key, self%late_contact, self%late_count)
+         self%late_count = self%late_count - 1
+      else
+         contact = self%front_contact(self%front_next)
+         self%front_next = self%front_next + 1
+      end if
+
+      self%count = self%count - 1
+      self%first_key = no_key
+      if (self%count == 0) return
+      if (self%front_next > self%front_count .and. self%late_count == 0) then
+         call self%advance_front(record)
+      end if
+      if (self%front_next <= self%front_count) self%first_key = self%front_key(self%front_next)
+      if (self%late_count > 0) self%first_key = min(self%first_key, self%late_key(1))
+   end subroutine pop
+
+   !> Number of the bucket of a key.
+   pure function bucket_of(self, key) result(bucket)
+      class(contact_queue_type), intent(in) :: self
+      real(wp), intent(in) :: key
+      integer(i8) :: bucket
+
+      real(wp) :: position
+
+      position = (key - self%edge) * self%inverse_width
+      ! Keys behind the slider go to the front whatever their number.
+      bucket = int(min(max(position, -1.0_wp), farthest_bucket), i8)
+      if (position < 0.0_wp) bucket = -1
+   end function bucket_of
+
+   !> Put a contact into a bucket.
+   pure subroutine append(self, slot, contact)
+      class(contact_queue_type), intent(inout) :: self
+      integer, intent(in) :: slot, contact
+
+      integer :: position, chunk
+
+      position = iand(self%bucket_count(slot), chunk_length - 1)
+      if (position == 0) then
+         chunk = self%free_chunk
+         self%free_chunk = self%chunk_next(chunk)
+         self%chunk_next(chunk) = self%bucket_chunk(slot)
+         self%bucket_chunk(slot) = chunk
+      else
+         chunk = self%bucket_chunk(slot)
+      end if
+      self%chunk_contact(position + 1, chunk) = contact
+      self%bucket_count(slot) = self%bucket_count(slot) + 1
+   end subroutine append
+
+   !> Take all contacts out of a bucket, into the front's arrays.
+   pure subroutine empty_bucket(self, slot)
+      type(contact_queue_type), intent(inout) :: self
+      integer, intent(in) :: slot
+
+      integer :: chunk, next, length
+
+      self%front_next = 1
+      self%front_count = 0
+      chunk = self%bucket_chunk(slot)
+      length = self%bucket_count(slot)
+      if (length == 0) return
+      length = iand(length - 1, chunk_length - 1) + 1
+      do while (chunk /= 0)
+         self%front_contact(self%front_count + 1:self%front_count + length) = &
+            & self%chunk_contact(:length, chunk)
+         self%front_count = self%front_count + length
+         length = chunk_length
+         next = self%chunk_next(chunk)
+         self%chunk_next(chunk) = self%free_chunk
+         self%free_chunk = chunk
+         chunk = next
+      end do
+      self%bucket_chunk(slot) = 0
+      self%bucket_count(slot) = 0
+   end subroutine empty_bucket
+
+   !> Make the next bucket that is not empty the front, and sort it.
+   subroutine advance_front(self, record)
+      class(contact_queue_type), intent(inout) :: self
+      real(wp), intent(in), contiguous :: record(:, :)
+
+      integer :: slot, position
+
+      if (self%ring_count == 0) then
+         self%front_bucket = max(self%front_bucket, self%overflow_first - self%ring_length / 2 - 1)
+      end if
+      do
+         if (self%overflow_first <= self%front_bucket + self%ring_length / 2 + 1) then
+            call self%take_overflow(record)
+         end if
+         self%front_bucket = self%front_bucket + 1
+         slot = int(iand(self%front_bucket, self%ring_length - 1))
+         if (self%bucket_count(slot) > 0) exit
+      end do
+
+      call empty_bucket(self, slot)
+      self%ring_count = self%ring_count - self%front_count
+      do position = 1, self%front_count
+         self%front_key(position) = &
+            & ahead_coordinate(record(:, self%front_contact(position)), self%direction)
+      end do
+      call sort(self%front_key, self%front_contact, self%front_count)
+   end subroutine advance_front
+
+   !> Move contacts from beyond the ring into it, where the ring has come to reach them.
+   !>
+   !> Called while the front is empty.
+   subroutine take_overflow(self, record)
+      class(contact_queue_type), intent(inout) :: self
+      real(wp), intent(in), contiguous :: record(:, :)
+
+      integer :: position, contact
+      integer(i8) :: bucket
+
+      call empty_bucket(self, self%overflow)
+      self%overflow_first = huge(1_i8)
+      do position = 1, self%front_count
+         contact = self%front_contact(position)
+         bucket = self%bucket_of(ahead_coordinate(record(:, contact), self%direction))
+         if (bucket <= self%front_bucket + self%ring_length) then
+            call self%append(int(iand(bucket, self%ring_length - 1)), contact)
+            self%ring_count = self%ring_count + 1
+         else
+            call self%append(self%overflow, contact)
+            self%overflow_first = min(self%overflow_first, bucket)
+         end if
+      end do
+      self%front_count = 0
+   end subroutine take_overflow
+
+   !> Whether one contact comes before another.
+   pure function before(key_a, contact_a, key_b, contact_b)
+      real(wp), intent(in) :: key_a, key_b
+      integer, intent(in) :: contact_a, contact_b
+      logical :: before
+
+      before = key_a < key_b .or. (key_a <= key_b .and. contact_a < contact_b)
+   end function before
+
+   !> Put a contact into a binary heap, the last place of which is free.
+   pure subroutine push(heap_key, heap_contact, count, key, contact)
+      real(wp), intent(inout), contiguous :: heap_key(:)
+      integer, intent(inout), contiguous :: heap_contact(:)
+      integer, intent(in) :: count, contact
+      real(wp), intent(in) :: key
+
+      integer :: child, parent
+
+      child = count
+      do while (child > 1)
+         parent = child / 2
+         if (.not. before(key, contact, heap_key(parent), heap_contact(parent))) exit
+         heap_key(child) = heap_key(parent)
+         heap_contact(child) = heap_contact(parent)
+         child = parent
+      end do
+      heap_key(child) = key
+      heap_contact(child) = contact
+   end subroutine push
+
+   !> Remove the first contact of a binary heap.
+   pure subroutine remove_first(heap_key, heap_contact, count)
+      real(wp), intent(inout), contiguous :: heap_key(:)
+      integer, intent(inout), contiguous :: heap_contact(:)
+      integer, intent(in) :: count
+
+      integer :: parent, child, contact
+      real(wp) :: key
+
+      key = heap_key(count)
+      contact = heap_contact(count)
+      parent = 1
+      do
+         child = 2 * parent
+         if (child >= count) exit
+         if (child + 1 < count) then
+            if (before(heap_key(child + 1), heap_contact(child + 1), &
+               & heap_key(child), heap_contact(child))) child = child + 1
+         end if
+         if (.not. before(heap_key(child), heap_contact(child), key, contact)) exit
+         heap_key(parent) = heap_key(child)
+         heap_contact(parent) = heap_contact(child)
+         parent = child
+      end do
+      heap_key(parent) = key
+      heap_contact(parent) = contact
+   end subroutine remove_first
+
+   !> Sort contacts by key, then by number: short runs by insertion, longer ones by merging.
+   pure subroutine sort(key, contact, count)
+      real(wp), intent(inout), contiguous :: key(:)
+      integer, intent(inout), contiguous :: contact(:)
+      integer, intent(in) :: count
+
+      real(wp), allocatable :: left_key(:)
+      integer, allocatable :: left_contact(:)
+      integer :: first, middle, last, run
+
+      do first = 1, count, short_run
+         call insertion_sort(key, contact, first, min(first + short_run - 1, count))
+      end do
+      if (count <= short_run) return
+
+      allocate (left_key(count), left_contact(count))
+      run = short_run
+      do while (run < count)
+         do first = 1, count - run, 2 * run
+            middle = first + run - 1
+            last = min(middle + run, count)
+            call merge_runs(key, contact, first, middle, last, left_key, left_contact)
+         end do
+         run = 2 * run
+      end do
+   end subroutine sort
+
+   !> Sort one run by insertion.
+   pure subroutine insertion_sort(key, contact, first, last)
+      real(wp), intent(inout), contiguous :: key(:)
+      integer, intent(inout), contiguous :: contact(:)
+      integer, intent(in) :: first, last
+
+      integer :: position, place, moved_contact
+      real(wp) :: moved_key
+
+      do position = first + 1, last
+         moved_key = key(position)
+         moved_contact = contact(position)
+         place = position
+         do while (place > first)
+            if (.not. before(moved_key, moved_contact, key(place - 1), contact(place - 1))) exit
+            key(place) = key(place - 1)
+            contact(place) = contact(place - 1)
+            place = place - 1
+         end do
+         key(place) = moved_key
+         contact(place) = moved_contact
+      end do
+   end subroutine insertion_sort
+
+   !> Merge two neighbouring sorted runs.
+   pure subroutine merge_runs(key, contact, first, middle, last, left_key, left_contact)
+      real(wp), intent(inout), contiguous :: key(:), left_key(:)
+      integer, intent(inout), contiguous :: contact(:), left_contact(:)
+      integer, intent(in) :: first, middle, last
+
+      integer :: left, left_count, right, place
+
+      left_count = middle - first + 1
+      left_key(:left_count) = key(first:middle)
+      left_contact(:left_count) = contact(first:middle)
+      left = 1
+      right = middle + 1
+      place = first
+      do while (left <= left_count)
+         if (right <= last) then
+            if (before(key(right), contact(right), left_key(left), left_contact(left))) then
+               key(place) = key(right)
+               contact(place) = contact(right)
+               right = right + 1
+               place = place + 1
+               cycle
+            end if
+         end if
+         key(place) = left_key(left)
+         contact(place) = left_contact(left)
+         left = left + 1
+         place = place + 1
+      end do
+   end subroutine merge_runs
+
+end module mesoslip_contacts_queue

@@ -1,0 +1,372 @@
+!> N contacts one by one: their records and random numbers, how one lets go and takes hold.
+!>
+!> The earthquake-like model but for the order in which contacts break, which is left to those who
+!> extend it. Displacements are relative to an origin that the caller moves along. State is plain
+!> arrays owned by the caller.
+module mesoslip_contacts_set
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_contacts_avalanche_track, only: avalanche_track_type, row_generation
+   use mesoslip_numerics_random, only: uniform_pair
+   use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, extent_length
+   use mesoslip_contacts_mechanics, only: coupling_scaled, initial_steady, initial_uniform
+   use mesoslip_contacts_record, only: row_limit, row_next, row_origin, row_renewal, &
+      & row_stiffness
+   implicit none
+   private
+
+   public :: contact_set_type, contact_arrays_type, exchange_set, law_set, snapshot_set
+   public :: detached_length
+
+   !> Numbers kept for a detached contact
+   integer, parameter :: detached_length = 2
+   !> When it attaches again [s]
+   integer, parameter :: row_due = 1
+   !> Its drag while it is detached [N s/m]
+   integer, parameter :: row_drag = 2
+
+   !> Arrays of the caller that hold the state of the contacts.
+   type :: contact_arrays_type
+      !> Records of the contacts, shape (record_length, count)
+      real(wp), pointer, contiguous :: record(:, :) => null()
+      !> A ring of detached contacts in the order of attaching, shape (detached_length, count)
+      real(wp), pointer, contiguous :: detached(:, :) => null()
+      !> Numbers of the contacts in that ring, shape (count)
+      integer, pointer, contiguous :: detached_contact(:) => null()
+   end type contact_arrays_type
+
+   !> N contacts one by one.
+   type, abstract, extends(contacts_type) :: contact_set_type
+      !> State of the contacts
+      type(contact_arrays_type) :: arrays
+      !> Time at which the next contact attaches; huge when there is none [s]
+      real(wp) :: next_attachment = huge(1.0_wp)
+      !> Totals of stiffness and of stiffness times origin of the pinned, of drag of the detached
+      type(accumulator_type) :: stiffness, offset, drag
+      !> Contacts of the present avalanche
+      type(avalanche_track_type) :: track
+      !> Number of contacts that are detached, and their first place in the ring
+      integer :: waiting = 0, first_detached = 0
+   contains
+      procedure :: law => law_set
+      procedure :: has_room
+      procedure :: elastic_energy
+      procedure :: exchange => exchange_set
+      procedure :: snapshot => snapshot_set
+      procedure :: take_extent
+      !> Draw all contacts for the start of a run
+      procedure, non_overridable :: draw
+      !> What happens to a contact that breaks
+      procedure, non_overridable :: let_go
+      !> Attach the contact that broke first
+      procedure, non_overridable :: take_hold
+      !> Sum stiffness and offset anew, from the records
+      procedure, non_overridable :: bear
+      procedure, non_overridable, private :: draw_next
+      !> Move all origins
+      procedure, non_overridable :: shift_records
+   end type contact_set_type
+
+contains
+
+   !> Draw all contacts for the start of a run.
+   subroutine draw(self, state)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      integer :: contact
+      integer(i8) :: attempt
+      real(wp) :: uniform(2), threshold, largest, stiffness, limit, back, stretch
+
+      largest = self%parameters%law%quantile(2.0_wp**(-53))
+      do contact = 1, self%parameters%count
+         attempt = 0
+         do
+            call uniform_pair(self%parameters%seed, self%parameters%realization, &
+               & int(contact - 1, i8), 0_i8, attempt, uniform)
+            threshold = self%parameters%law%quantile(uniform(1))
+            ! Thresholds of sliding contacts are weighted by how far the contact is carried.
+            if (state /= initial_steady) exit
+            call uniform_pair(self%parameters%seed, self%parameters%realization, &
+               & int(contact - 1, i8), 0_i8, attempt + 1, uniform)
+            if (uniform(1) * carried(self%parameters, largest) &
+               & <= carried(self%parameters, threshold)) exit
+            attempt = attempt + 2
+         end do
+
+         call born(self%parameters, threshold, stiffness, limit)
+         select case (state)
+         case (initial_steady)
+            back = self%parameters%back_force_ratio * self%parameters%static_force / stiffness
+            stretch = back + uniform(2) * (limit - back)
+         case (initial_uniform)
+            stretch = uniform(2) * limit
+         case default
+            stretch = 0.0_wp
+         end select
+         self%arrays%record(row_origin, contact) = -stretch
+         self%arrays%record(row_stiffness, contact) = stiffness
+         self%arrays%record(row_limit, contact) = limit
+         self%arrays%record(row_renewal, contact) = 0.0_wp
+         call self%draw_next(contact, 1.0_wp)
+      end do
+      call self%bear()
+   end subroutine draw
+
+   !> Contact force as a law.
+   pure function law_set(self) result(law)
+      !> The contacts
+      class(contact_set_type), intent(in) :: self
+      !> The law that holds until a contact breaks or attaches
+      type(interface_law_type) :: law
+
+      law%stiffness = self%stiffness%total()
+      law%offset = self%offset%total()
+      law%drag = self%drag%total()
+   end function law_set
+
+   !> Whether there is room for one more step: the arrays have a place for each contact.
+   pure function has_room(self)
+      !> The contacts
+      class(contact_set_type), intent(in) :: self
+      !> Always
+      logical :: has_room
+
+      has_room = size(self%arrays%record, 2) >= self%parameters%count
+   end function has_room
+
+   !> What happens to a contact that breaks: it leaves its force, and waits to attach again.
+   subroutine let_go(self, contact, displacement, time)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Displacement [m] and time [s]
+      real(wp), intent(in) :: displacement, time
+
+      integer :: place
+      real(wp) :: stiffness, origin, drag
+
+      associate (record => self%arrays%record(:, contact))
+         origin = record(row_origin)
+         stiffness = record(row_stiffness)
+         record(row_stiffness) = 0.0_wp
+         record(row_renewal) = record(row_renewal) + 1.0_wp
+      end associate
+
+      drag = self%parameters%drag
+      if (drag > 0.0_wp .and. self%parameters%coupling == coupling_scaled) then
+         drag = drag * (stiffness / self%parameters%stiffness)**2
+      end if
+      call self%break_loss%add(0.5_wp * stiffness * (displacement - origin)**2)
+      call self%stiffness%add(-stiffness)
+      call self%offset%add(-stiffness * origin)
+      if (drag > 0.0_wp) call self%drag%add(drag)
+      self%breaks = self%breaks + 1.0_wp
+      call self%track%add(contact)
+
+      place = self%first_detached + self%waiting
+      if (place >= self%parameters%count) place = place - self%parameters%count
+      self%waiting = self%waiting + 1
+      if (self%waiting == self%parameters%count) then
+         self%stiffness = accumulator_type()
+         self%offset = accumulator_type()
+      end if
+      self%arrays%detached_contact(place + 1) = contact
+      self%arrays%detached(row_due, place + 1) = time + self%parameters%delay
+      self%arrays%detached(row_drag, place + 1) = drag
+      if (self%waiting == 1 .and. self%parameters%reattach) then
+         self%next_attachment = self%arrays%detached(row_due, place + 1)
+      end if
+   end subroutine let_go
+
+   !> Attach the contact that broke first.
+   subroutine take_hold(self, displacement, force, bond, contact)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Force that the contact bears when it attaches, and that of its neighbours on it [N]
+      real(wp), intent(in) :: force
+      !> Stiffness of its bonds to its neighbours [N/m]
+      real(wp), intent(in) :: bond
+      !> Number of the contact
+      integer, intent(out) :: contact
+
+      integer :: place
+      real(wp) :: stiffness, limit, origin
+
+      place = self%first_detached + 1
+      contact = self%arrays%detached_contact(place)
+      call born(self%parameters, self%arrays%record(row_next, contact), stiffness, limit)
+      origin = displacement - force / (stiffness + bond)
+
+      call self%drag%add(-self%arrays%detached(row_drag, place))
+      self%waiting = self%waiting - 1
+      self%first_detached = place
+      if (place == self%parameters%count) self%first_detached = 0
+      self%next_attachment = huge(1.0_wp)
+      if (self%waiting > 0) then
+         self%next_attachment = self%arrays%detached(row_due, self%first_detached + 1)
+      else
+         self%drag = accumulator_type()
+      end if
+
+      call self%birth_gain%add(0.5_wp * stiffness * (displacement - origin)**2)
+      call self%stiffness%add(stiffness)
+      call self%offset%add(stiffness * origin)
+      associate (record => self%arrays%record(:, contact))
+         record(row_origin) = origin
+         record(row_stiffness) = stiffness
+         record(row_limit) = limit
+         call self%draw_next(contact, record(row_renewal) + 1.0_wp)
+      end associate
+   end subroutine take_hold
+
+   !> Draw the threshold of a contact at its next birth; so early that nothing waits for it.
+   subroutine draw_next(self, contact, renewal)
+      class(contact_set_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> How often it will have been born again then
+      real(wp), intent(in) :: renewal
+
+      real(wp) :: uniform(2)
+
+      call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
+         & int(renewal, i8), 0_i8, uniform)
+      self%arrays%record(row_next, contact) = self%parameters%law%quantile(uniform(1))
+   end subroutine draw_next
+
+   !> Move all origins.
+   subroutine shift_records(self, shift)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> Displacement of the new origin of displacements [m]
+      real(wp), intent(in) :: shift
+
+      integer :: contact
+
+      do contact = 1, self%parameters%count
+         self%arrays%record(row_origin, contact) = self%arrays%record(row_origin, contact) - shift
+      end do
+      call self%bear()
+   end subroutine shift_records
+
+   !> Contacts and extent of the avalanche that is over, and forget it.
+   subroutine take_extent(self, extent)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> Contacts that broke, columns and rows around them, generations; 0 without a lattice
+      integer, intent(out) :: extent(extent_length)
+
+      extent(1) = self%track%area
+      call self%track%extent(extent(2), extent(3))
+      extent(4) = self%track%generation
+      call self%track%clear()
+   end subroutine take_extent
+
+   !> How the contacts are.
+   pure subroutine snapshot_set(self, displacement, values)
+      !> The contacts
+      class(contact_set_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Of each contact its stretch, huge if it is detached [m], force over threshold, and
+      !> generation in the present avalanche, shape (snapshot_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      integer :: contact
+
+      do contact = 1, self%parameters%count
+         values(:, contact) = [huge(1.0_wp), 0.0_wp, 0.0_wp]
+         if (self%track%columns > 0) then
+            values(3, contact) = real(self%track%contact(row_generation, contact), wp)
+         end if
+         if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
+         values(1, contact) = displacement - self%arrays%record(row_origin, contact)
+         values(2, contact) = values(1, contact) / self%arrays%record(row_limit, contact)
+      end do
+   end subroutine snapshot_set
+
+   !> Sum stiffness and offset anew, from the records.
+   subroutine bear(self)
+      class(contact_set_type), intent(inout) :: self
+
+      integer :: contact
+
+      self%stiffness = accumulator_type()
+      self%offset = accumulator_type()
+      do contact = 1, self%parameters%count
+         call self%stiffness%add(self%arrays%record(row_stiffness, contact))
+         call self%offset%add(self%arrays%record(row_stiffness, contact) &
+            & * self%arrays%record(row_origin, contact))
+      end do
+   end subroutine bear
+
+   !> Elastic energy of the pinned contacts.
+   pure function elastic_energy(self, displacement) result(energy)
+      !> The contacts
+      class(contact_set_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Energy [J]
+      real(wp) :: energy
+
+      integer :: contact
+      type(accumulator_type) :: total
+
+      do contact = 1, self%parameters%count
+         call total%add(0.5_wp * self%arrays%record(row_stiffness, contact) &
+            & * (displacement - self%arrays%record(row_origin, contact))**2)
+      end do
+      energy = total%total()
+   end function elastic_energy
+
+   !> Put the state into an archive or take it out; the arrays of the caller are the rest of it.
+   subroutine exchange_set(self, archive)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange(self%waiting)
+      call archive%exchange(self%first_detached)
+      call archive%exchange(self%next_attachment)
+      call archive%exchange(self%breaks)
+      call archive%exchange(self%detached_count)
+      call archive%exchange(self%break_loss)
+      call archive%exchange(self%birth_gain)
+      call archive%exchange(self%stiffness)
+      call archive%exchange(self%offset)
+      call archive%exchange(self%drag)
+      call self%track%exchange(archive)
+   end subroutine exchange_set
+
+   !> Stiffness and breaking stretch of a contact that is born with a relative threshold.
+   pure subroutine born(parameters, threshold, stiffness, limit)
+      type(contact_parameters_type), intent(in) :: parameters
+      real(wp), intent(in) :: threshold
+      real(wp), intent(out) :: stiffness, limit
+
+      stiffness = parameters%stiffness
+      if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
+      limit = threshold * parameters%static_force / stiffness
+   end subroutine born
+
+   !> How far the slider carries a contact from attaching to breaking.
+   pure function carried(parameters, threshold) result(distance)
+      type(contact_parameters_type), intent(in) :: parameters
+      real(wp), intent(in) :: threshold
+      real(wp) :: distance
+
+      real(wp) :: stiffness, limit
+
+      call born(parameters, threshold, stiffness, limit)
+      distance = limit - parameters%back_force_ratio * parameters%static_force / stiffness
+   end function carried
+
+end module mesoslip_contacts_set

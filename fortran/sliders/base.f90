@@ -1,0 +1,236 @@
+!> What every slider can do: move under a linear law of the contact force, and say where it is.
+!>
+!> A slider knows nothing about contacts. Displacements are relative to an origin that moves along
+!> with the slider, so that they keep their digits however far it goes.
+module mesoslip_sliders_base
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   implicit none
+   private
+
+   public :: slider_type, motion_type, exchange_slider, shift_slider
+
+   !> The motion at one time.
+   type :: motion_type
+      !> Time [s]
+      real(wp) :: time = 0.0_wp
+      !> Displacement of the drive [m]
+      real(wp) :: drive_displacement = 0.0_wp
+      !> Displacement of the slider [m]
+      real(wp) :: displacement = 0.0_wp
+      !> Velocity of the slider [m/s]
+      real(wp) :: velocity = 0.0_wp
+      !> Force that the drive exerts on the slider [N]
+      real(wp) :: spring_force = 0.0_wp
+      !> Force that the slider exerts on the contacts [N]
+      real(wp) :: contact_force = 0.0_wp
+      !> Mean elastic force of a slider of layers [N], and displacement of its base [m]
+      real(wp) :: elastic_force = 0.0_wp, base_displacement = 0.0_wp
+   end type motion_type
+
+   !> A slider: what it has in common whatever its kind.
+   type, abstract :: slider_type
+      !> Time [s]
+      real(wp) :: time = 0.0_wp
+      !> Displacement of the origin of all other displacements [m]
+      real(wp) :: origin = 0.0_wp
+      !> Displacement of the slider [m] and its velocity [m/s]
+      real(wp) :: displacement = 0.0_wp, velocity = 0.0_wp
+      !> Its acceleration at the end of the last advance, and at its start [m/s2]
+      real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
+      !> Sign of the last velocity that was not zero
+      real(wp) :: sense = 1.0_wp
+      !> Velocity of the drive [m/s], and where it was when it took this velocity [s, m]
+      real(wp) :: drive_velocity = 0.0_wp, drive_time = 0.0_wp, drive_displacement = 0.0_wp
+      !> Time at which the last advance started [s]
+      real(wp) :: step_time = 0.0_wp
+      !> Work done by the drive, and lost in the drag of contacts and in the slider's damping [J]
+      type(accumulator_type) :: drive_work, drag_loss, damping_loss
+      !> Whether it has no inertia, and jumps to its equilibrium while the drive stands still
+      logical :: instant = .false.
+      !> Whether it came to its equilibrium in the last advance, and where [m]
+      logical :: settled = .false.
+      real(wp) :: rest_displacement = 0.0_wp
+      !> Set when nothing holds it any more
+      logical :: unbound = .false.
+      !> Set when the slider cannot go on
+      type(error_type), allocatable :: failure
+   contains
+      !> Put the slider at rest in balance with the contacts
+      procedure(start_interface), deferred :: start
+      !> Move until the first end of a window, or less far
+      procedure(advance_interface), deferred :: advance
+      !> The motion at a time of the last advance
+      procedure(observe_interface), deferred :: observe
+      !> Kinetic energy and that of the drive's spring
+      procedure(energy_interface), deferred :: energy
+      !> Where it is
+      procedure, non_overridable :: pose
+      !> Give the drive another velocity
+      procedure, non_overridable :: drive
+      !> Where the drive is at a time
+      procedure, non_overridable :: drive_at
+      !> Move the origin of displacements
+      procedure :: shift_origin => shift_slider
+      !> Displacements of the layers at a time of the last advance
+      procedure :: observe_layers
+      !> Numbers that tell what the slider's integrator did
+      procedure :: integrator_counts
+      !> Free what the slider holds
+      procedure :: close => close_slider
+      !> Put the state into an archive or take it out
+      procedure :: exchange => exchange_slider
+   end type slider_type
+
+   abstract interface
+      !> Put the slider at rest in balance with the contacts.
+      subroutine start_interface(self, law)
+         import :: slider_type, interface_law_type
+         implicit none
+         !> The slider, its displacement zero
+         class(slider_type), intent(inout) :: self
+         !> Contact force at the start
+         type(interface_law_type), intent(in) :: law
+      end subroutine start_interface
+
+      !> Move until the first end of a window, or less far.
+      subroutine advance_interface(self, law, window)
+         import :: slider_type, interface_law_type, window_type
+         implicit none
+         !> The slider; on return at an end of the window, or inside it.
+         !> At an end its displacement or time equals the window's to the bit.
+         class(slider_type), intent(inout) :: self
+         !> Contact force
+         type(interface_law_type), intent(in) :: law
+         !> Where the law holds
+         type(window_type), intent(in) :: window
+      end subroutine advance_interface
+
+      !> The motion at a time of the last advance, from its start to the slider's time.
+      pure function observe_interface(self, time) result(motion)
+         import :: slider_type, motion_type, wp
+         implicit none
+         !> The slider
+         class(slider_type), intent(in) :: self
+         !> Time [s]
+         real(wp), intent(in) :: time
+         !> The motion, displacements being absolute
+         type(motion_type) :: motion
+      end function observe_interface
+
+      !> Kinetic energy and that of the drive's spring.
+      pure function energy_interface(self) result(energy)
+         import :: slider_type, wp
+         implicit none
+         !> The slider
+         class(slider_type), intent(in) :: self
+         !> Energy [J]
+         real(wp) :: energy
+      end function energy_interface
+   end interface
+
+contains
+
+   !> Where the slider is.
+   pure function pose(self)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Where it is
+      type(pose_type) :: pose
+
+      pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, self%sense)
+   end function pose
+
+   !> Give the drive another velocity.
+   subroutine drive(self, velocity)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+      !> Velocity of the drive [m/s]
+      real(wp), intent(in) :: velocity
+
+      self%drive_displacement = self%drive_at(self%time)
+      self%drive_time = self%time
+      self%drive_velocity = velocity
+   end subroutine drive
+
+   !> Where the drive is at a time.
+   pure function drive_at(self, time) result(displacement)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Displacement of the drive from the moving origin [m]
+      real(wp) :: displacement
+
+      displacement = self%drive_displacement + self%drive_velocity * (time - self%drive_time)
+   end function drive_at
+
+   !> Move the origin of displacements; ends what can be observed of the last advance.
+   subroutine shift_slider(self, shift)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      self%drive_displacement = self%drive_at(self%time) - shift
+      self%drive_time = self%time
+      self%displacement = self%displacement - shift
+      self%origin = self%origin + shift
+   end subroutine shift_slider
+
+   !> Displacements of the layers at a time of the last advance; nothing for a rigid slider.
+   pure subroutine observe_layers(self, time, displacement)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Absolute displacements, shape (layers) [m]
+      real(wp), intent(out) :: displacement(:)
+
+      displacement = self%origin + self%displacement + 0.0_wp * time
+   end subroutine observe_layers
+
+   !> Steps, evaluations and failed steps of the slider's integrator; none without one.
+   function integrator_counts(self) result(counts)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> These three
+      integer(i8) :: counts(3)
+
+      counts = 0_i8
+      if (allocated(self%failure)) counts(3) = 1_i8
+   end function integrator_counts
+
+   !> Free what the slider holds; nothing for most.
+   subroutine close_slider(self)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+
+      self%step_time = self%time
+   end subroutine close_slider
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange_slider(self, archive)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange(self%time)
+      call archive%exchange(self%origin)
+      call archive%exchange(self%displacement)
+      call archive%exchange(self%velocity)
+      call archive%exchange(self%acceleration)
+      call archive%exchange(self%sense)
+      call archive%exchange(self%drive_velocity)
+      call archive%exchange(self%drive_time)
+      call archive%exchange(self%drive_displacement)
+      call archive%exchange(self%drive_work)
+      call archive%exchange(self%drag_loss)
+      call archive%exchange(self%damping_loss)
+   end subroutine exchange_slider
+
+end module mesoslip_sliders_base

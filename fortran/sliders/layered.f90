@@ -1,0 +1,713 @@
+!> An elastic slider: layers joined by springs, on an optional base (section 8 of the model, S24).
+!>
+!> Layer 1 bears the contacts; a spring joins layer N_l to the drive. Displacement and velocity are
+!> those of layer 1 relative to the base, by which contacts stretch.
+!>
+!> Under a linear law of the contact force the motion is that of a linear system. By default it is
+!> advanced by its Taylor series, exact to rounding, over steps in units of the fastest rate; most
+!> end at an event long before. CVODE is there as the reference, and for systems so stiff that the
+!> fastest rate has no part in the motion: it starts anew after each event, and events are found in
+!> the polynomial of each of its steps.
+module mesoslip_sliders_layered
+   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
+   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector, SUNMatrix
+   use fsunmatrix_band_mod, only: FSUNBandMatrix_Data, FSUNBandMatrix_LDim, &
+      & FSUNBandMatrix_StoredUpperBandwidth
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_numerics_quadrature, only: gauss_legendre
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, shift_slider
+   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf
+   implicit none
+   private
+
+   public :: slider_layered_type, layered_parameters_type
+   public :: solver_series, solver_adams, solver_bdf
+
+   !> Taylor series, and CVODE with either family of formulas
+   integer, parameter :: solver_series = 0, solver_adams = method_adams, solver_bdf = method_bdf
+
+   !> For the procedures of motion_series.inc
+   integer, parameter :: longest_series = 28
+   integer :: i
+   real(wp), parameter :: inverse(longest_series + 2) = [(1.0_wp / i, i=1, longest_series + 2)]
+   !> Longest step in units of the fastest rate
+   real(wp), parameter :: longest_step = 2.5_wp
+
+   !> Half the bandwidth of the Jacobian, with displacements and velocities in turn.
+   integer, parameter :: half_bandwidth = 3
+   !> Points of the rule by which losses are integrated
+   integer, parameter :: points = 12
+
+   !> What the slider is made of.
+   type :: layered_parameters_type
+      !> Number of layers
+      integer :: layers = 1
+      !> Mass [kg] and static stiffness [N/m] of the whole slider
+      real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp
+      !> Rate of Kelvin-Voigt damping between layers [1/s]
+      real(wp) :: damping = 0.0_wp
+      !> Mass of the base [kg], 0 for none, stiffness [N/m] and damping rate [1/s] of its support
+      real(wp) :: base_mass = 0.0_wp, base_stiffness = 0.0_wp, base_damping = 0.0_wp
+      !> One of the solver_ codes
+      integer :: solver = solver_series
+      !> Relative tolerance, and absolute one of displacements over 1 m, for CVODE
+      real(wp) :: relative = 1.0e-8_wp, absolute = 1.0e-17_wp
+   end type layered_parameters_type
+
+   !> A linear system: the chain, the base and the contacts.
+   type :: system_type
+      type(layered_parameters_type) :: parameters
+      type(interface_law_type) :: law
+      !> Mass of a layer [kg], stiffness [N/m] and damping [N s/m] between two
+      real(wp) :: layer_mass = 1.0_wp, spring = 1.0_wp, dashpot = 0.0_wp
+      !> Displacement [m] and velocity [m/s] of the drive at the start
+      real(wp) :: drive = 0.0_wp, drive_velocity = 0.0_wp
+   end type system_type
+
+   !> An elastic slider.
+   type, extends(slider_type) :: slider_layered_type
+      !> What it is made of
+      type(layered_parameters_type) :: parameters
+      !> The system during the last advance
+      type(system_type), pointer, private :: system => null()
+      !> Displacement and velocity of the base, then of each layer, shape (0:layers, 2)
+      real(wp), pointer, contiguous, private :: state(:, :) => null()
+      !> Taylor coefficients of both, shape (0:layers, 2, 0:longest_series)
+      real(wp), allocatable, private :: series(:, :, :)
+      !> The same of the velocity of layer 1 relative to the base
+      real(wp), private :: sliding(0:longest_series) = 0.0_wp
+      integer, private :: terms = 1
+      real(wp), private :: start_displacement = 0.0_wp
+      real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
+      !> Longest step of a number of terms, in units of the fastest rate
+      real(wp), private :: reach(longest_series) = 0.0_wp
+
+      type(cvode_type), private :: cvode
+      !> State in CVODE's order, and the time from which its time counts
+      real(wp), pointer, contiguous, private :: vector(:) => null()
+      real(wp), private :: start_time = 0.0_wp
+      !> CVODE's time, which has more digits than the time of the run
+      real(wp), private :: local_time = 0.0_wp
+      !> Whether CVODE has to start anew
+      logical, private :: is_stale = .true.
+   contains
+      !> Use a state of the caller
+      procedure :: attach
+      procedure :: start
+      procedure :: advance
+      procedure :: observe
+      procedure :: observe_layers
+      procedure :: energy
+      procedure :: shift_origin
+      procedure :: integrator_counts
+      procedure :: close
+      procedure :: exchange
+      procedure, private :: expand, step_cvode, restart, take_back, add_work
+   end type slider_layered_type
+
+contains
+
+   !> Use a state of the caller.
+   subroutine attach(self, state)
+      !> The slider, its parameters set
+      class(slider_layered_type), intent(inout) :: self
+      !> Displacement and velocity of base and layers, shape (layers + 1, 2)
+      real(wp), intent(inout), target, contiguous :: state(:, :)
+
+      integer :: term
+
+      self%state(0:self%parameters%layers, 1:2) => state
+      allocate (self%series(0:self%parameters%layers, 2, 0:longest_series), source=0.0_wp)
+      call gauss_legendre(self%point, self%weight)
+      ! The first term left out is below 1e-17 of what a free motion has.
+      do term = 1, longest_series
+         self%reach(term) = exp((log(1.0e-17_wp) + log_gamma(term + 1.0_wp)) / term)
+      end do
+      allocate (self%system)
+      self%system%parameters = self%parameters
+      self%system%layer_mass = self%parameters%mass / self%parameters%layers
+      self%system%spring = self%parameters%stiffness * self%parameters%layers
+      self%system%dashpot = self%parameters%damping * self%system%layer_mass
+   end subroutine attach
+
+   !> Put the slider at rest in balance with the contacts.
+   subroutine start(self, law)
+      !> The slider, its displacement zero
+      class(slider_layered_type), intent(inout) :: self
+      !> Contact force at the start
+      type(interface_law_type), intent(in) :: law
+
+      real(wp) :: force
+      integer :: layer
+
+      force = law%stiffness * self%displacement - law%offset
+      self%state = 0.0_wp
+      if (self%parameters%base_mass > 0.0_wp) then
+         self%state(0, 1) = force / self%parameters%base_stiffness
+      end if
+      do layer = 1, self%parameters%layers
+         self%state(layer, 1) = self%state(0, 1) + self%displacement &
+            & + (layer - 1) * force / self%system%spring
+      end do
+      self%drive_displacement = self%state(self%parameters%layers, 1) + force / self%system%spring
+      self%velocity = 0.0_wp
+      self%series(:, :, 0) = self%state
+      self%system%law = law
+   end subroutine start
+
+   !> Move until the first end of a window, or less far.
+   subroutine advance(self, law, window)
+      !> The slider
+      class(slider_layered_type), intent(inout) :: self
+      !> Contact force
+      type(interface_law_type), intent(in) :: law
+      !> Where the law holds
+      type(window_type), intent(in) :: window
+
+      real(wp) :: rate, step, gap, longest, change, sense
+      logical :: ends, crosses, turns
+      integer :: term
+
+      if (self%parameters%solver /= solver_series .and. .not. self%is_stale) then
+         self%is_stale = abs(law%stiffness - self%system%law%stiffness) > 0.0_wp .or. &
+            & abs(law%offset - self%system%law%offset) > 0.0_wp .or. &
+            & abs(law%drag - self%system%law%drag) > 0.0_wp .or. &
+            & abs(self%drive_velocity - self%system%drive_velocity) > 0.0_wp
+      end if
+      self%step_time = self%time
+      self%start_displacement = self%displacement
+      self%system%law = law
+      step = window%end_time - self%time
+      if (.not. step > 0.0_wp) then
+         self%series(:, :, 1:) = 0.0_wp
+         self%series(:, :, 0) = self%state
+         return
+      end if
+
+      if (self%parameters%solver == solver_series) then
+         self%system%drive = self%drive_at(self%time)
+         self%system%drive_velocity = self%drive_velocity
+         rate = fastest_rate(self%system)
+         ends = step * rate <= longest_step
+         if (.not. ends) step = longest_step / rate
+         ! Most steps end at a break: no need for a series that reaches farther.
+         if (self%velocity > 0.0_wp) then
+            gap = window%upper - self%displacement
+         else
+            gap = self%displacement - window%lower
+         end if
+         if (gap < 0.5_wp * abs(self%velocity) * step) then
+            step = 2.0_wp * gap / abs(self%velocity)
+            ends = .false.
+            if (.not. step > 0.0_wp) step = longest_step / rate
+         end if
+         self%terms = longest_series
+         do term = 4, longest_series
+            if (rate * step <= self%reach(term)) then
+               self%terms = term
+               exit
+            end if
+         end do
+         call self%expand()
+      else
+         call self%step_cvode(window%end_time, step, ends)
+         if (allocated(self%failure)) return
+      end if
+
+      do term = 0, self%terms - 1
+         self%sliding(term) = (term + 1) &
+            & * (self%series(1, 1, term + 1) - self%series(0, 1, term + 1))
+      end do
+      longest = step
+      crosses = .false.
+      turns = .false.
+      change = 0.0_wp
+      do term = self%terms - 1, 1, -1
+         change = (change + abs(self%sliding(term))) * step
+      end do
+      if (.not. (abs(self%sliding(0)) + change) * step < min(window%upper - self%displacement, &
+         & self%displacement - window%lower)) then
+         call first_end(self%sliding, self%terms, window%upper - self%displacement, &
+            & window%lower - self%displacement, change, step, crosses, turns, sense)
+      end if
+
+      call take_back(self, step)
+      if (crosses) then
+         self%displacement = merge(window%upper, window%lower, sense > 0.0_wp)
+         self%state(1, 1) = self%state(0, 1) + self%displacement
+         self%is_stale = .true.
+      else
+         self%displacement = self%state(1, 1) - self%state(0, 1)
+      end if
+      if (turns) then
+         self%state(1, 2) = self%state(0, 2)
+         self%is_stale = .true.
+      end if
+      self%velocity = self%state(1, 2) - self%state(0, 2)
+      if (step < longest) self%is_stale = .true.
+      if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
+         self%time = window%end_time
+      else
+         self%time = self%time + step
+      end if
+      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+      self%acceleration = slope(self%sliding, self%terms, step)
+      self%start_acceleration = self%sliding(1)
+      call self%add_work(step)
+   end subroutine advance
+
+   !> Bound on the rates of a system.
+   pure function fastest_rate(system) result(rate)
+      type(system_type), intent(in) :: system
+      real(wp) :: rate
+
+      real(wp) :: base_mass
+
+      base_mass = system%parameters%base_mass
+      rate = 4.0_wp * system%spring + abs(system%law%stiffness)
+      if (system%parameters%layers == 1) rate = system%spring + abs(system%law%stiffness)
+      rate = sqrt(rate / system%layer_mass)
+      if (base_mass > 0.0_wp) then
+         rate = sqrt(rate**2 + (abs(system%law%stiffness) + system%parameters%base_stiffness) &
+            & / base_mass) + system%law%drag / base_mass + system%parameters%base_damping
+      end if
+      rate = rate + (system%law%drag + 4.0_wp * system%dashpot) / system%layer_mass
+   end function fastest_rate
+
+   !> Accelerations of base and layers without what acts from outside.
+   pure subroutine accelerate(system, displacement, velocity, acceleration)
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: displacement(0:), velocity(0:)
+      real(wp), intent(out) :: acceleration(0:)
+
+      real(wp) :: spring, dashpot, force
+      integer :: layer, last
+
+      last = system%parameters%layers
+      spring = system%spring / system%layer_mass
+      dashpot = system%dashpot / system%layer_mass
+      force = system%law%stiffness * (displacement(1) - displacement(0)) &
+         & + system%law%drag * (velocity(1) - velocity(0))
+      if (dashpot > 0.0_wp) then
+         do layer = 2, last - 1
+            acceleration(layer) = spring * ((displacement(layer + 1) - displacement(layer)) &
+               & - (displacement(layer) - displacement(layer - 1))) &
+               & + dashpot * ((velocity(layer + 1) - velocity(layer)) &
+               & - (velocity(layer) - velocity(layer - 1)))
+         end do
+      else
+         do layer = 2, last - 1
+            acceleration(layer) = spring * ((displacement(layer + 1) - displacement(layer)) &
+               & - (displacement(layer) - displacement(layer - 1)))
+         end do
+      end if
+      acceleration(last) = -spring * displacement(last) - dashpot * velocity(last)
+      if (last > 1) then
+         acceleration(last) = acceleration(last) &
+            & - spring * (displacement(last) - displacement(last - 1)) &
+            & - dashpot * (velocity(last) - velocity(last - 1))
+         acceleration(1) = spring * (displacement(2) - displacement(1)) &
+            & + dashpot * (velocity(2) - velocity(1))
+      end if
+      acceleration(1) = acceleration(1) - force / system%layer_mass
+      acceleration(0) = 0.0_wp
+      if (system%parameters%base_mass > 0.0_wp) then
+         acceleration(0) = (force - system%parameters%base_stiffness * displacement(0)) &
+            & / system%parameters%base_mass - system%parameters%base_damping * velocity(0)
+      end if
+   end subroutine accelerate
+
+   !> Accelerations by the drive and the origins of contacts, at a time after the start.
+   pure subroutine push(system, time, acceleration)
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: time
+      real(wp), intent(inout) :: acceleration(0:)
+
+      integer :: last
+
+      last = system%parameters%layers
+      acceleration(last) = acceleration(last) + (system%spring * (system%drive &
+         & + system%drive_velocity * time) + system%dashpot * system%drive_velocity) &
+         & / system%layer_mass
+      acceleration(1) = acceleration(1) + system%law%offset / system%layer_mass
+      if (system%parameters%base_mass > 0.0_wp) then
+         acceleration(0) = acceleration(0) - system%law%offset / system%parameters%base_mass
+      end if
+   end subroutine push
+
+   !> Taylor coefficients of the motion.
+   subroutine expand(self)
+      class(slider_layered_type), intent(inout) :: self
+
+      integer :: term, last
+
+      last = self%parameters%layers
+      self%series(:, :, 0) = self%state
+      do term = 0, self%terms - 1
+         call accelerate(self%system, self%series(:, 1, term), self%series(:, 2, term), &
+            & self%series(:, 2, term + 1))
+         if (term == 0) call push(self%system, 0.0_wp, self%series(:, 2, 1))
+         if (term == 1) self%series(last, 2, 2) = self%series(last, 2, 2) &
+            & + self%system%spring * self%system%drive_velocity / self%system%layer_mass
+         self%series(:, 2, term + 1) = self%series(:, 2, term + 1) * inverse(term + 1)
+         self%series(:, 1, term + 1) = self%series(:, 2, term) * inverse(term + 1)
+      end do
+   end subroutine expand
+
+   !> The state at a time after the start of the step.
+   subroutine take_back(self, time)
+      class(slider_layered_type), intent(inout) :: self
+      real(wp), intent(in) :: time
+
+      integer :: term
+
+      self%state = self%series(:, :, self%terms)
+      do term = self%terms - 1, 0, -1
+         self%state = self%state * time + self%series(:, :, term)
+      end do
+   end subroutine take_back
+
+   !> A step of CVODE, as a series from its start.
+   subroutine step_cvode(self, end_time, step, ends)
+      class(slider_layered_type), intent(inout) :: self
+      !> Time that must not be passed
+      real(wp), intent(in) :: end_time
+      !> Length of the step
+      real(wp), intent(out) :: step
+      !> Whether it comes to that time
+      logical, intent(out) :: ends
+
+      real(wp), target :: values(2 * (self%parameters%layers + 1))
+      real(wp) :: reached, factor
+      integer :: order
+
+      step = 0.0_wp
+      ends = .false.
+      if (self%is_stale) call self%restart()
+      if (allocated(self%failure)) return
+      call self%cvode%step(end_time - self%start_time, reached, step, self%terms, self%failure)
+      if (allocated(self%failure)) then
+         self%failure%message = self%failure%message // "; a looser slider.solver." &
+            & // "relative_tolerance, or another slider.solver.method, may help"
+         return
+      end if
+      ends = reached >= end_time - self%start_time
+      step = reached - self%local_time
+      factor = 1.0_wp
+      self%series(:, :, self%terms + 1:) = 0.0_wp
+      do order = 0, self%terms
+         factor = factor / max(1, order)
+         call self%cvode%derivative(self%local_time, order, values, self%failure)
+         if (allocated(self%failure)) return
+         self%series(:, 1, order) = factor * values(1::2)
+         self%series(:, 2, order) = factor * values(2::2)
+      end do
+      self%local_time = reached
+   end subroutine step_cvode
+
+   !> Start CVODE anew from the state.
+   subroutine restart(self)
+      class(slider_layered_type), intent(inout) :: self
+
+      self%start_time = self%time
+      self%local_time = 0.0_wp
+      self%system%drive = self%drive_at(self%time)
+      self%system%drive_velocity = self%drive_velocity
+      if (.not. associated(self%vector)) allocate (self%vector(size(self%state)))
+      self%vector(1::2) = self%state(:, 1)
+      self%vector(2::2) = self%state(:, 2)
+      if (self%cvode%is_open()) then
+         call self%cvode%restart(0.0_wp, self%failure)
+      else
+         call self%cvode%open(c_funloc(rates), c_loc(self%system), self%parameters%solver, &
+            & half_bandwidth, 0.0_wp, self%vector, self%parameters%relative, &
+            & self%parameters%absolute, self%failure)
+         if (.not. allocated(self%failure) .and. self%parameters%solver == solver_bdf) then
+            call self%cvode%set_jacobian(c_funloc(jacobian), self%failure)
+         end if
+      end if
+      self%is_stale = .false.
+   end subroutine restart
+
+   !> Rates of the state in CVODE's order.
+   function rates(time, state, rate, user_data) bind(c, name="mesoslip_layers_rates") &
+      & result(status)
+      real(c_double), value :: time
+      type(N_Vector) :: state, rate
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+
+      type(system_type), pointer :: system
+      real(c_double), pointer :: y(:), dy(:)
+      real(wp), allocatable :: acceleration(:)
+
+      call c_f_pointer(user_data, system)
+      y => FN_VGetArrayPointer(state)
+      dy => FN_VGetArrayPointer(rate)
+      allocate (acceleration(0:system%parameters%layers))
+      call accelerate(system, y(1::2), y(2::2), acceleration)
+      call push(system, time, acceleration)
+      dy(1::2) = y(2::2)
+      dy(2::2) = acceleration
+      status = 0
+   end function rates
+
+   !> The Jacobian of rates, a banded matrix.
+   function jacobian(time, state, rate, matrix, user_data, first, second, third) &
+      & bind(c, name="mesoslip_layers_jacobian") result(status)
+      real(c_double), value :: time
+      type(N_Vector) :: state, rate, first, second, third
+      type(SUNMatrix) :: matrix
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+
+      type(system_type), pointer :: system
+      real(c_double), pointer :: start(:), entries(:)
+      real(wp) :: spring, dashpot, base
+      integer :: stride, upper, layer, last
+
+      call c_f_pointer(user_data, system)
+      stride = int(FSUNBandMatrix_LDim(matrix))
+      upper = int(FSUNBandMatrix_StoredUpperBandwidth(matrix))
+      last = system%parameters%layers
+      ! What SUNDIALS returns is a pointer to the first entry.
+      start => FSUNBandMatrix_Data(matrix)
+      call c_f_pointer(c_loc(start), entries, [stride * 2 * (last + 1)])
+      entries = 0.0_c_double
+      spring = system%spring / system%layer_mass
+      dashpot = system%dashpot / system%layer_mass
+      do layer = 0, last
+         call add(2 * layer + 1, 2 * layer + 2, 1.0_wp)
+      end do
+      do layer = 1, last
+         ! The spring ahead, which joins the last layer to the drive.
+         call couple(layer, layer, -spring, -dashpot)
+         if (layer < last) call couple(layer, layer + 1, spring, dashpot)
+         if (layer == 1) cycle
+         call couple(layer, layer, -spring, -dashpot)
+         call couple(layer, layer - 1, spring, dashpot)
+      end do
+      associate (law => system%law, parameters => system%parameters)
+         call couple(1, 1, -law%stiffness / system%layer_mass, -law%drag / system%layer_mass)
+         call couple(1, 0, law%stiffness / system%layer_mass, law%drag / system%layer_mass)
+         if (parameters%base_mass > 0.0_wp) then
+            base = 1.0_wp / parameters%base_mass
+            call couple(0, 1, law%stiffness * base, law%drag * base)
+            call couple(0, 0, -(law%stiffness + parameters%base_stiffness) * base, &
+               & -law%drag * base - parameters%base_damping)
+         end if
+      end associate
+      status = 0
+
+   contains
+
+      !> Derivatives of the acceleration of one by displacement and velocity of another.
+      subroutine couple(of, by, by_displacement, by_velocity)
+         integer, intent(in) :: of, by
+         real(wp), intent(in) :: by_displacement, by_velocity
+
+         call add(2 * of + 2, 2 * by + 1, by_displacement)
+         call add(2 * of + 2, 2 * by + 2, by_velocity)
+      end subroutine couple
+
+      !> Add to an entry.
+      subroutine add(row, column, value)
+         integer, intent(in) :: row, column
+         real(wp), intent(in) :: value
+
+         integer :: place
+
+         place = (column - 1) * stride + upper + row - column + 1
+         entries(place) = entries(place) + value
+      end subroutine add
+
+   end function jacobian
+
+   !> Add work and losses of a step to the energy balance.
+   subroutine add_work(self, step)
+      class(slider_layered_type), intent(inout) :: self
+      real(wp), intent(in) :: step
+
+      real(wp) :: way, extension, sliding, drag, damped, velocity(0:self%parameters%layers)
+      real(wp) :: drive_velocity, drive
+      integer :: last, node, term
+
+      last = self%parameters%layers
+      drive_velocity = self%drive_velocity
+      drive = self%drive_at(self%step_time)
+      way = 0.0_wp
+      do term = self%terms, 0, -1
+         way = way * step + self%series(last, 1, term) * inverse(term + 1)
+      end do
+      way = way * step
+      extension = step * (drive + 0.5_wp * drive_velocity * step) - way
+      call self%drive_work%add(drive_velocity * (self%system%spring * extension &
+         & + self%system%dashpot * (step * drive_velocity - (self%state(last, 1) &
+         & - self%series(last, 1, 0)))))
+
+      drag = 0.0_wp
+      damped = 0.0_wp
+      do node = 1, points
+         sliding = horner(self%sliding, self%terms, self%point(node) * step)
+         drag = drag + self%weight(node) * sliding**2
+      end do
+      call self%drag_loss%add(step * drag * self%system%law%drag)
+      if (self%system%dashpot + self%parameters%base_damping <= 0.0_wp) return
+      do node = 1, points
+         velocity = self%series(:, 2, self%terms)
+         do term = self%terms - 1, 0, -1
+            velocity = velocity * (self%point(node) * step) + self%series(:, 2, term)
+         end do
+         damped = damped + step * self%weight(node) * (self%system%dashpot &
+            & * (sum((velocity(2:) - velocity(1:last - 1))**2) &
+            & + (drive_velocity - velocity(last))**2) &
+            & + self%parameters%base_mass * self%parameters%base_damping * velocity(0)**2)
+      end do
+      call self%damping_loss%add(damped)
+   end subroutine add_work
+
+   !> The motion at a time of the last advance.
+   pure function observe(self, time) result(motion)
+      !> The slider
+      class(slider_layered_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> The motion, that of layer 1 relative to the base
+      type(motion_type) :: motion
+
+      real(wp) :: step, drive, first, last, base
+      integer :: layers
+
+      layers = self%parameters%layers
+      step = time - self%step_time
+      drive = self%drive_at(time)
+      first = value_of(1, 1)
+      base = value_of(0, 1)
+      last = value_of(layers, 1)
+      motion%time = time
+      motion%velocity = value_of(1, 2) - value_of(0, 2)
+      motion%drive_displacement = self%origin + drive
+      motion%displacement = self%origin + first - base
+      motion%spring_force = self%system%spring * (drive - last) &
+         & + self%system%dashpot * (self%drive_velocity - value_of(layers, 2))
+      motion%elastic_force = self%parameters%stiffness * (drive - first)
+      motion%base_displacement = base
+      motion%contact_force = self%system%law%stiffness * (first - base) - self%system%law%offset &
+         & + self%system%law%drag * motion%velocity
+
+   contains
+
+      !> Displacement (1) or velocity (2) of the base (0) or of a layer.
+      pure function value_of(layer, kind) result(value)
+         integer, intent(in) :: layer, kind
+         real(wp) :: value
+
+         integer :: term
+
+         value = self%series(layer, kind, self%terms)
+         do term = self%terms - 1, 0, -1
+            value = value * step + self%series(layer, kind, term)
+         end do
+      end function value_of
+
+   end function observe
+
+   !> Displacements of the layers at a time of the last advance.
+   pure subroutine observe_layers(self, time, displacement)
+      !> The slider
+      class(slider_layered_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Absolute displacements, shape (layers) [m]
+      real(wp), intent(out) :: displacement(:)
+
+      integer :: term
+
+      displacement = self%series(1:, 1, self%terms)
+      do term = self%terms - 1, 0, -1
+         displacement = displacement * (time - self%step_time) + self%series(1:, 1, term)
+      end do
+      displacement = self%origin + displacement
+   end subroutine observe_layers
+
+   !> Kinetic energy and that of all springs.
+   pure function energy(self)
+      !> The slider
+      class(slider_layered_type), intent(in) :: self
+      !> Energy [J]
+      real(wp) :: energy
+
+      integer :: last
+
+      last = self%parameters%layers
+      associate (x => self%state(:, 1), v => self%state(:, 2))
+         energy = 0.5_wp * self%system%layer_mass * sum(v(2:)**2) &
+            & + 0.5_wp * self%system%spring * (sum((x(3:) - x(2:last))**2) &
+            & + (self%drive_at(self%time) - x(last + 1))**2) &
+            & + 0.5_wp * self%parameters%base_mass * v(1)**2 &
+            & + 0.5_wp * self%parameters%base_stiffness * x(1)**2
+      end associate
+   end function energy
+
+   !> Move the origin of displacements; the base keeps its own.
+   subroutine shift_origin(self, shift)
+      !> The slider
+      class(slider_layered_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      call shift_slider(self, shift)
+      self%state(1:, 1) = self%state(1:, 1) - shift
+      self%is_stale = .true.
+   end subroutine shift_origin
+
+   !> Steps, evaluations and failed steps of CVODE.
+   function integrator_counts(self) result(counts)
+      !> The slider
+      class(slider_layered_type), intent(in) :: self
+      !> These three
+      integer(i8) :: counts(3)
+
+      counts = int(self%cvode%counts(), i8)
+   end function integrator_counts
+
+   !> Free what the slider holds.
+   subroutine close(self)
+      !> The slider
+      class(slider_layered_type), intent(inout) :: self
+
+      call self%cvode%close()
+      if (associated(self%vector)) deallocate (self%vector)
+      if (associated(self%system)) deallocate (self%system)
+   end subroutine close
+
+   !> Put the state into an archive or take it out; CVODE starts anew.
+   subroutine exchange(self, archive)
+      !> The slider
+      class(slider_layered_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call exchange_slider(self, archive)
+      self%is_stale = .true.
+   end subroutine exchange
+
+   !> Derivative of a series.
+   pure function slope(series, terms, time)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: slope
+
+      integer :: term
+
+      slope = 0.0_wp
+      do term = terms - 1, 1, -1
+         slope = slope * time + term * series(term)
+      end do
+   end function slope
+
+   include "motion_series.inc"
+
+end module mesoslip_sliders_layered

@@ -1,0 +1,102 @@
+!> A slider that goes exactly where the drive goes: a velocity-controlled block, K = infinity.
+module mesoslip_sliders_prescribed
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_sliders_base, only: motion_type, slider_type
+   implicit none
+   private
+
+   public :: slider_prescribed_type
+
+   !> A slider whose displacement is that of the drive.
+   type, extends(slider_type) :: slider_prescribed_type
+      !> Contact force during the last advance
+      type(interface_law_type), private :: law
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: observe
+      procedure :: energy
+   end type slider_prescribed_type
+
+contains
+
+   !> Put the slider where the drive is, moving with it.
+   subroutine start(self, law)
+      !> The slider, its displacement zero
+      class(slider_prescribed_type), intent(inout) :: self
+      !> Contact force at the start
+      type(interface_law_type), intent(in) :: law
+
+      self%law = law
+      self%drive_displacement = 0.0_wp
+      self%velocity = self%drive_velocity
+   end subroutine start
+
+   !> Move until the first end of a window.
+   subroutine advance(self, law, window)
+      !> The slider
+      class(slider_prescribed_type), intent(inout) :: self
+      !> Contact force
+      type(interface_law_type), intent(in) :: law
+      !> Where the law holds
+      type(window_type), intent(in) :: window
+
+      real(wp) :: limit, start, step, arrival
+
+      self%law = law
+      self%step_time = self%time
+      self%velocity = self%drive_velocity
+      start = self%displacement
+      limit = window%upper
+      if (self%velocity < 0.0_wp) limit = window%lower
+
+      if (abs(self%velocity) > 0.0_wp .and. abs(limit - start) &
+         & <= abs(self%velocity) * (window%end_time - self%time)) then
+         arrival = self%drive_time + (limit - self%drive_displacement) / self%velocity
+         self%time = min(max(arrival, self%time), window%end_time)
+         self%displacement = limit
+      else
+         self%time = window%end_time
+         self%displacement = self%drive_at(self%time)
+      end if
+      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+
+      step = self%displacement - start
+      call self%drive_work%add(step * (law%stiffness * (start + 0.5_wp * step) - law%offset &
+         & + law%drag * self%velocity))
+      call self%drag_loss%add(step * law%drag * self%velocity)
+   end subroutine advance
+
+   !> The motion at a time of the last advance.
+   pure function observe(self, time) result(motion)
+      !> The slider
+      class(slider_prescribed_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> The motion
+      type(motion_type) :: motion
+
+      real(wp) :: displacement
+
+      displacement = self%drive_at(time)
+      motion%time = time
+      motion%displacement = self%origin + displacement
+      motion%drive_displacement = motion%displacement
+      motion%velocity = self%velocity
+      motion%contact_force = self%law%stiffness * displacement - self%law%offset &
+         & + self%law%drag * self%velocity
+      motion%spring_force = motion%contact_force
+   end function observe
+
+   !> A massless slider without a spring has no energy.
+   pure function energy(self)
+      !> The slider
+      class(slider_prescribed_type), intent(in) :: self
+      !> Energy [J]
+      real(wp) :: energy
+
+      energy = 0.0_wp
+   end function energy
+
+end module mesoslip_sliders_prescribed

@@ -1,0 +1,172 @@
+!> A slider without inertia that follows the stable equilibrium of spring and contacts.
+!>
+!> Under a linear law of the contact force the equilibrium is one division away. Where contacts have
+!> changed since, the slider jumps to it, or to the first contact on the way, while the drive
+!> stands still; then it goes with the drive. The drive moves the end of the spring, or, without a
+!> spring, is a force itself.
+module mesoslip_sliders_quasistatic
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_sliders_base, only: motion_type, slider_type, shift_slider
+   implicit none
+   private
+
+   public :: slider_quasistatic_type
+
+   !> A slider in equilibrium.
+   type, extends(slider_type) :: slider_quasistatic_type
+      !> Stiffness of the drive's spring K [N/m]; zero if the drive is a force [N] that grows at a
+      !> rate [N/s], for which the drive's displacement and velocity stand
+      real(wp) :: stiffness = 0.0_wp
+      !> Contact force during the last advance
+      type(interface_law_type), private :: law
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: observe
+      procedure :: energy
+      procedure :: shift_origin
+      procedure, non_overridable, private :: pull
+   end type slider_quasistatic_type
+
+contains
+
+   !> Put the slider in balance with the contacts.
+   subroutine start(self, law)
+      !> The slider, its displacement zero
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Contact force at the start
+      type(interface_law_type), intent(in) :: law
+
+      self%law = law
+      self%instant = .true.
+      self%drive_displacement = law%stiffness * self%displacement - law%offset
+      if (self%stiffness > 0.0_wp) self%drive_displacement = self%displacement &
+         & + self%drive_displacement / self%stiffness
+      self%rest_displacement = self%displacement
+   end subroutine start
+
+   !> Jump to equilibrium or to the first contact on the way; then move until the window's end.
+   subroutine advance(self, law, window)
+      !> The slider
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Contact force
+      type(interface_law_type), intent(in) :: law
+      !> Where the law holds
+      type(window_type), intent(in) :: window
+
+      real(wp) :: stiffness, start, target, way, pull, rate, limit
+
+      self%instant = .true.
+      self%law = law
+      self%step_time = self%time
+      self%velocity = 0.0_wp
+      self%settled = .false.
+      stiffness = self%stiffness + law%stiffness
+      if (.not. stiffness > 0.0_wp) then
+         self%unbound = .true.
+         return
+      end if
+
+      start = self%displacement
+      pull = self%pull(self%time)
+      target = (pull + law%offset) / stiffness
+      self%settled = target < window%upper .and. target > window%lower
+      self%displacement = min(max(target, window%lower), window%upper)
+      way = self%displacement - start
+      if (abs(way) > 0.0_wp) then
+         self%sense = sign(1.0_wp, way)
+         call self%damping_loss%add(way * stiffness * (target - start - 0.5_wp * way))
+         if (.not. self%stiffness > 0.0_wp) call self%drive_work%add(way * pull)
+      end if
+      if (.not. self%settled) return
+
+      start = self%displacement
+      self%rest_displacement = start
+      rate = self%drive_velocity
+      if (self%stiffness > 0.0_wp) rate = rate * self%stiffness
+      self%velocity = rate / stiffness
+      limit = window%upper
+      if (self%velocity < 0.0_wp) limit = window%lower
+      if (abs(self%velocity) > 0.0_wp &
+         & .and. (limit - start) / self%velocity <= window%end_time - self%time) then
+         self%time = min(self%time + (limit - start) / self%velocity, window%end_time)
+         self%displacement = limit
+      else
+         self%time = window%end_time
+         self%displacement = (self%pull(self%time) + law%offset) / stiffness
+         ! Rounding may take it to the other side of a contact that is about to break.
+         self%displacement = min(max(self%displacement, window%lower), window%upper)
+      end if
+
+      way = self%displacement - start
+      if (abs(way) > 0.0_wp) self%sense = sign(1.0_wp, way)
+      if (self%stiffness > 0.0_wp) then
+         ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
+         call self%drive_work%add(self%drive_velocity * (self%time - self%step_time) &
+            & * (law%stiffness * (start + 0.5_wp * way) - law%offset))
+      else
+         call self%drive_work%add(way * (pull + 0.5_wp * rate * (self%time - self%step_time)))
+      end if
+   end subroutine advance
+
+   !> Force of the drive on a slider without displacement.
+   pure function pull(self, time) result(force)
+      class(slider_quasistatic_type), intent(in) :: self
+      real(wp), intent(in) :: time
+      real(wp) :: force
+
+      force = self%drive_at(time)
+      if (self%stiffness > 0.0_wp) force = force * self%stiffness
+   end function pull
+
+   !> The motion at a time of the last advance.
+   pure function observe(self, time) result(motion)
+      !> The slider
+      class(slider_quasistatic_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> The motion; under a force the drive is where the slider is
+      type(motion_type) :: motion
+
+      real(wp) :: displacement
+
+      displacement = self%rest_displacement + self%velocity * (time - self%step_time)
+      motion%time = time
+      motion%displacement = self%origin + displacement
+      motion%velocity = self%velocity
+      motion%contact_force = self%law%stiffness * displacement - self%law%offset
+      motion%spring_force = self%pull(time) - self%stiffness * displacement
+      motion%elastic_force = motion%spring_force
+      motion%drive_displacement = motion%displacement
+      if (self%stiffness > 0.0_wp) motion%drive_displacement = self%origin + self%drive_at(time)
+   end function observe
+
+   !> Energy of the drive's spring.
+   pure function energy(self)
+      !> The slider
+      class(slider_quasistatic_type), intent(in) :: self
+      !> Energy [J]
+      real(wp) :: energy
+
+      energy = 0.0_wp
+      if (self%stiffness > 0.0_wp) then
+         energy = 0.5_wp * self%stiffness * (self%drive_at(self%time) - self%displacement)**2
+      end if
+   end function energy
+
+   !> Move the origin of displacements; ends what can be observed of the last advance.
+   subroutine shift_origin(self, shift)
+      !> The slider
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      real(wp) :: force
+
+      force = self%drive_at(self%time)
+      call shift_slider(self, shift)
+      if (.not. self%stiffness > 0.0_wp) self%drive_displacement = force
+   end subroutine shift_origin
+
+end module mesoslip_sliders_quasistatic

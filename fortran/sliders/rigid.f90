@@ -1,0 +1,395 @@
+!> A rigid slider on a spring, Eqs. S40 and S41, followed exactly.
+!>
+!> Under a linear law of the contact force the motion is that of a linear system with constant
+!> coefficients. It is advanced by its Taylor series over steps so short that the series is exact to
+!> rounding; nothing is a matter of step size. Events are short compared with any period of the
+!> system, so a few terms do.
+module mesoslip_sliders_rigid
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider
+   implicit none
+   private
+
+   public :: slider_rigid_type
+
+   !> Terms of the series for short, middling and long steps, and the lengths of these in units of
+   !> the fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
+   integer, parameter :: few_terms = 6, some_terms = 10, most_terms = 17
+   real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 8.0e-2_wp, longest_step = 0.5_wp
+
+   !> For the procedures of motion_series.inc
+   integer, parameter :: longest_series = most_terms
+   integer :: i
+   real(wp), parameter :: inverse(longest_series + 2) = [(1.0_wp / i, i=1, longest_series + 2)]
+
+   !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
+   real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
+      & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
+   real(wp), parameter :: weight_4(4) = [0.17392742256872692869_wp, 0.32607257743127307131_wp, &
+      & 0.32607257743127307131_wp, 0.17392742256872692869_wp]
+   real(wp), parameter :: point_6(6) = [0.033765242898423986094_wp, 0.16939530676686774317_wp, &
+      & 0.38069040695840154568_wp, 0.61930959304159845432_wp, 0.83060469323313225683_wp, &
+      & 0.96623475710157601391_wp]
+   real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
+      & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
+      & 0.085662246189585172520_wp]
+
+   !> Coefficients of the equation of motion, per mass of the slider.
+   type :: system_type
+      !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
+      real(wp) :: inverse_mass, stiffness, drag, spring
+   end type system_type
+
+   !> Velocity of the slider with derivatives, and the same of the damper.
+   type :: motion_rates_type
+      !> Velocity, acceleration and jerk of the slider
+      real(wp) :: velocity, acceleration, jerk
+      !> eta_S (V - W) [m/s2] and its rate [m/s3]
+      real(wp) :: damper, damper_rate
+   end type motion_rates_type
+
+   !> A rigid slider on a spring.
+   type, extends(slider_type) :: slider_rigid_type
+      !> Mass M [kg], stiffness of the drive's spring K [N/m], damping rate eta_S [1/s]
+      real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp, damping = 0.0_wp
+      !> Running mean of the velocity, W [m/s]
+      real(wp) :: mean_velocity = 0.0_wp
+      !> Contact force during the last advance, and displacement at its start [m]
+      type(interface_law_type), private :: law
+      real(wp), private :: start_displacement = 0.0_wp
+      !> Taylor coefficients of the velocity in the time since then
+      integer, private :: terms = few_terms
+      real(wp), private :: series(0:most_terms - 1) = 0.0_wp
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: observe
+      procedure :: energy
+      procedure :: exchange
+   end type slider_rigid_type
+
+contains
+
+   !> Put the slider at rest in balance with the contacts.
+   subroutine start(self, law)
+      !> The slider, its displacement zero
+      class(slider_rigid_type), intent(inout) :: self
+      !> Contact force at the start
+      type(interface_law_type), intent(in) :: law
+
+      self%law = law
+      self%velocity = 0.0_wp
+      self%mean_velocity = 0.0_wp
+      self%start_displacement = self%displacement
+      self%drive_displacement = (law%stiffness * self%displacement - law%offset) / self%stiffness
+      self%series = 0.0_wp
+   end subroutine start
+
+   !> Move until the first end of a window, or less far.
+   subroutine advance(self, law, window)
+      !> The slider
+      class(slider_rigid_type), intent(inout) :: self
+      !> Contact force
+      type(interface_law_type), intent(in) :: law
+      !> Where the law holds
+      type(window_type), intent(in) :: window
+
+      real(wp) :: rate, step, gap
+      type(system_type) :: system
+      logical :: ends
+
+      self%law = law
+      self%step_time = self%time
+      self%start_displacement = self%displacement
+
+      system%inverse_mass = 1.0_wp / self%mass
+      system%stiffness = (self%stiffness + law%stiffness) * system%inverse_mass
+      system%drag = law%drag * system%inverse_mass
+      system%spring = self%stiffness * system%inverse_mass
+      rate = sqrt(abs(system%stiffness)) + system%drag + 2.0_wp * self%damping
+      step = window%end_time - self%time
+      ends = step * rate <= longest_step
+      if (.not. ends) step = longest_step / rate
+      ! Most steps end at a break: no need for a series that reaches farther.
+      if (self%velocity > 0.0_wp) then
+         gap = window%upper - self%displacement
+      else
+         gap = self%displacement - window%lower
+      end if
+      if (gap < 0.5_wp * abs(self%velocity) * step) then
+         step = 2.0_wp * gap / abs(self%velocity)
+         ends = .false.
+      end if
+
+      if (.not. step > 0.0_wp) return
+      ! The number of terms is a constant in each call: the compiler makes a copy for each.
+      if (rate * step <= short_step) then
+         call move(self, system, window, step, ends, few_terms)
+      else if (rate * step <= middling_step) then
+         call move(self, system, window, step, ends, some_terms)
+      else
+         call move(self, system, window, step, ends, most_terms)
+      end if
+   end subroutine advance
+
+   !> Move for a step, or to the first end of the window or turning point within it.
+   subroutine move(self, system, window, longest, ends, terms)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      type(window_type), intent(in) :: window
+      !> Length of the step [s]
+      real(wp), intent(in) :: longest
+      !> Whether the step comes to the end of the window's time
+      logical, intent(in) :: ends
+      !> Terms of the series
+      integer, intent(in) :: terms
+
+      real(wp) :: step, change, reach, target, sense, drive_gap, way, swept, extension
+      logical :: crosses, turns
+      type(motion_rates_type) :: early, late
+      integer :: term
+
+      drive_gap = self%drive_displacement - self%displacement &
+         & + self%drive_velocity * (self%time - self%drive_time)
+      early = rates(self, system, drive_gap)
+      call expand(self, system, early, terms)
+      self%terms = terms
+
+      step = longest
+      crosses = .false.
+      turns = .false.
+      target = 0.0_wp
+      change = 0.0_wp
+      do term = terms - 1, 1, -1
+         change = (change + abs(self%series(term))) * step
+      end do
+      reach = (abs(self%series(0)) + change) * step
+      if (.not. reach < min(window%upper - self%displacement, &
+         & self%displacement - window%lower)) then
+         call first_end(self%series, terms, window%upper - self%displacement, &
+            & window%lower - self%displacement, change, step, crosses, turns, sense)
+         target = merge(window%upper, window%lower, sense > 0.0_wp)
+      end if
+
+      way = integral(self%series, terms, step)
+      swept = second_integral(self%series, terms, step)
+      self%velocity = horner(self%series, terms, step)
+      if (turns) self%velocity = 0.0_wp
+      if (crosses) then
+         self%displacement = target
+      else
+         self%displacement = self%displacement + way
+      end if
+      if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
+         self%time = window%end_time
+      else
+         self%time = self%time + step
+      end if
+      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+
+      extension = step * (drive_gap + 0.5_wp * self%drive_velocity * step) - swept
+      ! From the balance of momentum, M dV + M dW = the impulse of spring and contacts.
+      if (self%damping > 0.0_wp) then
+         self%mean_velocity = self%mean_velocity - (self%velocity - early%velocity) &
+            & + system%spring * extension - system%drag * way + system%inverse_mass * (step &
+            & * (self%law%offset - self%law%stiffness * self%start_displacement) &
+            & - self%law%stiffness * swept)
+      end if
+
+      drive_gap = self%drive_displacement - self%displacement &
+         & + self%drive_velocity * (self%time - self%drive_time)
+      late = rates(self, system, drive_gap)
+      self%acceleration = late%acceleration
+      self%start_acceleration = early%acceleration
+      call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
+      call add_losses(self, early, late, step, terms)
+   end subroutine move
+
+   !> Velocity and its derivatives, from the equation of motion.
+   pure function rates(self, system, drive_gap) result(motion)
+      type(slider_rigid_type), intent(in) :: self
+      type(system_type), intent(in) :: system
+      !> How far the drive is ahead of the slider [m]
+      real(wp), intent(in) :: drive_gap
+      type(motion_rates_type) :: motion
+
+      motion%velocity = self%velocity
+      motion%damper = self%damping * (self%velocity - self%mean_velocity)
+      motion%acceleration = system%spring * drive_gap - system%inverse_mass &
+         & * (self%law%stiffness * self%displacement - self%law%offset) &
+         & - system%drag * self%velocity - motion%damper
+      motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
+      motion%jerk = system%spring * self%drive_velocity - system%stiffness * self%velocity &
+         & - system%drag * motion%acceleration - motion%damper_rate
+   end function rates
+
+   !> Taylor coefficients of the velocity.
+   !>
+   !> Without its running mean, S40 with S41 is an equation of the third order for the velocity.
+   pure subroutine expand(self, system, early, terms)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+      integer, intent(in) :: terms
+
+      real(wp) :: first, second, third, driving
+      integer :: term
+
+      first = 2.0_wp * self%damping + system%drag
+      second = system%stiffness + system%drag * self%damping
+      third = system%stiffness * self%damping
+      driving = self%damping * system%spring * self%drive_velocity
+      self%series(0) = early%velocity
+      self%series(1) = early%acceleration
+      self%series(2) = 0.5_wp * early%jerk
+      do term = 3, terms - 1
+         self%series(term) = inverse(term) * ((driving - third * self%series(term - 3)) &
+            & * (inverse(term - 1) * inverse(term - 2)) &
+            & - (second * inverse(term - 1)) * self%series(term - 2) &
+            & - first * self%series(term - 1))
+         driving = 0.0_wp
+      end do
+   end subroutine expand
+
+   !> Add the losses of a step to the energy balance: the integrals of C V**2 and M eta_S (V - W) V.
+   subroutine add_losses(self, early, late, step, terms)
+      type(slider_rigid_type), intent(inout) :: self
+      !> The motion at both ends
+      type(motion_rates_type), intent(in) :: early, late
+      !> Length of the step [s]
+      real(wp), intent(in) :: step
+      integer, intent(in) :: terms
+
+      real(wp) :: square, damped
+
+      select case (terms)
+      case (few_terms)
+         ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
+         ! fastest rate, of terms that are a small part of the balance.
+         square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
+            & + step * (1.0_wp / 6.0_wp) * (early%velocity * early%acceleration &
+            & - late%velocity * late%acceleration))
+         damped = step * (0.5_wp * (early%damper * early%velocity + late%damper * late%velocity) &
+            & + step * (1.0_wp / 12.0_wp) * (early%damper_rate * early%velocity &
+            & + early%damper * early%acceleration - late%damper_rate * late%velocity &
+            & - late%damper * late%acceleration))
+      case (some_terms)
+         call integrate_losses(self, early%damper, step, terms, point_4, weight_4, square, damped)
+      case default
+         call integrate_losses(self, early%damper, step, terms, point_6, weight_6, square, damped)
+      end select
+      call self%drag_loss%add(self%law%drag * square)
+      call self%damping_loss%add(self%mass * damped)
+   end subroutine add_losses
+
+   !> Integrals of V**2 and eta_S (V - W) V over a step by a Gauss rule.
+   pure subroutine integrate_losses(self, damper, step, terms, point, weight, square, damped)
+      type(slider_rigid_type), intent(in) :: self
+      !> eta_S (V - W) at the start [m/s2], length of the step [s]
+      real(wp), intent(in) :: damper, step
+      integer, intent(in) :: terms
+      real(wp), intent(in), contiguous :: point(:), weight(:)
+      real(wp), intent(out) :: square, damped
+
+      real(wp) :: velocity, series(0:most_terms - 1)
+      integer :: node, term
+
+      series(0) = damper
+      do term = 1, terms - 1
+         series(term) = self%damping * (self%series(term) - series(term - 1) * inverse(term))
+      end do
+      square = 0.0_wp
+      damped = 0.0_wp
+      do node = 1, size(point)
+         velocity = horner(self%series, terms, point(node) * step)
+         square = square + step * weight(node) * velocity**2
+         damped = damped + step * weight(node) * velocity &
+            & * horner(series, terms, point(node) * step)
+      end do
+   end subroutine integrate_losses
+
+   !> The motion at a time of the last advance.
+   pure function observe(self, time) result(motion)
+      !> The slider
+      class(slider_rigid_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> The motion
+      type(motion_type) :: motion
+
+      real(wp) :: displacement, drive, step
+
+      step = time - self%step_time
+      drive = self%drive_at(time)
+      ! As in advance, the number of terms is a constant in each call.
+      select case (self%terms)
+      case (few_terms)
+         call evaluate(self%series, few_terms, step, displacement, motion%velocity)
+      case (some_terms)
+         call evaluate(self%series, some_terms, step, displacement, motion%velocity)
+      case default
+         call evaluate(self%series, most_terms, step, displacement, motion%velocity)
+      end select
+      displacement = self%start_displacement + displacement
+      motion%time = time
+      motion%drive_displacement = self%origin + drive
+      motion%displacement = self%origin + displacement
+      motion%spring_force = self%stiffness * (drive - displacement)
+      motion%elastic_force = motion%spring_force
+      motion%contact_force = self%law%stiffness * displacement - self%law%offset &
+         & + self%law%drag * motion%velocity
+   end function observe
+
+   !> Way and velocity from the series of the velocity.
+   pure subroutine evaluate(series, terms, time, way, velocity)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp), intent(out) :: way, velocity
+
+      way = integral(series, terms, time)
+      velocity = horner(series, terms, time)
+   end subroutine evaluate
+
+   !> Kinetic energy and that of the drive's spring.
+   pure function energy(self)
+      !> The slider
+      class(slider_rigid_type), intent(in) :: self
+      !> Energy [J]
+      real(wp) :: energy
+
+      energy = 0.5_wp * self%mass * self%velocity**2 &
+         & + 0.5_wp * self%stiffness * (self%drive_at(self%time) - self%displacement)**2
+   end function energy
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The slider
+      class(slider_rigid_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call exchange_slider(self, archive)
+      call archive%exchange(self%mean_velocity)
+   end subroutine exchange
+
+   !> Integral of the integral of a series from zero.
+   pure function second_integral(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: value
+
+      integer :: term
+      real(wp) :: twice(0:longest_series - 1)
+
+      do term = 0, terms - 1
+         twice(term) = series(term) * (inverse(term + 1) * inverse(term + 2))
+      end do
+      value = time**2 * horner(twice, terms, time)
+   end function second_integral
+
+   include "motion_series.inc"
+
+end module mesoslip_sliders_rigid

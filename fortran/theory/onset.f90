@@ -1,0 +1,125 @@
+!> The onset of slip, Eqs. S46 and S47, dimensionless: x = K (X - X_c)/F_s, time times Omega_S.
+module mesoslip_theory_onset
+   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
+   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_bdf
+   implicit none
+   private
+
+   public :: onset_type, integrate_onset
+   public :: onset_length, equation_sequential, equation_melting
+
+   !> Contacts break one after another, S46
+   integer, parameter :: equation_sequential = 1
+   !> The whole film melts at once, S47
+   integer, parameter :: equation_melting = 2
+
+   !> Numbers of a sample: time, displacement, velocity, running mean of the velocity
+   integer, parameter :: onset_length = 4
+
+   !> An equation of the onset of slip.
+   type :: onset_type
+      !> One of the equation_ codes
+      integer :: equation = equation_sequential
+      !> Coefficients D0, D1, D2, D3
+      real(wp) :: D(0:3) = 0.0_wp
+      !> eta_S/Omega_S, and eta/Omega_S of the molten film
+      real(wp) :: damping = 0.0_wp, drag = 0.0_wp
+      !> Displacement at which S46 ends, because its expansion does
+      real(wp) :: end_displacement = huge(1.0_wp)
+   end type onset_type
+
+contains
+
+   !> Integrate an equation until it ends: S46 where its expansion does, S47 at the least spring
+   !> force, where the slider is as slow as the drive again.
+   subroutine integrate_onset(onset, interval, tolerance, samples, count, ended, error)
+      !> The equation
+      type(onset_type), intent(in), target :: onset
+      !> Interval of the samples, and relative tolerance of the integration
+      real(wp), intent(in) :: interval, tolerance
+      !> Samples, the last one at the end, shape (onset_length, capacity)
+      real(wp), intent(out) :: samples(:, :)
+      !> Number of samples
+      integer, intent(out) :: count
+      !> Whether it came to its end, rather than to the last sample there is room for
+      logical, intent(out) :: ended
+      !> Set if the integration fails
+      type(error_type), allocatable, intent(out) :: error
+
+      ! Displacements are of order D1 at the start and 1 in the end.
+      real(wp), parameter :: least = 1.0e-3_wp
+      type(cvode_type) :: cvode
+      real(c_double), target :: state(3)
+      real(c_double) :: time
+
+      state = [0.0_wp, onset%D(1), onset%D(1)]
+      samples = 0.0_wp
+      samples(:, 1) = [0.0_wp, state]
+      count = 1
+      ended = .false.
+      call cvode%open(c_funloc(rates), c_loc(onset), method_bdf, 2, 0.0_wp, state, tolerance, &
+         & tolerance * onset%D(1) * least, error)
+      if (allocated(error)) return
+      call cvode%find_roots(c_funloc(ends), 1, error)
+      if (allocated(error)) return
+      do while (count < size(samples, 2) .and. .not. ended)
+         call cvode%integrate(count * interval, time, ended, error)
+         if (allocated(error)) return
+         count = count + 1
+         samples(:, count) = [time, state]
+      end do
+      call cvode%close()
+   end subroutine integrate_onset
+
+   !> Rates of displacement, velocity and running mean of the velocity, for CVODE.
+   function rates(time, state, rate, user_data) bind(c, name="mesoslip_onset_rates") &
+      & result(status)
+      real(c_double), value :: time
+      type(N_Vector) :: state, rate
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+
+      type(onset_type), pointer :: onset
+      real(c_double), pointer :: y(:), dy(:)
+
+      call c_f_pointer(user_data, onset)
+      y => FN_VGetArrayPointer(state)
+      dy => FN_VGetArrayPointer(rate)
+      dy(1) = y(2)
+      dy(3) = onset%damping * (y(2) - y(3))
+      if (onset%equation == equation_sequential) then
+         dy(2) = onset%D(1) * time + (onset%D(2) + onset%D(3) * y(1)) * y(1)**2 - dy(3)
+      else
+         dy(2) = onset%D(0) + onset%D(1) * time - y(1) - onset%drag * y(2) - dy(3)
+      end if
+      status = 0
+   end function rates
+
+   !> Zero where an equation ends, for CVODE.
+   function ends(time, state, value, user_data) bind(c, name="mesoslip_onset_ends") &
+      & result(status)
+      real(c_double), value :: time
+      type(N_Vector) :: state
+      real(c_double) :: value(*)
+      type(c_ptr), value :: user_data
+      integer(c_int) :: status
+
+      type(onset_type), pointer :: onset
+      real(c_double), pointer :: y(:)
+
+      call c_f_pointer(user_data, onset)
+      y => FN_VGetArrayPointer(state)
+      if (onset%equation == equation_sequential) then
+         value(1) = onset%end_displacement - y(1)
+      else
+         ! At the start the slider is as slow as the drive as well.
+         value(1) = y(2) - onset%D(1)
+         if (.not. time > 0.0_c_double) value(1) = onset%D(0)
+      end if
+      status = 0
+   end function ends
+
+end module mesoslip_theory_onset

@@ -1,0 +1,1 @@
+"""What is read off outputs: slips, avalanches, and their statistics."""

@@ -1,0 +1,181 @@
+"""The catalogue of avalanches of an output, and its statistics."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from mesoslip.analysis.avalanche_statistics import fit_power_law
+from mesoslip.analysis.slips import write_table
+from mesoslip.configuration.config import Config
+from mesoslip.errors import FileError
+
+NO_AVALANCHES = (
+    "the output has no avalanches: they are recorded with [interaction] or "
+    'slider.kind = "quasistatic"'
+)
+
+# Name: unit, meaning.
+SUMMARY = {
+    "count": ("1", "avalanches in the catalogue"),
+    "breaks": ("1", "breaks of contacts in them"),
+    "mean_size": ("1", "mean size"),
+    "largest_size": ("1", "largest size"),
+    "largest_part": ("1", "largest size over the number of contacts"),
+    "triggered_share": ("1", "share of the breaks that others brought about"),
+    "slip_share": (
+        "1",
+        "share of the slider's displacement that happens in avalanches, for a drive "
+        "in one direction",
+    ),
+    "spanning_count": ("1", "avalanches that span the lattice"),
+    "strength": ("N", "greatest contact force before an avalanche"),
+    "failure_size": ("1", "mean size of the avalanches that broke all contacts that were left"),
+    "exponent": ("1", "exponent tau of the sizes, P(s) ~ s^(-tau) exp(-s/s_c)"),
+    "exponent_error": ("1", "standard error of the exponent"),
+    "cutoff": ("1", "cutoff s_c of the sizes; none if they do not tell one"),
+    "cutoff_error": ("1", "standard error of the cutoff"),
+    "smallest_fitted": ("1", "least size that the law is fitted to"),
+    "fitted_count": ("1", "avalanches that the law is fitted to"),
+    "fit_distance": ("1", "greatest distance of the law's distribution from theirs"),
+    "fit_p_value": ("1", "probability of such a distance if the law were right"),
+}
+
+
+def avalanches(
+    tree: xr.DataTree, *, after: float = 0.0, force_above: float | None = None
+) -> xr.Dataset:
+    """The avalanches of an output, dimension ``avalanche``.
+
+    Parameters
+    ----------
+    tree
+        Output of a run.
+    after
+        Only those that start after this time [s].
+    force_above
+        Only those before the greatest contact force of their realization, at more than this part of
+        it: those near the failure of a bundle.
+
+    Raises
+    ------
+    FileError
+        If the output has none.
+    """
+    if "avalanches" not in tree.children:
+        raise FileError(NO_AVALANCHES)
+    data = tree.children["avalanches"].to_dataset(inherit=False)
+    chosen = data["time"].values >= after
+    if force_above is not None:
+        force = np.abs(data["force_before"].values)
+        owner = data["realization"].values
+        for realization in np.unique(owner):
+            mine = np.flatnonzero(owner == realization)
+            peak = mine[np.argmax(force[mine])]
+            chosen[mine] &= (force[mine] > force_above * force[peak]) & (mine < peak)
+    return data.isel(avalanche=np.flatnonzero(chosen))
+
+
+def statistics(
+    tree: xr.DataTree,
+    *,
+    after: float = 0.0,
+    force_above: float | None = None,
+    smallest: int | None = None,
+) -> dict[str, float | None]:
+    """Statistics of the avalanches of an output, with the names of `SUMMARY`.
+
+    Parameters
+    ----------
+    tree, after, force_above
+        See `avalanches`.
+    smallest
+        Least size that the law is fitted to; chosen by default, see
+        `mesoslip.avalanche_statistics.fit_power_law`.
+
+    Returns
+    -------
+    dict
+        What the output does not tell is left out; a cutoff that the sizes do not resolve is None.
+    """
+    data = avalanches(tree, after=after, force_above=force_above)
+    config = Config.from_toml(tree.attrs["configuration"])
+    sizes = data["size"].values
+    result: dict[str, float | None] = {"count": float(sizes.size), "breaks": float(sizes.sum())}
+    if sizes.size == 0:
+        return result
+    result["mean_size"] = float(sizes.mean())
+    result["largest_size"] = float(sizes.max())
+    result["largest_part"] = float(sizes.max() / config.contacts.count)
+    result["triggered_share"] = float(1 - sizes.size / sizes.sum())
+    directions = {math.copysign(1, one.velocity) for one in config.drive_stages if one.velocity}
+    if "slip" in data and after == 0 and force_above is None and len(directions) == 1:
+        root = tree.to_dataset()
+        moved = float(np.abs(root["end_displacement"]).sum())
+        if moved > 0:
+            result["slip_share"] = float(np.abs(root["avalanche_slip"]).sum()) / moved
+    if "spans" in data:
+        result["spanning_count"] = float(data["spans"].values.sum())
+    result["strength"] = float(np.abs(data["force_before"].values).max())
+    is_failure = failures(tree, data)
+    if is_failure.any():
+        result["failure_size"] = float(sizes[is_failure].mean())
+    fit = fit_power_law(sizes[~is_failure], smallest=smallest)
+    if fit is not None:
+        result |= {
+            "exponent": fit.exponent,
+            "exponent_error": fit.exponent_error,
+            "cutoff": fit.cutoff if math.isfinite(fit.cutoff) else None,
+            "cutoff_error": fit.cutoff_error if math.isfinite(fit.cutoff) else None,
+            "smallest_fitted": float(fit.smallest),
+            "fitted_count": float(fit.count),
+            "fit_distance": fit.distance,
+            "fit_p_value": fit.p_value,
+        }
+    return result
+
+
+def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
+    """Which avalanches broke all contacts that were left; no law of sizes describes them."""
+    config = Config.from_toml(tree.attrs["configuration"])
+    if config.contacts.reattach:
+        return np.zeros(data.sizes["avalanche"], dtype=bool)
+    everything = tree.children["avalanches"].to_dataset(inherit=False)
+    owner, times = everything["realization"].values, everything["time"].values
+    last = {one: times[owner == one].max() for one in np.unique(owner)}
+    broken = tree["breaks"].to_series()
+    return np.array(
+        [
+            time == last[one] and broken[one] == config.contacts.count
+            for one, time in zip(data["realization"].values, data["time"].values, strict=True)
+        ],
+        dtype=bool,
+    )
+
+
+def rows(data: xr.Dataset) -> list[dict[str, Any]]:
+    """The avalanches, a dictionary for each."""
+    names = _columns(data)
+    columns = [data[name].values.tolist() for name in names]
+    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def write_csv(data: xr.Dataset, path: Path) -> None:
+    """Write avalanches as a table with the units in its header.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    units = {name: data[name].attrs.get("units", "1") for name in _columns(data)}
+    write_table(rows(data), units, path)
+
+
+def _columns(data: xr.Dataset) -> list[str]:
+    return ["realization", "time", *(str(name) for name in data.data_vars)]

@@ -1,0 +1,1 @@
+"""Output files, and the same in memory."""

@@ -1,0 +1,237 @@
+"""Pictures of avalanches: how large they are, and how one spreads over the lattice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mesoslip.analysis.avalanche_statistics import (
+    PowerLawFit,
+    ccdf,
+    fit_power_law,
+    logarithmic_bins,
+)
+from mesoslip.analysis.avalanches import failures
+from mesoslip.configuration.config import Config
+from mesoslip.errors import FileError
+from mesoslip.plots.run import STYLE, written_whole
+
+Array = NDArray[np.float64]
+
+# Contacts up to which each is drawn as a polygon; more of them make an image.
+MOST_POLYGONS = 20_000
+# Frames of an animation at most, and how long each is shown [s].
+MOST_FRAMES = 100
+FRAME_SECONDS = 0.08
+
+BLANK = "0.93"
+
+
+def overview(tree: xr.DataTree) -> Figure:
+    """Contact force and sizes of avalanches against the displacement of the slider."""
+    root = tree.to_dataset().isel(realization=0)
+    data = catalogue_of_first(tree)
+    config = Config.from_toml(tree.attrs["configuration"])
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.5, 5))
+        force, sizes = figure.subplots(2, 1, sharex=True)
+        at, where = root["displacement"].values * 1e6, data["displacement"].values * 1e6
+        force.plot(at, root["contact_force"].values * 1e6, color="black")
+        force.set_ylabel("contact force (µN)")
+        force.set_title(tree.attrs["title"], loc="left")
+        sizes.semilogy(where, data["size"].values, ".", color="black", markersize=2)
+        sizes.set_ylabel("avalanche size")
+        sizes.set_ylim(0.8, 1.25 * max(config.contacts.count, data["size"].values.max(initial=1)))
+        sizes.axhline(config.contacts.count, color="tab:red", linewidth=0.6)
+        sizes.set_title("red: as many as all contacts", loc="left")
+        sizes.set_xlabel("displacement (µm)")
+    return figure
+
+
+def catalogue_of_first(tree: xr.DataTree) -> xr.Dataset:
+    """Avalanches of the first realization of an output."""
+    data = tree.children["avalanches"].to_dataset(inherit=False)
+    first = tree.to_dataset()["realization"].values[0]
+    return data.isel(avalanche=np.flatnonzero(data["realization"].values == first))
+
+
+def draw_distribution(
+    axes: Axes, sizes: Array, fit: PowerLawFit | None = None, **style: Any
+) -> None:
+    """Density of avalanche sizes in logarithmic bins, and a law that was fitted to them."""
+    bins = logarithmic_bins(sizes)
+    (points,) = axes.loglog(
+        bins.centre, bins.density, "o", markersize=2.5, **{"color": "black"} | style
+    )
+    if fit is None:
+        return
+    fitted = bins.centre >= fit.smallest
+    centre, width = bins.centre[fitted], np.diff(bins.edges[fitted], axis=1)[:, 0]
+    law = centre**-fit.exponent * np.exp(-centre / fit.cutoff)
+    law *= np.sum(bins.density[fitted] * width) / np.sum(law * width)
+    axes.loglog(centre, law, color=points.get_color(), linewidth=0.7, alpha=0.7)
+
+
+def distribution(tree: xr.DataTree) -> Figure:
+    """Density and complementary cumulative distribution of the sizes of avalanches."""
+    data = tree.children["avalanches"].to_dataset(inherit=False)
+    sizes = data["size"].values[~failures(tree, data)]
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.5, 3))
+        density, cumulative = figure.subplots(1, 2)
+        for axes in (density, cumulative):
+            axes.set_xlabel("avalanche size $s$")
+        density.set_ylabel("$P(s)$")
+        cumulative.set_ylabel("$P(S \\geq s)$")
+        fit = fit_power_law(sizes, replicas=0)
+        draw_distribution(density, sizes, fit)
+        cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-pre")
+        if fit is not None:
+            label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
+            label += f"{fit.exponent_error:.3f}"
+            if np.isfinite(fit.cutoff):
+                label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
+            density.set_title(label, loc="left")
+        cumulative.set_title(tree.attrs["title"], loc="left")
+    return figure
+
+
+def draw_contacts(axes: Axes, snapshots: xr.Dataset, values: Array, **style: Any) -> Any:
+    """Draw a value of each contact at its place, shape (rows, columns); NaN in light grey."""
+    style["cmap"] = mpl.colormaps[style["cmap"]].with_extremes(bad=BLANK)
+    x, y = snapshots["x"].values, snapshots["y"].values
+    spacing = x[0, 1] - x[0, 0]
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)
+    is_triangular = bool(x[1, 0] > 0.25 * spacing)
+    if values.size > MOST_POLYGONS:
+        height = y[1, 0] - y[0, 0]
+        extent = (0, spacing * values.shape[1], 0, height * values.shape[0])
+        return axes.imshow(values, origin="lower", extent=extent, interpolation="nearest", **style)
+    corners = np.arange(6) / 6 + 1 / 12 if is_triangular else np.arange(4) / 4 + 1 / 8
+    radius = 1.01 * spacing / (2 * np.cos(np.pi / len(corners)))
+    shape = radius * np.stack([np.cos(2 * np.pi * corners), np.sin(2 * np.pi * corners)], axis=1)
+    places = np.stack([x.ravel(), y.ravel()], axis=1)
+    polygons = PolyCollection(
+        places[:, None, :] + shape[None, :, :], array=np.ma.masked_invalid(values.ravel()), **style
+    )
+    axes.add_collection(polygons)
+    axes.set_xlim(x.min() - spacing, x.max() + spacing)
+    axes.set_ylim(y.min() - spacing, y.max() + spacing)
+    return polygons
+
+
+def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
+    """A snapshot: that of the given number, or after the largest avalanche, or the last.
+
+    Raises
+    ------
+    FileError
+        If the output has no snapshots, or none of this number.
+    """
+    if "snapshots" not in tree.children:
+        raise FileError(
+            "the output has no snapshots of the lattice; ask for them by output.snapshots (times) "
+            "or output.snapshot_size (after avalanches at least that large)"
+        )
+    data = tree.children["snapshots"].to_dataset(inherit=False)
+    count = data.sizes["snapshot"]
+    if count == 0:
+        raise FileError(
+            "the output has no snapshot: the run had no avalanche of output.snapshot_size, or "
+            "ended before the first time of output.snapshots"
+        )
+    if number is None:
+        sizes = data["avalanche_size"].values
+        number = int(np.argmax(sizes)) if sizes.max() > 0 else count - 1
+    if not 0 <= number < count:
+        raise FileError(f"there is no snapshot {number}; the last one is {count - 1}")
+    return data.isel(snapshot=number)
+
+
+def lattice(tree: xr.DataTree, number: int | None = None) -> Figure:
+    """The contacts on their lattice: how near to breaking, and in what order those of an avalanche
+    broke."""
+    snapshot = chosen_snapshot(tree, number)
+    size = snapshot["avalanche_size"].item()
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(6.5, 3.4) if size else (3.6, 3.4))
+        panels = figure.subplots(1, 2 if size else 1, squeeze=False)[0]
+        drawn = draw_contacts(
+            panels[0], snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
+        )
+        figure.colorbar(drawn, ax=panels[0], shrink=0.8, label="force over threshold")
+        panels[0].set_title(f"{snapshot['time'].item():.6g} s; grey: detached", loc="left")
+        if size:
+            draw_generations(figure, panels[1], snapshot)
+            panels[1].set_title(f"an avalanche of {size} breaks", loc="left")
+    return figure
+
+
+def draw_generations(figure: Figure, axes: Axes, snapshot: xr.Dataset) -> None:
+    """Draw the order in which the contacts of an avalanche let go."""
+    generation = snapshot["generation"].values.astype(float)
+    generation[generation == 0] = np.nan
+    drawn = draw_contacts(
+        axes, snapshot, generation, cmap="inferno_r", norm=Normalize(1, np.nanmax(generation))
+    )
+    figure.colorbar(drawn, ax=axes, shrink=0.8, label="generation")
+
+
+def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
+    """Write an animation: an avalanche that spreads, or else the snapshots one after another.
+
+    Raises
+    ------
+    FileError
+        If there is no snapshot, or the file cannot be written.
+    """
+    snapshot = chosen_snapshot(tree, number)
+    everything = tree.children["snapshots"].to_dataset(inherit=False)
+    mine = everything["realization"].values == snapshot["realization"].item()
+    everything = everything.isel(snapshot=np.flatnonzero(mine))
+    spreads = bool(snapshot["avalanche_size"].item())
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(3.6, 3.4), dpi=120)
+        axes = figure.subplots()
+        if spreads:
+            generation = snapshot["generation"].values.astype(float)
+            last = generation.max()
+            steps = np.unique(np.linspace(0, last, min(MOST_FRAMES, int(last) + 1)).astype(int))
+            generation[generation == 0] = np.nan
+            frames = [np.where(generation <= now, generation, np.nan) for now in steps]
+            titles = [f"generation {now}" for now in steps]
+            style: dict[str, Any] = {"cmap": "inferno_r", "norm": Normalize(1, max(last, 2))}
+        else:
+            chosen = np.unique(
+                np.linspace(0, everything.sizes["snapshot"] - 1, MOST_FRAMES).astype(int)
+            )
+            frames = [everything["load"].values[one] for one in chosen]
+            titles = [f"{everything['time'].values[one]:.6g} s" for one in chosen]
+            style = {"cmap": "viridis", "norm": Normalize(-1, 1)}
+        drawn = draw_contacts(axes, snapshot, frames[0], **style)
+        label = "generation" if spreads else "force over threshold"
+        figure.colorbar(ScalarMappable(style["norm"], style["cmap"]), ax=axes, label=label)
+
+        def show(frame: int) -> list[Any]:
+            values = np.ma.masked_invalid(frames[frame])
+            drawn.set_array(values if frames[frame].size > MOST_POLYGONS else values.ravel())
+            axes.set_title(titles[frame], loc="left")
+            return [drawn]
+
+        film = FuncAnimation(figure, show, frames=len(frames))
+        with written_whole(path) as part:
+            film.save(part, writer=PillowWriter(fps=round(1 / FRAME_SECONDS)))

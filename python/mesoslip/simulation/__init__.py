@@ -1,0 +1,1 @@
+"""Simulations: realizations of a configuration, advanced side by side."""

@@ -1,0 +1,545 @@
+"""The force curve of the master equation, F(X), and the elastic instability it leads to.
+
+Slow forward sliding of infinitely many contacts, for which the delay does not matter: a renewal
+equation, solved by collocation of high order (``fortran/renewal.f90``) on panels that are halved
+until the force no longer changes. Sources: Braun's "Stick-slip kinetics", Eqs. S42, S43, S48.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, special
+from scipy.interpolate import BPoly
+
+from mesoslip import _core
+from mesoslip.configuration.threshold_law import ThresholdLaw
+from mesoslip.errors import ConfigError, Problem
+from mesoslip.output.store import program_attributes, variable
+from mesoslip.theory.derived import loading_rate
+from mesoslip.theory.lives import checked, law_arguments, scales
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+Array = NDArray[np.float64]
+
+# Points of collocation in a panel: the force converges with the order of this number.
+POINTS = 12
+# Width of the first panels over the spread of the break stretches.
+FIRST_WIDTH = 0.7
+# Multiplications that a finer solution may take, which is about a second.
+MOST_WORK = 2e9
+# Panels that fit into memory.
+MOST_PANELS = 4_000_000
+
+
+# Units and meanings of what a curve is summed up in.
+SUMMARY = {
+    "K_star": ("N/m", "greatest -F'(X), K*: sliding is smooth with a stiffer spring"),
+    "K_star_displacement": ("m", "where that is"),
+    "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
+    "stable": ("1", "whether sliding is smooth with the configured spring"),
+    "X_c": ("m", "displacement at which the slider becomes unstable, lowest F'(X) = -K"),
+    "F_c": ("N", "force there"),
+    "F_peak": ("N", "greatest force"),
+    "X_peak": ("m", "where that is"),
+    "F_steady": ("N", "force of stationary slow sliding"),
+    "D0": ("1", "F(X_c)/F_s"),
+    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
+    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
+    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
+    "error": ("1", "estimated error of the force over F_s"),
+    "slope_error": ("1", "estimated error of its slope over Nk"),
+    "digits": ("1", "digits of the force that are certain"),
+    "conservation_error": ("1", "largest error of the number of contacts, relative"),
+}
+
+
+class CriticalPoint(NamedTuple):
+    """A solution of F'(X) = -K, and the expansion of the force about it (model section 6)."""
+
+    displacement: float
+    """X_c [m]."""
+    force: float
+    """F(X_c) [N]."""
+    curvature: float
+    """F''(X_c) [N/m²]."""
+    third_derivative: float
+    """F'''(X_c) [N/m³]."""
+    D0: float
+    D2: float
+    D3: float
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Polynomials of the dimensionless displacement, and numbers of the solver."""
+
+    edges: Array
+    point: Array
+    force: BPoly
+    slope: BPoly
+    stiffness: BPoly
+    breaks: BPoly
+    conservation_error: float
+    mismatch: float
+
+
+def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
+    """The polynomials through values at the points of each panel, shape (points, panels)."""
+    degree = len(point) - 1
+    k = np.arange(degree + 1)
+    bernstein = special.comb(degree, k) * point[:, None] ** k * (1 - point[:, None]) ** (degree - k)
+    return BPoly(np.linalg.solve(bernstein, values), edges, extrapolate=False)
+
+
+def _solve(arguments: tuple[Any, ...], start: float, width: float, panels: int) -> _Solution:
+    point, breaks, slope, force, stiffness, pinned, mismatch = checked(
+        _core.force_curve(*arguments, start, width, panels, POINTS)
+    )
+    edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
+    return _Solution(
+        edges,
+        point,
+        force=_polynomials(edges, point, force),
+        slope=_polynomials(edges, point, slope),
+        stiffness=_polynomials(edges, point, stiffness),
+        breaks=_polynomials(edges, point, breaks),
+        conservation_error=float(np.max(np.abs(pinned - 1))),
+        mismatch=float(mismatch),
+    )
+
+
+class ForceCurve:
+    """F(X) of a configuration, from the start of its contacts to ``curve.length``.
+
+    All displacements, forces and stiffnesses are in SI units and of all contacts together.
+
+    Parameters
+    ----------
+    config
+        What contacts there are; the table ``curve`` says how far and how exactly.
+
+    Attributes
+    ----------
+    error, slope_error
+        Estimated errors of the force over F_s and of its slope over Nk: what changed in the last
+        halving of the panels, which is more than what the result still lacks.
+    conservation_error
+        Largest deviation of the number of contacts from 1.
+    panels, kernel_seconds
+        Panels of the result; computing time of all solutions together.
+
+    Raises
+    ------
+    ConfigError
+        If the curve is too long for so narrow a threshold law.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        contacts = config.contacts
+        self.newborn_width = config.curve.newborn_width
+        self._stretch = contacts.static_force / contacts.stiffness
+        self.scales = scales(config, self.newborn_width)
+        self.length = config.curve_length
+        self._force_unit = contacts.static_force
+        self._refine()
+
+    def _refine(self) -> None:
+        arguments = law_arguments(self.config, self.newborn_width)
+        length = self.length / self._stretch
+        start, width = self._first_panels(length)
+        coarse = None
+        self.kernel_seconds = 0.0
+        self.error = self.slope_error = math.inf
+        while True:
+            begin = time.perf_counter()
+            panels = math.ceil((length - start) / width)
+            if panels > MOST_PANELS:
+                raise ConfigError(
+                    [
+                        Problem(
+                            "",
+                            "curve.length",
+                            f"needs {panels:.1e} steps of the spread of the breaking stretches, of "
+                            f"which there may be {MOST_PANELS:.0e}: choose a shorter curve or a "
+                            "wider threshold law",
+                            self.length,
+                        )
+                    ]
+                )
+            fine = _solve(arguments, start, width, panels)
+            self.kernel_seconds += time.perf_counter() - begin
+            if coarse is not None:
+                inside = np.linspace(max(0.0, start), length, 20011)[1:-1]
+                self.error = float(np.max(np.abs(fine.force(inside) - coarse.force(inside))))
+                self.slope_error = float(np.max(np.abs(fine.slope(inside) - coarse.slope(inside))))
+            is_exact = self.error <= self.config.curve.tolerance
+            if is_exact or (coarse is not None and self._is_too_much(2 * panels, width / 2)):
+                break
+            coarse = fine
+            width /= 2
+        self._solution = fine
+        self.panels = panels
+        self.conservation_error = fine.conservation_error if self.config.contacts.reattach else 0.0
+        self.error = max(self.error, self.conservation_error)
+
+    def _is_too_much(self, panels: int, width: float) -> bool:
+        """Whether a solution would take too much work."""
+        band = min(panels, (self.scales.longest - self.scales.shortest) / width + 3)
+        return panels * band * POINTS * (3 + 2 * POINTS) > MOST_WORK
+
+    def _first_panels(self, length: float) -> tuple[float, float]:
+        """Start and width of the panels, with their edges where the density is discontinuous."""
+        threshold = self.config.contacts.threshold
+        spread = min(threshold.relative_width, 0.35)
+        if self.config.contacts.coupling == "scaled":
+            spread /= 2
+        width = min(FIRST_WIDTH * spread, length)
+        scales = self.scales
+        # The first generation breaks between two displacements, the next ones after lives of at
+        # least the shortest; the width is a whole part of what lies between discontinuities.
+        period = 0.0
+        if self.config.contacts.initial == "uniform":
+            period = scales.first_shortest
+        elif threshold.law == "uniform":
+            period = scales.first_longest - scales.first_shortest
+        elif threshold.law == "exponential":
+            period = scales.shortest
+        if period > width / 20:
+            width = period / math.ceil(period / width)
+        if self.config.contacts.initial != "relaxed":
+            return 0.0, width
+        first = scales.first_shortest
+        return min(0.0, first - math.ceil(first / width) * width), width
+
+    @property
+    def digits(self) -> int:
+        """Decimal digits of the force over F_s that are certain."""
+        return max(0, math.floor(-math.log10(max(self.error, 1e-16))))
+
+    def _evaluate(self, polynomial: BPoly, displacement: ArrayLike, unit: float) -> Array:
+        values: Array = unit * polynomial(np.asarray(displacement, dtype=float) / self._stretch)
+        return values
+
+    def force(self, displacement: ArrayLike) -> Array:
+        """F(X) [N]; NaN beyond the curve."""
+        return self._evaluate(self._solution.force, displacement, self._force_unit)
+
+    def slope(self, displacement: ArrayLike, derivative: int = 1) -> Array:
+        """F'(X) [N/m] or a higher derivative [N/m^n]; NaN beyond the curve."""
+        slope = self._solution.slope
+        if derivative > 1:
+            slope = slope.derivative(derivative - 1)
+        return self._evaluate(slope, displacement, self._force_unit / self._stretch**derivative)
+
+    def stiffness(self, displacement: ArrayLike) -> Array:
+        """Stiffness of the pinned contacts, K_c(X) [N/m]."""
+        return self._evaluate(
+            self._solution.stiffness, displacement, self._force_unit / self._stretch
+        )
+
+    def breaks(self, displacement: ArrayLike) -> Array:
+        """Γ(X): breaks of a contact over displacement [1/m]."""
+        return self._evaluate(self._solution.breaks, displacement, 1 / self._stretch)
+
+    def potential(self, displacement: ArrayLike, drive_displacement: float) -> Array:
+        """V_eff(X_d, X) = K (X_d - X)²/2 + ∫₀^X F [J], Eq. S42."""
+        x = np.asarray(displacement, dtype=float)
+        work = self._work_of_contacts
+        values: Array = 0.5 * self._spring * (drive_displacement - x) ** 2
+        values += self._force_unit * self._stretch * (work(x / self._stretch) - work(0.0))
+        return values
+
+    @cached_property
+    def _work_of_contacts(self) -> BPoly:
+        return self._solution.force.antiderivative()
+
+    @property
+    def _spring(self) -> float:
+        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
+        return self.config.spring_stiffness
+
+    @cached_property
+    def samples(self) -> Array:
+        """Displacements [m] that show every feature: the points of the panels above 0."""
+        solution = self._solution
+        width = solution.edges[1] - solution.edges[0]
+        nodes = (solution.edges[:-1, None] + width * solution.point).ravel()
+        nodes = np.concatenate([[0.0], nodes[nodes > 0]])
+        return self._stretch * nodes[nodes * self._stretch <= self.length]
+
+    def _extreme(self, function: Callable[[Array], Array], place: int) -> tuple[float, float]:
+        """Place and value of the minimum of a function next to one of the samples."""
+        low = self.samples[max(place - 1, 0)]
+        high = self.samples[min(place + 1, len(self.samples) - 1)]
+        scale = self._stretch
+        found = optimize.minimize_scalar(
+            lambda x: float(function(x * scale)),
+            bounds=(low / scale, high / scale),
+            method="bounded",
+            options={"xatol": 1e-12},
+        )
+        best = min((float(function(x)), float(x)) for x in (low, high, found.x * scale))
+        return best[1], best[0]
+
+    @cached_property
+    def K_star(self) -> tuple[float, float]:  # noqa: N802
+        """K* = max(-F'(X)) [N/m] and where it is [m]: sliding is smooth with a stiffer spring."""
+        place = int(np.argmin(self.slope(self.samples)))
+        displacement, slope = self._extreme(self.slope, place)
+        return -slope, displacement
+
+    @cached_property
+    def peak(self) -> tuple[float, float]:
+        """Greatest force [N] and where it is [m]."""
+        place = int(np.argmax(self.force(self.samples)))
+        displacement, force = self._extreme(lambda x: -self.force(x), place)
+        return -force, displacement
+
+    @property
+    def steady_force(self) -> float:
+        """Force of stationary slow sliding, N ⟨k (x_s² - x_b²)/2⟩/⟨x_s - x_b⟩ [N]."""
+        return self.scales.steady_force * self._force_unit
+
+    @property
+    def stable(self) -> bool:
+        """Whether sliding is smooth everywhere, K ≥ K*."""
+        return self._spring >= self.K_star[0]
+
+    @cached_property
+    def critical_points(self) -> tuple[CriticalPoint, ...]:
+        """All solutions of F'(X) = -K, the lowest first; none if sliding is smooth."""
+        spring = self._spring
+        if math.isinf(spring):
+            return ()
+        samples = np.unique([*self.samples, self.K_star[1]])
+        excess = self.slope(samples) + spring
+        changes = np.flatnonzero(np.diff(np.sign(excess)) != 0)
+        scale = self._stretch
+        points = []
+        for place in changes:
+            low, high = samples[place : place + 2] / scale
+            root = optimize.brentq(
+                lambda x: float(self.slope(x * scale)) + spring, low, high, xtol=1e-15
+            )
+            points.append(self._critical_point(root * scale))
+        return tuple(points)
+
+    def _critical_point(self, displacement: float) -> CriticalPoint:
+        force = float(self.force(displacement))
+        second, third = (float(self.slope(displacement, order)) for order in (2, 3))
+        unit = self._force_unit
+        extension = unit / self._spring if self._spring > 0 else math.inf
+        return CriticalPoint(
+            displacement,
+            force,
+            second,
+            third,
+            force / unit,
+            -second * extension**2 / (2 * unit),
+            -third * extension**3 / (6 * unit),
+        )
+
+    def stretch_density(self, stretch: ArrayLike, displacement: float) -> tuple[Array, float]:
+        """Q(x; X) [1/m] at stretches x [m], and the part of contacts that are all at x = X.
+
+        The second is not zero after a relaxed start, as long as some of the first generation are
+        left. The integral of the first and the second are 1 together.
+        """
+        contacts = self.config.contacts
+        law = ThresholdLaw(
+            contacts.threshold.law, contacts.threshold.relative_width, contacts.back_force_ratio
+        )
+        unit = self._stretch
+        x = np.atleast_1d(np.asarray(stretch, dtype=float)) / unit
+        moved = displacement / unit
+        density = self._newborn_density(law, x, moved)
+        density += self._first_density(law, x, moved)
+        atom = 0.0
+        if contacts.initial == "relaxed":
+            atom = float(law.survival(self._threshold_of(np.array(moved))))
+        return density / unit, atom
+
+    def _threshold_of(self, stretch: Array) -> Array:
+        """Threshold of contacts that break at a stretch."""
+        if self.config.contacts.coupling == "equal":
+            return stretch
+        return np.maximum(stretch, 0.0) ** 2
+
+    def _average_between(
+        self, law: ThresholdLaw, lower: Array, upper: Array, function: Callable[[Array], Array]
+    ) -> Array:
+        """E[f(u); lower < u < upper] for arrays of limits, by Gauss's rule."""
+        node, weight = np.polynomial.legendre.leggauss(100)
+        # As a function of the normal deviate of the same probability no law has narrow features.
+        low, high = (
+            special.ndtri(np.clip(law.survival(limit), 1e-17, 1 - 1e-16))
+            for limit in (upper, lower)
+        )
+        z = low[..., None] + (high - low)[..., None] * (node + 1) / 2
+        values = function(law.quantile(special.ndtr(z))) * np.exp(-0.5 * z**2)
+        average: Array = np.sum(values * weight, axis=-1) * (high - low) / 2
+        return average / math.sqrt(2 * math.pi)
+
+    def _newborn_density(self, law: ThresholdLaw, x: Array, moved: float) -> Array:
+        contacts = self.config.contacts
+        if not contacts.reattach:
+            return np.zeros_like(x)
+        breaks = self._solution.breaks
+        back = contacts.back_force_ratio
+        width = self.newborn_width / self._stretch
+        node, weight = np.zeros(1), np.ones(1)
+        if width > 0:
+            node, weight = special.roots_hermitenorm(32)
+            weight = weight / math.sqrt(2 * math.pi)
+        lowest = np.maximum(self._threshold_of(np.maximum(x, 0.0)), law.minimum)
+        total, acceptance = np.zeros_like(x), 0.0
+        for shift, part in zip(width * node, weight, strict=True):
+            gap = x - shift
+            if contacts.coupling == "equal":
+                age = gap - back
+                rate = np.where((age >= 0) & (age <= moved), breaks(moved - age), 0.0)
+                density = rate * law.survival(lowest)
+                acceptance += part * float(law.survival(back + shift))
+            else:
+                # Of an age between 0 and X are those with x_b(u) between gap and gap - X.
+                lower, upper = (
+                    np.where(edge > 0, (back / np.maximum(edge, 1e-9)) ** 2, np.inf)
+                    for edge in (gap, gap - moved)
+                )
+                lower = np.maximum(np.where(gap > 0, lower, np.inf), lowest)
+
+                def attached(threshold: Array, gap: Array = gap) -> Array:
+                    place = moved - gap[:, None] + back / np.sqrt(threshold)
+                    rate: Array = np.nan_to_num(breaks(place))
+                    return rate
+
+                density = self._average_between(law, lower, np.maximum(lower, upper), attached)
+                root = 0.5 * (shift + math.sqrt(shift**2 + 4 * back))
+                acceptance += part * float(law.survival(root**2 if root > 0 else 0.0))
+            total += part * density
+        return total / acceptance
+
+    def _first_density(self, law: ThresholdLaw, x: Array, moved: float) -> Array:
+        contacts = self.config.contacts
+        equal = contacts.coupling == "equal"
+        back = contacts.back_force_ratio
+        lowest = np.maximum(self._threshold_of(np.maximum(x, 0.0)), law.minimum)
+        if contacts.initial == "uniform":
+            density = self._average_between(
+                law, lowest, np.full_like(x, np.inf), lambda u: 1 / (u if equal else np.sqrt(u))
+            )
+            return np.where(x >= moved, density, 0.0)
+        if contacts.initial == "steady":
+            start = np.maximum(x - moved, 0.0)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                least = np.where(start > 0, (back / start) ** 2, np.inf if back > 0 else 0.0)
+            if equal:
+                least = np.where(x - moved >= back, 0.0, np.inf)
+            least = np.where(x < moved, np.inf, least)
+            return law.survival(np.maximum(lowest, least)) / self.scales.mean_life
+        return np.zeros_like(x)
+
+    def to_tree(self) -> xr.DataTree:
+        """The curve and its instability as an output file holds them.
+
+        Root: F, F', K_c and Γ over ``displacement``, with V_eff if a drive displacement is given;
+        what follows from them as attributes. Groups: ``critical`` (all X_c), ``stretch_density``
+        (Q at the displacements asked for).
+        """
+        x = self.samples
+        curves = {
+            "contact_force": self.force(x),
+            "slope": self.slope(x),
+            "contact_stiffness": self.stiffness(x),
+            "break_rate": self.breaks(x),
+        }
+        if self.config.curve.drive_displacement is not None and math.isfinite(self._spring):
+            curves["potential"] = self.potential(x, self.config.curve.drive_displacement)
+        dimension = ("displacement",)
+        root = xr.Dataset(
+            {name: variable(name, dimension, values) for name, values in curves.items()},
+            coords={"displacement": variable("displacement", dimension, x)},
+            attrs=program_attributes(self.config, "curve")
+            | {name: value for name, value in self.summary().items() if value is not None}
+            | {
+                "solver": f"collocation at {POINTS} points of {self.panels} panels",
+                "kernel_seconds": self.kernel_seconds,
+            },
+        )
+        root.attrs["stable"] = str(self.stable).lower()
+        points = np.array(self.critical_points).reshape(-1, len(CriticalPoint._fields))
+        names = ("displacement", "contact_force", "curvature", "third_derivative", "D0", "D2", "D3")
+        critical = xr.Dataset(
+            {
+                name: variable(name, ("point",), column)
+                for name, column in zip(names, points.T, strict=True)
+            }
+        )
+        children = {"critical": xr.DataTree(critical)}
+        if self.config.curve.density_at:
+            children["stretch_density"] = xr.DataTree(self._densities())
+        return xr.DataTree(root, children=children)
+
+    def _densities(self) -> xr.Dataset:
+        """Q(x; X) at the displacements that the configuration asks for."""
+        width = self.newborn_width / self._stretch
+        back = self.config.contacts.back_force_ratio
+        least, most = min(0.0, back - 6 * width), self.scales.longest + back
+        x = self._stretch * np.linspace(least, most, 2001)
+        at = np.array(self.config.curve.density_at)
+        densities, atoms = zip(*(self.stretch_density(x, one) for one in at), strict=True)
+        dimensions = ("density_displacement", "stretch")
+        return xr.Dataset(
+            {
+                "stretch_density": variable("stretch_density", dimensions, np.array(densities)),
+                "unbroken_part": variable("unbroken_part", dimensions[:1], np.array(atoms)),
+            },
+            coords={
+                "density_displacement": variable("density_displacement", dimensions[:1], at),
+                "stretch": variable("stretch", dimensions[1:], x),
+            },
+        )
+
+    def summary(self) -> dict[str, float | bool | None]:
+        """What is to be known of the curve, in SI units; None for what does not exist.
+
+        ``X_c`` and ``D0``, ``D2``, ``D3`` belong to the lowest solution of F'(X) = -K, which does
+        not exist if sliding is stable; ``D1`` needs a drive that moves and a slider with a mass.
+        """
+        critical = self.critical_points[0] if self.critical_points else None
+        contacts = self.config.contacts
+        force, force_place = self.peak
+        stiffness, stiffness_place = self.K_star
+        return {
+            "K_star": stiffness,
+            "K_star_displacement": stiffness_place,
+            "K_star_estimate": contacts.stiffness
+            * (1 - contacts.back_force_ratio)
+            / contacts.threshold.relative_width,
+            "stable": self.stable,
+            "X_c": critical.displacement if critical else None,
+            "F_c": critical.force if critical else None,
+            "F_peak": force,
+            "X_peak": force_place,
+            "F_steady": self.steady_force,
+            "D0": critical.D0 if critical else None,
+            "D1": loading_rate(self.config),
+            "D2": critical.D2 if critical else None,
+            "D3": critical.D3 if critical else None,
+            "error": self.error,
+            "slope_error": self.slope_error,
+            "digits": self.digits,
+            "conservation_error": self.conservation_error,
+        }

@@ -1,0 +1,265 @@
+"""The onset of slip: contacts that break one after another, or a film that melts at once.
+
+Eqs. S46 and S47 of Braun's "Stick-slip kinetics" in the dimensionless displacement
+x = K (X - X_c)/F_s and time τ = Ω_S (t - t_c), integrated by CVODE (``fortran/onset.f90``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import optimize
+
+from mesoslip import _core
+from mesoslip.configuration.tables import RigidSlider
+from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.output.store import program_attributes, variable
+from mesoslip.theory.force_curve import ForceCurve
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+Array = NDArray[np.float64]
+
+# Units and meanings of what the onset is summed up in.
+SUMMARY = {
+    "stable": ("1", "whether sliding is smooth, so that there is no onset of slip"),
+    "K_star": ("N/m", "spring constant above which it is"),
+    "X_c": ("m", "displacement at the onset"),
+    "D0": ("1", "F(X_c)/F_s"),
+    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
+    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
+    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
+    "alpha": (
+        "1",
+        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; the source says 2.21 of "
+        "Klein's case, for which this is 14.2",
+    ),
+    "slip_time_sequential": ("s", "slip time of sequential breaking"),
+    "B": ("1", "(D0 - eta D1/Omega_S)/2: the spring force drops by B tau^2 F_s as the film melts"),
+    "beta": ("1", "B^(-1/2), slip time of instant melting times Omega_S"),
+    "slip_time_melting": ("s", "slip time of instant melting"),
+    "expansion_end": ("1", "x at which S46 no longer describes the contacts"),
+    "expansion_end_time": ("1", "tau at which it comes there"),
+}
+
+EQUATIONS = {"sequential": 1, "melting": 2}
+# S46 describes the contacts as long as its force is off by less than this part of F_s.
+EXPANSION_ERROR = 0.02
+TOLERANCE = 1e-10
+MOST_SAMPLES = 50_000
+# Samples in the time scale of an equation.
+SAMPLES = 200
+
+
+@dataclass(frozen=True)
+class Onset:
+    """A solution of S46 or S47; arrays over the samples.
+
+    Attributes
+    ----------
+    time, displacement, velocity, mean_velocity
+        τ, x, x′ and its running mean.
+    force_drop
+        ΔF_d/F_s = D1 τ - x, negative: the change of the spring force.
+    ended
+        Whether the solution came to its end: S46 to where its expansion does, S47 to the least
+        spring force.
+    """
+
+    time: Array
+    displacement: Array
+    velocity: Array
+    mean_velocity: Array
+    force_drop: Array
+    ended: bool
+
+
+def solve(
+    equation: Literal["sequential", "melting"],
+    coefficients: tuple[float, float, float, float],
+    *,
+    damping: float = 0.0,
+    drag: float = 0.0,
+    end_displacement: float = math.inf,
+    interval: float | None = None,
+) -> Onset:
+    """Integrate S46 ("sequential") or S47 ("melting").
+
+    Parameters
+    ----------
+    equation
+        Which one.
+    coefficients
+        D0 to D3; S46 does not need the first, S47 the last two.
+    damping, drag
+        η_S/Ω_S, and η/Ω_S of the molten film per slider mass.
+    end_displacement
+        x at which S46 ends.
+    interval
+        Interval of the samples in τ; by default a small part of the equation's time scale.
+
+    Raises
+    ------
+    RunError
+        If the integration fails.
+    """
+    _, d_1, d_2, _ = coefficients
+    if interval is None:
+        scale = 1.0
+        if equation == "sequential":
+            scale = min(1.0, (d_1 * max(d_2, 1.0)) ** -0.2, 4 * end_displacement / d_1)
+        interval = scale / SAMPLES
+    samples = np.zeros((4, MOST_SAMPLES), order="F")
+    count, ended, status, message = _core.onset(
+        EQUATIONS[equation],
+        np.array(coefficients),
+        damping,
+        drag,
+        min(end_displacement, 1e300),
+        interval,
+        TOLERANCE,
+        samples,
+    )
+    if status != 0:
+        raise RunError(message.decode().strip())
+    time, displacement, velocity, mean = samples[:, :count]
+    return Onset(time, displacement, velocity, mean, d_1 * time - displacement, bool(ended))
+
+
+def end_of_expansion(curve: ForceCurve) -> float:
+    """Displacement from X_c [m] at which the expansion of F about X_c no longer describes it.
+
+    It is off by `EXPANSION_ERROR` of F_s there, unless the curve ends before.
+    """
+    critical = curve.critical_points[0]
+    spring = curve.config.spring_stiffness
+    start = critical.displacement
+    x = curve.samples[curve.samples > start] - start
+
+    def excess(distance: Array | float) -> Any:
+        expansion = (
+            critical.force
+            - spring * distance
+            + critical.curvature * distance**2 / 2
+            + critical.third_derivative * distance**3 / 6
+        )
+        error = np.abs(expansion - curve.force(start + distance))
+        return error - EXPANSION_ERROR * curve.config.contacts.static_force
+
+    beyond = np.flatnonzero(excess(x) > 0)
+    if beyond.size == 0:
+        return float(x[-1])
+    place = int(beyond[0])
+    low = float(x[place - 1]) if place > 0 else 0.0
+    return float(optimize.brentq(excess, low, float(x[place]), xtol=1e-15 * float(x[-1])))
+
+
+def onset_of_slip(config: Config) -> xr.DataTree:
+    """The onset of slip of a configuration, from the force curve of its master equation.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``sequential`` (S46) and ``melting`` (S47) with dimension ``time``; attributes: the
+        coefficients, the slip times of both and how they end. Without groups if sliding is stable.
+
+    Raises
+    ------
+    ConfigError
+        If the slider is not rigid, or the drive does not move.
+    RunError
+        If an integration fails.
+    """
+    slider = config.slider
+    if not isinstance(slider, RigidSlider):
+        raise ConfigError(
+            [Problem("", "slider.kind", "must be rigid for the onset of slip", slider.kind)]
+        )
+    curve = ForceCurve(config)
+    summary = curve.summary()
+    if summary["D1"] is None:
+        raise ConfigError([Problem("", "drive", "must move for the onset of slip")])
+    attributes = program_attributes(config, "onset") | {
+        name: value for name, value in summary.items() if value is not None
+    }
+    attributes["stable"] = str(curve.stable).lower()
+    if not curve.critical_points:
+        attributes["comment"] = "sliding is smooth, as F' is above -K everywhere: there is no onset"
+        return xr.DataTree(xr.Dataset(attrs=attributes))
+
+    omega = slider.omega_s
+    critical = curve.critical_points[0]
+    coefficients = (critical.D0, float(summary["D1"]), critical.D2, critical.D3)
+    damping = slider.damping_rate / omega
+    drag = config.contacts.count * config.contacts.contact_drag / slider.mass / omega
+    end = end_of_expansion(curve) * slider.stiffness / config.contacts.static_force
+    solutions = {
+        "sequential": solve("sequential", coefficients, damping=damping, end_displacement=end)
+    }
+    # A film that drags with more than D0 at the velocity of the drive does not let the force drop.
+    drops = coefficients[0] > drag * coefficients[1]
+    if drops:
+        solutions["melting"] = solve("melting", coefficients, damping=damping, drag=drag)
+    attributes |= slip_times(coefficients, drag, omega) | {
+        "omega_s": omega,
+        "expansion_end": end,
+        "expansion_end_time": float(solutions["sequential"].time[-1]),
+        "comment": "S46 ends where its expansion of the force is off by "
+        f"{EXPANSION_ERROR:g} of the static force"
+        + ("" if solutions["sequential"].ended else "; it did not come to that")
+        + (
+            "; S47 has no solution with a drop, as the film drags with more than D0"
+            if not drops
+            else "; S47 ends at the least spring force"
+            + ("" if solutions["melting"].ended else ", but did not come to that")
+        ),
+    }
+    groups = {
+        name: xr.DataTree(_dataset(one, asymptote(name, one.time, coefficients, drag)))
+        for name, one in solutions.items()
+    }
+    return xr.DataTree(xr.Dataset(attrs=attributes), children=groups)
+
+
+def slip_times(
+    coefficients: tuple[float, float, float, float], drag: float, omega: float
+) -> dict[str, float]:
+    """α, β and B of section 6 of the model with the slip times [s]; β only if it exists."""
+    d_0, d_1, _, _ = coefficients
+    alpha = (6 / d_1) ** (1 / 3)
+    b = 0.5 * (d_0 - drag * d_1)
+    times = {"alpha": alpha, "slip_time_sequential": alpha / omega, "B": b}
+    if b > 0:
+        times |= {"beta": b**-0.5, "slip_time_melting": b**-0.5 / omega}
+    return times
+
+
+def asymptote(
+    equation: str, time: Array, coefficients: tuple[float, float, float, float], drag: float
+) -> Array:
+    """ΔF_d/F_s at short times: -D1 τ³/6 for S46, -B τ² for S47."""
+    d_0, d_1, _, _ = coefficients
+    if equation == "sequential":
+        return -d_1 * time**3 / 6
+    return -0.5 * (d_0 - drag * d_1) * time**2
+
+
+def _dataset(solution: Onset, short_times: Array) -> xr.Dataset:
+    columns = {
+        "onset_displacement": solution.displacement,
+        "onset_velocity": solution.velocity,
+        "onset_mean_velocity": solution.mean_velocity,
+        "relative_force_drop": solution.force_drop,
+        "asymptote": short_times,
+    }
+    return xr.Dataset(
+        {name: variable(name, ("onset_time",), values) for name, values in columns.items()},
+        coords={"onset_time": variable("onset_time", ("onset_time",), solution.time)},
+        attrs={"ended": str(solution.ended).lower()},
+    )

@@ -9,8 +9,11 @@ from conftest import ROOT, klein_tables
 from hypothesis import given
 from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError
+from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
+from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.units import to_si
 from mesoslip.theory.derived import derived_quantities
+from pydantic import ValidationError
 
 LAYERED = {"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 4}
 
@@ -399,3 +402,131 @@ def test_derived_quantities_of_klein(klein):
     prescribed = derived_quantities(klein(slider={"kind": "prescribed"}))
     assert "omega_s" not in prescribed
     assert "alpha" not in derived_quantities(klein(drive__velocity=0.0))
+
+
+QUASISTATIC = {"kind": "quasistatic", "stiffness": 97.0}
+SCALE = math.sqrt(97 / 1.47e-3) * 18e-6 / 97
+
+
+def test_what_the_kernel_is_told_of_sliders(klein):
+    rigid = klein()
+    assert rigid.slider.kernel_kind == "rigid"
+    assert rigid.slider.kernel_parameters(rigid) == {
+        "mass": 1.47e-3,
+        "stiffness": 97.0,
+        "damping": pytest.approx(0.2 * math.sqrt(97 / 1.47e-3)),
+    }
+    layered = klein(slider=LAYERED | {"layer_damping": 3.0, "solver": {"method": "bdf"}})
+    assert layered.slider.kernel_parameters(layered) == {
+        "layers": 4,
+        "mass": 1e-3,
+        "stiffness": 97.0,
+        "damping": 3.0,
+        "base_mass": 0.0,
+        "base_stiffness": 0.0,
+        "base_damping": 0.0,
+        "solver": 2,
+        "relative_tolerance": 1e-8,
+        "absolute_tolerance": pytest.approx(1e-14 * 18e-6 / 97),
+    }
+    on_base = klein(slider=LAYERED | {"base": {"mass": 1.0, "stiffness": 2.0, "damping": 3.0}})
+    told = on_base.slider.kernel_parameters(on_base)
+    assert [told[f"base_{name}"] for name in ("mass", "stiffness", "damping")] == [1, 2, 3]
+    block = klein(slider={"kind": "prescribed"})
+    assert (block.slider.kernel_kind, block.slider.kernel_parameters(block)) == ("prescribed", {})
+    quasistatic = klein(slider=QUASISTATIC)
+    assert quasistatic.slider.kernel_parameters(quasistatic) == {"stiffness": 97.0}
+    by_force = klein(slider={"kind": "quasistatic"}, drive={"force_rate": 1e-6})
+    assert by_force.slider.kernel_parameters(by_force) == {"stiffness": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("slider", "slip_velocity", "spring", "traces", "solver"),
+    [
+        ({"mass": 1.47e-3, "stiffness": 97.0}, 0.02 * SCALE, 97.0, (), None),
+        (
+            LAYERED | {"mass": 1.47e-3, "base": {"mass": 1.0, "stiffness": 2.0}},
+            0.02 * SCALE,
+            97.0,
+            ("elastic_force", "base_displacement"),
+            "series",
+        ),
+        (LAYERED | {"mass": 1.47e-3}, 0.02 * SCALE, 97.0, ("elastic_force",), "series"),
+        ({"kind": "prescribed"}, 0.0, math.inf, (), None),
+        (QUASISTATIC, 0.0, 97.0, (), None),
+    ],
+)
+def test_what_sliders_answer(klein, slider, slip_velocity, spring, traces, solver):
+    config = klein(slider=slider)
+    assert config.slider.slip_velocity(config) == pytest.approx(slip_velocity)
+    assert config.slider.spring_stiffness == spring
+    assert config.slider.extra_traces == traces
+    assert config.slider.solver_name(config) == solver
+    period = 2 * math.pi / math.sqrt(97 / 1.47e-3)
+    assert config.slider.quiet_time == pytest.approx(period / 2 if slip_velocity else 1.0)
+    assert config.slider.jumps == config.slider.ignores_delay == config.has_avalanches
+    wanted = klein(slider=slider, output__slip_velocity=1e-8)
+    assert wanted.slider.slip_velocity(wanted) == (1e-8 if slip_velocity else 0.0)
+
+
+def test_what_the_kernel_is_told_of_contacts(klein):
+    common = {
+        "count": 4080,
+        "static_force": pytest.approx(18e-6 / 4080),
+        "stiffness": pytest.approx(2000 / 4080),
+        # rho (A/N) h eta
+        "drag": pytest.approx(956 * 1e-10 / 4080 * 3.5e-9 * 2e11),
+        "delay": 5e-4,
+        "back_force_ratio": 0.1,
+        "coupling": 1,
+        "reattach": 1,
+        "law": 1,
+        "relative_width": 0.01,
+    }
+    config = klein()
+    kind = config.contact_kind
+    assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("ensemble", True, False)
+    assert kind.kernel_parameters(config) == common | {"columns": 0, "rows": 0}
+
+    config = klein(interaction=LATTICE | {"strength": 0.0})
+    kind = config.contact_kind
+    assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("ensemble", True, True)
+    assert kind.kernel_parameters(config) == common | {"columns": 60, "rows": 68}
+
+    config = klein(interaction=LATTICE | {"lattice": "square"})
+    kind = config.contact_kind
+    assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("lattice", True, True)
+    bond = 3 * 0.3 * 18e-6 / 4080 / math.sqrt(1e-10 / 4080)
+    places = {"bond": pytest.approx(bond), "lattice": 2, "columns": 60, "rows": 68}
+    assert kind.kernel_parameters(config) == common | places
+
+    config = klein(run__engine="me")
+    kind = config.contact_kind
+    assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("populations", False, False)
+    assert kind.kernel_parameters(config) == common | {"resolution": 0.25}
+    assert kind.most_realizations == 1
+
+    config = klein(slider=QUASISTATIC)
+    told = config.contact_kind.kernel_parameters(config)
+    assert (told["drag"], told["delay"]) == (0.0, 0.0)
+
+
+def test_a_kind_of_slider_is_named_once():
+    """The message of a kind that does not exist names those that do, and so do the others."""
+    (message,) = problems(klein_tables(slider__kind="bouncy"))
+    for kind in SLIDERS:
+        assert f"'{kind}'" in message
+    for table in SLIDER_KINDS:
+        kind = table.model_fields["kind"].default
+        assert SLIDERS[kind] is table
+        keys = {"kind": kind} | dict.fromkeys(("mass", "stiffness", "layers"), 1)
+        keys = {key: value for key, value in keys.items() if key in table.model_fields}
+        assert type(Config.from_dict(klein_tables(slider=keys)).slider) is table
+
+
+def test_a_configuration_is_checked_however_it_is_made():
+    tables = klein_tables(output__interval="20 s")
+    with pytest.raises(ValidationError, match=r"output\.interval: must not exceed the duration"):
+        Config(**tables)
+    with pytest.raises(ValidationError):
+        Config.model_validate(tables)

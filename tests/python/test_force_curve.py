@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip import ForceCurve, _core
-from mesoslip.configuration.threshold_law import LAWS
-from mesoslip.theory.lives import COUPLINGS, INITIAL_STATES
+from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
 from oracles import frozen_law, stationary_force
 from scipy import integrate
 
@@ -184,7 +183,7 @@ def test_the_order_of_convergence(klein):
     """The error falls with the power of the number of points, until rounding."""
     contacts = klein(**EQUAL, **dispersion(0.2)).contacts
     law = (
-        LAWS[contacts.threshold.law],
+        contacts.threshold.code,
         0.2,
         COUPLINGS["equal"],
         0.0,

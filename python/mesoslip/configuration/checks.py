@@ -1,130 +1,168 @@
-"""What may be wrong between the tables of a configuration, and what is too much for the machine."""
+"""What may be wrong between the tables of a configuration whatever the kinds of its slider and
+contacts, and what is too much for the machine.
+"""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from mesoslip.configuration.tables import LayeredSlider, QuasistaticSlider
+from mesoslip.configuration.sliders import SLIDERS, base
+from mesoslip.configuration.table import Complaint, Complaints
+from mesoslip.configuration.tables import Curve, Run
 
-if TYPE_CHECKING:
-    from mesoslip.configuration.config import Config
-
-# What a run needs for each contact, and for each sample of the trace [bytes].
-BYTES_PER_CONTACT = 150
+# What a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
+# snapshot [bytes].
 BYTES_PER_SAMPLE = 3 * 7 * 8
-
-# The same for a contact on a lattice, and for an avalanche in the catalogue.
-BYTES_PER_CONTACT_ON_LATTICE = 260
+BYTES_PER_LAYER = 2 * 8
 BYTES_PER_AVALANCHE = 3 * 10 * 8
 BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
 
-# Stiffness of all bonds of a contact over its own, beyond which the force that breaks it, the
-# difference of what it and what its neighbours pull, has fewer than ten digits.
-STRONGEST_BONDS = 1e6
 
-# Step of the master equation over the mean breaking stretch that can be followed.
-FINEST = 2e-5
+class Setting(base.Setting, Protocol):
+    """What is checked: a whole configuration."""
+
+    @property
+    def run(self) -> Run: ...
+    @property
+    def slider(self) -> base.SliderTable: ...
+    @property
+    def curve(self) -> Curve: ...
+    @property
+    def duration(self) -> float: ...
+    @property
+    def output_interval(self) -> float: ...
+    @property
+    def has_avalanches(self) -> bool: ...
 
 
-def cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
-    """What is wrong between tables: key, message, value."""
-    problems = [*_drive_checks(config)]
-    if problems:
-        yield from problems
-        return
+def drive_problems(config: Setting) -> Complaints:
+    """What is wrong with the drive and the length of the run."""
+    run, drive = config.run, config.drive
+    if drive.force_rate is not None and not config.slider.driven_by_force:
+        named = _named(kind for kind, table in SLIDERS.items() if table.driven_by_force)
+        yield Complaint("drive.force_rate", f"is for {named} only", drive.force_rate)
+    if run.drive_displacement is not None:
+        if not drive.velocity:
+            yield Complaint(
+                "run.drive_displacement",
+                "needs a drive.velocity that is not 0",
+                run.drive_displacement,
+            )
+        elif run.duration is not None:
+            yield Complaint(
+                "run.drive_displacement",
+                "give either this or run.duration",
+                run.drive_displacement,
+            )
+        elif math.isinf(config.duration):
+            yield Complaint(
+                "run.drive_displacement",
+                f"takes for ever at {drive.velocity:g} m/s",
+                run.drive_displacement,
+            )
+    if run.avalanches is not None:
+        if not config.has_avalanches:
+            yield Complaint(
+                "run.avalanches",
+                f"needs [interaction] or {_named_jumping()}: otherwise contacts break one by one",
+                run.avalanches,
+            )
+        elif drive.velocity == 0:
+            yield Complaint(
+                "drive.velocity", "must not be 0 for a run that avalanches end", drive.velocity
+            )
+    if run.avalanches is None and config.duration == math.inf and run.drive_displacement is None:
+        if drive.force_rate is not None and not config.contacts.reattach:
+            return
+        yield Complaint("run.duration", "needed, as the drive has no stages")
+    elif config.duration <= 0:
+        yield Complaint("run.duration", "needed, as the drive has no stages")
+
+
+def output_problems(config: Setting) -> Complaints:
+    """What is wrong with what is recorded, of a run whose drive is right."""
     if not (config.expected_duration > 0 and math.isfinite(config.expected_duration)):
-        yield "drive", "so slow or so fast that the run has no finite duration", None
+        yield Complaint("drive", "so slow or so fast that the run has no finite duration")
         return
-    yield from _interaction_checks(config)
-    interval = config.output_interval
+    output, interval = config.output, config.output_interval
     if interval > config.duration:
-        yield "output.interval", f"must not exceed the duration, {config.duration:g} s", interval
-    finer = config.output.slip_interval
-    if finer is not None and finer > interval:
-        yield "output.slip_interval", f"must not exceed the interval, {interval:g} s", finer
-
-    if config.run.engine == "me" and config.run.realizations > 1:
-        yield (
-            "run.realizations",
-            'must be 1 with engine "me", which leaves nothing to chance',
-            config.run.realizations,
+        yield Complaint(
+            "output.interval", f"must not exceed the duration, {config.duration:g} s", interval
         )
-    stretch = config.contacts.static_force / config.contacts.stiffness
-    if config.curve.newborn_width > 0.25 * stretch:
-        yield (
+    finer = output.slip_interval
+    if finer is not None and finer > interval:
+        yield Complaint(
+            "output.slip_interval", f"must not exceed the interval, {interval:g} s", finer
+        )
+    if output.layers and not config.slider.layers_recorded(config):
+        named = _named(kind for kind, table in SLIDERS.items() if "layers" in table.model_fields)
+        yield Complaint("output.layers", f"is for {named} only", True)
+    if not config.contact_kind.on_lattice:
+        for key in ("snapshots", "snapshot_size"):
+            if getattr(output, key):
+                yield Complaint(f"output.{key}", "needs [interaction], for the places of contacts")
+    times = list(output.snapshots)
+    if times != sorted(set(times)) or (times and times[-1] > config.duration):
+        yield Complaint("output.snapshots", "must grow, up to the duration of the run", times)
+    if output.avalanche_size is not None and not config.has_avalanches:
+        yield Complaint(
+            "output.avalanche_size",
+            f"needs [interaction] or {_named_jumping()}",
+            output.avalanche_size,
+        )
+
+
+def curve_problems(config: Setting) -> Complaints:
+    """What is wrong with the force curve."""
+    width, stretch = config.curve.newborn_width, config.contacts.break_stretch
+    if width > 0.25 * stretch:
+        yield Complaint(
             "curve.newborn_width",
             "must be a narrow spread, at most a quarter of the mean breaking stretch, "
             f"{0.25 * stretch:.3g} m",
-            config.curve.newborn_width,
+            width,
         )
-
-    if config.curve.newborn_width > 0 and config.contacts.initial == "steady":
-        yield (
+    if width > 0 and config.contacts.initial == "steady":
+        yield Complaint(
             "curve.newborn_width",
             'must be 0 with contacts.initial = "steady", the state of contacts without a spread',
-            config.curve.newborn_width,
+            width,
         )
-    if isinstance(config.slider, LayeredSlider):
-        method = config.slider.solver.method
-        if config.run.engine == "me" and method not in {"auto", "series"}:
-            yield (
-                "slider.solver.method",
-                'must be "series" with engine "me", whose contacts change their law at every step',
-                method,
-            )
-    if config.run.engine == "me":
-        fineness = config.run.resolution * config.contacts.threshold.relative_width
-        if fineness < FINEST:
-            yield (
-                "run.resolution",
-                f"times the relative width of the thresholds must be at least {FINEST:g}, or there "
-                "are more populations than can be followed",
-                config.run.resolution,
-            )
-    if config.output.layers and not isinstance(config.slider, LayeredSlider):
-        yield "output.layers", 'is for slider.kind = "layered" only', True
 
+
+def memory_problems(config: Setting) -> Complaints:
+    """What does not fit into the machine's memory."""
+    run, output, contacts = config.run, config.output, config.contacts
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    together = min(config.run.realizations, os.cpu_count() or 1)
+    together = min(run.realizations, os.cpu_count() or 1)
+    in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
+    per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
     for key, needed, value in (
         (
             "contacts.count",
-            (BYTES_PER_CONTACT if config.interaction is None else BYTES_PER_CONTACT_ON_LATTICE)
-            * config.contacts.count
-            * together
-            * (config.run.engine == "eq"),
-            config.contacts.count,
+            config.contact_kind.bytes_per_contact * contacts.count * together,
+            contacts.count,
         ),
-        (
-            "run.avalanches",
-            BYTES_PER_AVALANCHE
-            * (config.run.avalanches or 0)
-            * config.run.realizations
-            * (config.output.avalanche_size is None),
-            config.run.avalanches,
-        ),
+        ("run.avalanches", BYTES_PER_AVALANCHE * in_catalogue * run.realizations, run.avalanches),
         (
             "output.snapshots",
             BYTES_PER_CONTACT_IN_SNAPSHOT
-            * config.contacts.count
-            * len(config.output.snapshots)
-            * config.run.realizations,
-            f"{len(config.output.snapshots)} times",
+            * contacts.count
+            * len(output.snapshots)
+            * run.realizations,
+            f"{len(output.snapshots)} times",
         ),
         (
             "output.interval",
-            (BYTES_PER_SAMPLE + 16 * getattr(config.slider, "layers", 0) * config.output.layers)
-            * config.expected_duration
-            / interval
-            * config.run.realizations,
-            interval,
+            per_sample * config.expected_duration / config.output_interval * run.realizations,
+            config.output_interval,
         ),
     ):
         if needed > memory:
-            yield (
+            yield Complaint(
                 key,
                 f"the run needs {needed / 2**30:.3g} GiB for this, and the machine has "
                 f"{memory / 2**30:.3g} GiB",
@@ -132,111 +170,10 @@ def cross_checks(config: Config) -> Iterable[tuple[str, str, object]]:
             )
 
 
-def _drive_checks(config: Config) -> Iterable[tuple[str, str, object]]:
-    """What is wrong with the drive and the length of the run: key, message, value."""
-    run, drive = config.run, config.drive
-    if isinstance(config.slider, QuasistaticSlider):
-        spring = config.slider.stiffness
-        if drive.force_rate is None and spring is None:
-            yield "slider.stiffness", "missing; only a drive by force needs no spring", None
-        elif drive.force_rate is not None and spring is not None:
-            yield (
-                "slider.stiffness",
-                "has no meaning with drive.force_rate, which acts on the slider without a spring",
-                spring,
-            )
-    elif drive.force_rate is not None:
-        yield "drive.force_rate", 'is for slider.kind = "quasistatic" only', drive.force_rate
-    if run.drive_displacement is not None:
-        if not drive.velocity:
-            yield (
-                "run.drive_displacement",
-                "needs a drive.velocity that is not 0",
-                run.drive_displacement,
-            )
-        elif run.duration is not None:
-            yield (
-                "run.drive_displacement",
-                "give either this or run.duration",
-                run.drive_displacement,
-            )
-        elif math.isinf(config.duration):
-            yield (
-                "run.drive_displacement",
-                f"takes for ever at {drive.velocity:g} m/s",
-                run.drive_displacement,
-            )
-    if run.avalanches is not None:
-        if not config.has_avalanches:
-            yield (
-                "run.avalanches",
-                'needs [interaction] or slider.kind = "quasistatic": otherwise contacts break one '
-                "by one",
-                run.avalanches,
-            )
-        elif drive.velocity == 0:
-            yield "drive.velocity", "must not be 0 for a run that avalanches end", drive.velocity
-    if run.avalanches is None and config.duration == math.inf and run.drive_displacement is None:
-        if drive.force_rate is not None and not config.contacts.reattach:
-            return
-        yield "run.duration", "needed, as the drive has no stages", None
-    elif config.duration <= 0:
-        yield "run.duration", "needed, as the drive has no stages", None
+def _named_jumping() -> str:
+    return _named(kind for kind, table in SLIDERS.items() if table.jumps)
 
 
-def _interaction_checks(config: Config) -> Iterable[tuple[str, str, object]]:
-    """What is wrong with interaction, avalanches and snapshots: key, message, value."""
-    contacts, interaction, output = config.contacts, config.interaction, config.output
-    if isinstance(config.slider, QuasistaticSlider) and config.run.engine == "me":
-        yield (
-            "slider.kind",
-            'needs engine "eq"; the force of infinitely many contacts over the displacement of a '
-            "slider without inertia is that of mesoslip curve",
-            config.slider.kind,
-        )
-    if interaction is None:
-        for key in ("snapshots", "snapshot_size"):
-            if getattr(output, key):
-                yield f"output.{key}", "needs [interaction], for the places of contacts", None
-        if output.avalanche_size is not None and not config.has_avalanches:
-            yield (
-                "output.avalanche_size",
-                'needs [interaction] or slider.kind = "quasistatic"',
-                output.avalanche_size,
-            )
-        return
-
-    if config.run.engine == "me":
-        yield (
-            "interaction",
-            'needs engine "eq": the master equation has no neighbours; in the mean, interaction '
-            "acts like a narrower law of thresholds (contacts.threshold.relative_width)",
-            None,
-        )
-    places = interaction.columns * interaction.rows
-    if places != contacts.count:
-        yield (
-            "interaction.columns",
-            f"times rows must be contacts.count: {interaction.columns} x {interaction.rows} = "
-            f"{places}, not {contacts.count}",
-            interaction.columns,
-        )
-    if contacts.area is None:
-        yield "contacts.area", "needed for the distance between neighbours, a = (A/N)^(1/2)", None
-    relative = interaction.neighbours * config.bond_stiffness / contacts.contact_stiffness
-    if relative > STRONGEST_BONDS:
-        strongest = interaction.strength * (STRONGEST_BONDS / relative)
-        yield (
-            "interaction.strength",
-            "so strong that a contact cannot attach: the force at which it does, (k + G z) x less "
-            f"the pull of its neighbours, is a difference of terms {relative:.1g} times as large, "
-            f"without digits enough; at most {strongest:.3g}",
-            interaction.strength,
-        )
-    times = output.snapshots
-    if list(times) != sorted(set(times)) or (times and times[-1] > config.duration):
-        yield (
-            "output.snapshots",
-            "must grow, up to the duration of the run",
-            list(times),
-        )
+def _named(kinds: Iterable[str]) -> str:
+    """Kinds of sliders, as a message names them."""
+    return "slider.kind = " + " or ".join(f'"{kind}"' for kind in kinds)

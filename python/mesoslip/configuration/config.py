@@ -8,33 +8,22 @@ from __future__ import annotations
 import difflib
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self, get_args
 
-from pydantic import StrictStr, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import StrictStr, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
 
-from mesoslip.configuration.checks import cross_checks
+from mesoslip.configuration import checks
+from mesoslip.configuration.contacts import contact_kind
+from mesoslip.configuration.contacts.base import ContactKind
+from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
 from mesoslip.configuration.files import override, parse_toml, read_toml
-from mesoslip.configuration.tables import (
-    SLIDERS,
-    Base,
-    Cantilever,
-    Contacts,
-    Curve,
-    Drive,
-    Interaction,
-    Output,
-    QuasistaticSlider,
-    RigidSlider,
-    Run,
-    Slider,
-    Solver,
-    Stage,
-    Table,
-    Threshold,
-)
+from mesoslip.configuration.sliders import SLIDERS, Slider
+from mesoslip.configuration.table import Complaint, Table
+from mesoslip.configuration.tables import Curve, Drive, Output, Run
 from mesoslip.errors import ConfigError, Problem
 
 # Tables and keys that the format knows and this version does not.
@@ -61,10 +50,45 @@ class Config(Table):
     output: Output = Output()
     curve: Curve = Curve()
 
+    @model_validator(mode="after")
+    def _tables_agree(self) -> Self:
+        """Whether all tables together can be run, after each of them was found right."""
+        complaints = self._complaints()
+        if complaints:
+            raise PydanticCustomError(
+                "tables",
+                "{message}",
+                {
+                    "message": "; ".join(f"{one.key}: {one.message}" for one in complaints),
+                    "complaints": complaints,
+                },
+            )
+        return self
+
+    def _complaints(self) -> list[Complaint]:
+        complaints = [
+            *checks.drive_problems(self),
+            *self.slider.problems(self),
+            *self.contact_kind.problems(self),
+            *checks.curve_problems(self),
+        ]
+        # Without a drive there is no length of the run, to which what is recorded is compared.
+        return complaints or [*checks.output_problems(self)] or [*checks.memory_problems(self)]
+
+    @cached_property
+    def contact_kind(self) -> ContactKind:
+        """The kind of contacts."""
+        return contact_kind(self.run, self.interaction)
+
+    @property
+    def initial_code(self) -> int:
+        """The kernel's code of the initial state of the contacts."""
+        return INITIAL_STATES[self.contacts.initial]
+
     @property
     def curve_length(self) -> float:
         """Length of the force curve [m]; twenty mean breaking stretches unless given."""
-        return self.curve.length or 20 * self.contacts.static_force / self.contacts.stiffness
+        return self.curve.length or 20 * self.contacts.break_stretch
 
     @property
     def duration(self) -> float:
@@ -86,7 +110,7 @@ class Config(Table):
         if self.drive.force_rate is not None:
             return contacts.static_force / abs(self.drive.force_rate)
         stiffness = self.spring_stiffness
-        stretch = contacts.static_force / contacts.stiffness
+        stretch = contacts.break_stretch
         loading = stretch + contacts.static_force / stiffness
         # A break is followed by Nk/K others in the mean, or the slider would not keep up.
         sliding = (self.run.avalanches or 0) * stretch / contacts.count
@@ -96,21 +120,24 @@ class Config(Table):
     @property
     def bond_stiffness(self) -> float:
         """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without interaction."""
-        contacts = self.contacts
-        if self.interaction is None or contacts.area is None:
-            return 0.0
-        spacing = math.sqrt(contacts.area / contacts.count)
-        return 3 * self.interaction.strength * contacts.contact_static_force / spacing
+        return 0.0 if self.interaction is None else self.interaction.bond_stiffness(self.contacts)
 
     @property
     def spring_stiffness(self) -> float:
         """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
-        return getattr(self.slider, "stiffness", math.inf) or 0.0
+        return self.slider.spring_stiffness
 
     @property
     def has_avalanches(self) -> bool:
         """Whether avalanches are recorded: breaks may bring about others at once."""
-        return self.interaction is not None or isinstance(self.slider, QuasistaticSlider)
+        return self.interaction is not None or self.slider.jumps
+
+    @property
+    def drive_speed(self) -> float:
+        """Speed of the first stage of the drive that moves [m/s]; 0 if none does."""
+        if self.drive.force_rate is not None:
+            return 0.0
+        return next((abs(one.velocity) for one in self.drive_stages if one.velocity), 0.0)
 
     @property
     def drive_stages(self) -> tuple[DriveStage, ...]:
@@ -166,13 +193,9 @@ class Config(Table):
             If anything in it is wrong.
         """
         try:
-            config = cls.model_validate(tables)
+            return cls.model_validate(tables)
         except ValidationError as error:
             raise ConfigError(_problems(error, source)) from None
-        problems = [Problem(source, *problem) for problem in cross_checks(config)]
-        if problems:
-            raise ConfigError(problems)
-        return config
 
     @classmethod
     def from_toml(
@@ -194,11 +217,19 @@ class Config(Table):
 
 def _problems(error: ValidationError, source: str) -> list[Problem]:
     """Everything that pydantic found, in our words."""
-    return [_problem_of(details, source) for details in error.errors()]
+    problems = []
+    for details in error.errors():
+        if details["type"] == "tables":
+            problems += [Problem(source, *one) for one in details["ctx"]["complaints"]]
+        else:
+            problems.append(_problem_of(details, source))
+    return problems
 
 
 def _problem_of(details: ErrorDetails, source: str) -> Problem:
-    place = [part for part in details["loc"] if part not in SLIDERS]
+    place = list(details["loc"])
+    if place[0] == "slider" and len(place) > 1 and place[1] in SLIDERS:
+        del place[1]
     context = details.get("ctx", {})
     kind, value, message = details["type"], details["input"], details["msg"]
     table, name = _dotted(place[:-1]), str(place[-1]) if place else ""
@@ -241,23 +272,17 @@ def _dotted(place: Iterable[Any]) -> str:
 
 def _known_keys(place: list[Any], details: ErrorDetails) -> list[str]:
     """Keys of the table at a place of the file."""
-    model: Any = Config
-    tables: dict[str, Any] = {
-        "run": Run,
-        "drive": Drive,
-        "slider": next(
-            (kind for name, kind in SLIDERS.items() if name in details["loc"]), RigidSlider
-        ),
-        "base": Base,
-        "solver": Solver,
-        "cantilever": Cantilever,
-        "contacts": Contacts,
-        "interaction": Interaction,
-        "output": Output,
-        "curve": Curve,
-        "threshold": Threshold,
-        "stage": Stage,
-    }
-    for part in place:
-        model = tables.get(part, model)
+    model: type[Table] = Config
+    for name in place:
+        if isinstance(name, str):
+            inner = list(_tables_in(model.model_fields[name].annotation))
+            model = SLIDERS[str(details["loc"][1])] if name == "slider" else inner[0]
     return [*model.model_fields, *(["base"] if model is Config else [])]
+
+
+def _tables_in(annotation: Any) -> Iterator[type[Table]]:
+    """The tables that an annotation names."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _tables_in(part)

@@ -1,7 +1,11 @@
-"""Laws of the relative breaking thresholds, as the kernels use them."""
+"""Laws of the relative breaking thresholds, as the kernels use them.
+
+Adding a law is adding a line to `LAWS`, and its formulas to the kernels.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +14,29 @@ from numpy.typing import ArrayLike, NDArray
 from mesoslip import _core
 from mesoslip.errors import MesoslipError
 
-LAWS = {"gaussian": 1, "uniform": 2, "lognormal": 3, "weibull": 4, "exponential": 5}
+# The widest law whose quantiles the kernels can still compute.
+WIDEST = 20.0
+
+
+@dataclass(frozen=True)
+class Law:
+    """What there is to know of a law: its code in the kernels, its widest relative width, and
+    what is wrong with a wider one."""
+
+    code: int
+    widest: float = WIDEST
+    if_wider: str = ""
+
+
+_NOT_NEGATIVE = ", whose least threshold would be negative"
+
+LAWS = {
+    "gaussian": Law(1),
+    "uniform": Law(2, 1 / math.sqrt(3), _NOT_NEGATIVE),
+    "lognormal": Law(3),
+    "weibull": Law(4),
+    "exponential": Law(5, 1.0, _NOT_NEGATIVE),
+}
 
 
 @dataclass(frozen=True)
@@ -24,6 +50,11 @@ class ThresholdLaw:
     law: str
     relative_width: float
     minimum: float = 0.0
+
+    @property
+    def acceptance(self) -> float:
+        """Probability that a draw is not rejected."""
+        return self._kernel(3, np.empty(0))[1]
 
     def quantile(self, probability: ArrayLike) -> NDArray[np.float64]:
         """Threshold that is exceeded with a given probability, 0 < probability < 1."""
@@ -39,9 +70,15 @@ class ThresholdLaw:
 
     def _evaluate(self, what: int, argument: ArrayLike) -> NDArray[np.float64]:
         values = np.asarray(argument, dtype=np.float64)
-        result, _, status, message = _core.evaluate_threshold_law(
-            LAWS[self.law], self.relative_width, self.minimum, what, values.ravel()
+        return self._kernel(what, values.ravel())[0].reshape(values.shape)
+
+    def _kernel(
+        self, what: int, argument: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], float]:
+        """Values of a function of the law, and the acceptance."""
+        values, acceptance, status, message = _core.evaluate_threshold_law(
+            LAWS[self.law].code, self.relative_width, self.minimum, what, argument
         )
         if status != 0:
             raise MesoslipError(message.decode().strip())
-        return result.reshape(values.shape)
+        return values, acceptance

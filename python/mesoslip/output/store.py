@@ -15,7 +15,7 @@ import xarray as xr
 
 from mesoslip import _build, _core
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.tables import Interaction, LayeredSlider, QuasistaticSlider
+from mesoslip.configuration.contacts.tables import Interaction
 from mesoslip.errors import FileError
 from mesoslip.simulation import engine
 
@@ -161,17 +161,17 @@ def build(
     if config.output.layers:
         root = root.merge(layer_displacements(realizations))
     # Where realizations end at different times, the shorter ones are filled with NaN.
-    if config.run.engine == "eq" and np.isfinite(root["detached_contacts"]).all():
+    if config.contact_kind.is_discrete and np.isfinite(root["detached_contacts"]).all():
         root["detached_contacts"] = root["detached_contacts"].astype(np.int32)
 
     groups = {"slips": slip_catalogue(realizations), "energy": energy_balance(realizations)}
-    if config.output.slip_interval is not None and engine.slip_velocity(config) > 0:
+    if config.output.slip_interval is not None and config.slider.slip_velocity(config) > 0:
         groups["slip_traces"] = slip_traces(config, realizations)
     if config.has_avalanches:
         groups["avalanches"] = avalanche_catalogue(config, realizations)
     if config.output.snapshots or config.output.snapshot_size:
         groups["snapshots"] = snapshots(config, realizations)
-    if config.run.engine == "eq":
+    if config.contact_kind.is_discrete:
         for group, name in (("slips", "contacts_broken"), ("slip_traces", "detached_contacts")):
             if group in groups:
                 groups[group][name] = groups[group][name].astype(np.int64)
@@ -180,12 +180,7 @@ def build(
 
 def recorded(config: Config) -> tuple[str, ...]:
     """Names of the traces that an output of a configuration has, without the time."""
-    names: tuple[str, ...] = engine.TRACE_COLUMNS[1:7]
-    if isinstance(config.slider, LayeredSlider):
-        names += ("elastic_force",)
-        if config.slider.base is not None:
-            names += ("base_displacement",)
-    return names
+    return engine.TRACE_COLUMNS[1:7] + config.slider.extra_traces
 
 
 def layer_displacements(realizations: Sequence[Realization]) -> xr.Dataset:
@@ -235,7 +230,7 @@ def avalanche_catalogue(config: Config, realizations: Sequence[Realization]) -> 
     rows = np.concatenate([one.avalanches for one in realizations])
     owner = np.concatenate([np.full(len(one.avalanches), one.number) for one in realizations])
     names = ["time", "displacement", "size", "force_before", "force_drop"]
-    if isinstance(config.slider, QuasistaticSlider):
+    if config.slider.jumps:
         names.append("slip")
     if config.interaction is not None:
         names += ["area", "width", "height", "generations"]
@@ -334,10 +329,11 @@ def attributes(
     reached = min(one.time for one in realizations)
     residual: float = max((one.energy_residual for one in realizations), key=abs)
     solver = {}
-    if isinstance(config.slider, LayeredSlider):
+    solver_name = config.slider.solver_name(config)
+    if solver_name is not None:
         counts = np.sum([one.integrator_counts for one in realizations], axis=0)
         solver = {
-            "solver": config.slider.solver_method(config),
+            "solver": solver_name,
             "solver_steps": int(counts[0]),
             "solver_evaluations": int(counts[1]),
             "solver_failed_steps": int(counts[2]),

@@ -257,7 +257,7 @@ def draw(tree: xr.DataTree, view: str | None = None, snapshot: int | None = None
         if "avalanches" not in tree.children:
             raise FileError(NO_AVALANCHES)
         return avalanche_plots.distribution(tree)
-    if Config.from_toml(tree.attrs["configuration"]).slider.kind == "quasistatic":
+    if Config.from_toml(tree.attrs["configuration"]).slider.jumps:
         return avalanche_plots.overview(tree)
     return overview(tree)
 

@@ -18,10 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
-from mesoslip.configuration.tables import LayeredSlider, QuasistaticSlider, RigidSlider
-from mesoslip.configuration.threshold_law import LAWS
 from mesoslip.errors import RunError
-from mesoslip.theory.lives import COUPLINGS, INITIAL_STATES
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -75,20 +72,25 @@ ENERGY_COLUMNS = (
 ENGINES = {"eq": 1, "me": 2}
 SLIDERS = {"rigid": 1, "prescribed": 2, "layered": 3, "quasistatic": 4}
 FORCE_DRIVEN = 5
-LATTICES = {"triangular": 1, "square": 2}
+# What the kernel's interface takes of a slider, and a kind may not have.
+NO_SLIDER = {
+    "mass": 1.0,
+    "stiffness": 1.0,
+    "damping": 0.0,
+    "layers": 1,
+    "base_mass": 0.0,
+    "base_stiffness": 0.0,
+    "base_damping": 0.0,
+    "solver": 0,
+    "relative_tolerance": 1e-8,
+    "absolute_tolerance": 1e-17,
+}
 ENDINGS = {
     1: "the drive came to its end",
     2: "as many avalanches as wanted",
     3: "no contact is left to break",
     4: "contacts break under the force without end",
 }
-SOLVERS = {"series": 0, "adams": 1, "bdf": 2}
-
-# In a slip the slider exceeds the drive's velocity by this part of the scale Omega_S F_s/K.
-SLIP_VELOCITY_RATIO = 0.02
-
-# Displacements below this part of the spring's extension under F_s do not matter to CVODE.
-TINY_STRETCH = 1e-6
 
 # Work of the drive over the energy of all contacts about to break, below which it does not count.
 LEAST_ENERGY = 1e-9
@@ -118,16 +120,6 @@ POPULATION_COLUMNS = 12
 PACKET_ROWS = 4
 # Populations and packets at first; there is room for more when they are needed.
 POPULATIONS = 4096
-
-
-def slip_velocity(config: Config) -> float:
-    """Velocity above the drive's that makes a slip [m/s]; 0 for a slider without slips."""
-    if not isinstance(config.slider, RigidSlider | LayeredSlider):
-        return 0.0
-    if config.output.slip_velocity is not None:
-        return config.output.slip_velocity
-    scale = config.slider.omega_s * config.contacts.static_force / config.slider.stiffness
-    return SLIP_VELOCITY_RATIO * scale
 
 
 @dataclass
@@ -166,10 +158,10 @@ class Realization:
         self.integrator_counts = np.zeros(3, dtype=np.int64)
         self._started = False
         # Every segment orders the queue anew, which must cost little beside its advances.
-        self._is_exact = self.config.run.engine == "eq"
+        self._is_exact = self.config.contact_kind.is_discrete
         self._segment = SEGMENT_ADVANCES
         # CVODE starts anew with each segment, which must therefore not depend on computing times.
-        self._grows = not isinstance(self.config.slider, LayeredSlider)
+        self._grows = self.config.slider.solver_name(self.config) is None
         if self._is_exact:
             self._segment = max(SEGMENT_ADVANCES, self.config.contacts.count)
 
@@ -308,68 +300,40 @@ class Realization:
             If the kernel cannot go on.
         """
         config = self.config
-        contacts, slider = config.contacts, config.slider
-        stages = config.drive_stages
-        mass = spring = quiet_time = 1.0
-        damping = layer_damping = 0.0
-        base, tolerances, solver = (0.0, 0.0, 0.0), (1e-8, 1e-17), "series"
-        delay, drag = contacts.delay, contacts.contact_drag
-        kind, interaction, output = SLIDERS[slider.kind], config.interaction, config.output
-        if isinstance(slider, RigidSlider | LayeredSlider):
-            mass, spring = slider.mass, slider.stiffness
-            quiet_time = np.pi / slider.omega_s
-        if isinstance(slider, QuasistaticSlider):
-            delay, drag = 0.0, 0.0
-            if slider.stiffness is None:
-                kind = FORCE_DRIVEN
-            else:
-                spring = slider.stiffness
-        if isinstance(slider, RigidSlider):
-            damping = slider.damping_rate
-        if isinstance(slider, LayeredSlider):
-            layer_damping, solver = slider.layer_damping, slider.solver_method(config)
-            if slider.base is not None:
-                base = (slider.base.mass, slider.base.stiffness, slider.base.damping)
-            relative = slider.solver.relative_tolerance
-            tolerances = (relative, relative * TINY_STRETCH * contacts.static_force / spring)
+        slider, stages, output = config.slider, config.drive_stages, config.output
+        contacts = {"bond": 0.0, "lattice": 0, "columns": 0, "rows": 0}
+        contacts |= config.contact_kind.kernel_parameters(config)
+        contacts["lattice_rows"] = contacts.pop("rows")
+        contacts.setdefault("resolution", config.run.resolution)
+        block = NO_SLIDER | slider.kernel_parameters(config)
+        kind = SLIDERS[slider.kernel_kind]
+        if slider.driven_by_force and slider.spring_stiffness == 0:
+            kind = FORCE_DRIVEN
         if not self._started:
             self._allocate()
         segment = advances or self._segment
         start = time.perf_counter()
         results = _core.run_segment(
             engine=ENGINES[config.run.engine],
-            count=contacts.count,
-            static_force=contacts.contact_static_force,
-            stiffness=contacts.contact_stiffness,
-            drag=drag,
-            delay=delay,
-            back_force_ratio=contacts.back_force_ratio,
-            coupling=COUPLINGS[contacts.coupling],
-            reattach=int(contacts.reattach),
-            law=LAWS[contacts.threshold.law],
-            relative_width=contacts.threshold.relative_width,
-            initial=INITIAL_STATES[contacts.initial],
+            **contacts,
+            initial=config.initial_code,
             seed=config.run.seed,
             realization=self.number,
-            bond=config.bond_stiffness,
-            lattice=LATTICES[interaction.lattice] if interaction is not None else 0,
-            columns=interaction.columns if interaction is not None else 0,
-            lattice_rows=interaction.rows if interaction is not None else 0,
             slider_kind=kind,
-            mass=mass,
-            spring=spring,
-            damping=damping,
-            layers=self._layers,
-            layer_damping=layer_damping,
-            base=np.array(base),
-            solver=SOLVERS[solver],
-            tolerances=np.array(tolerances),
+            mass=block["mass"],
+            spring=block["stiffness"] or 1.0,
+            damping=block["damping"],
+            layers=block["layers"],
+            layer_damping=block["damping"],
+            base=np.array([block[f"base_{name}"] for name in ("mass", "stiffness", "damping")]),
+            solver=block["solver"],
+            tolerances=np.array([block["relative_tolerance"], block["absolute_tolerance"]]),
             stage_end=np.minimum(np.cumsum([stage.duration for stage in stages]), NEVER),
             stage_velocity=np.array([stage.velocity for stage in stages]),
             interval=config.output_interval,
             slip_interval=config.output.slip_interval or 0.0,
-            slip_velocity=slip_velocity(config),
-            quiet_time=quiet_time,
+            slip_velocity=slider.slip_velocity(config),
+            quiet_time=slider.quiet_time,
             least_avalanche=float(output.avalanche_size or 1) * config.has_avalanches,
             snapshot_size=float(output.snapshot_size or 0),
             most_avalanches=config.run.avalanches or 0,
@@ -381,7 +345,6 @@ class Realization:
             detached=self._detached,
             detached_contact=self._detached_contact,
             track=self._track,
-            resolution=config.run.resolution,
             population=self._population,
             packet=self._packet,
             layer_state=self._layer_state,

@@ -24,7 +24,6 @@ from mesoslip import _core
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.store import program_attributes, variable
-from mesoslip.theory.derived import loading_rate
 from mesoslip.theory.lives import checked, law_arguments, scales
 
 if TYPE_CHECKING:
@@ -535,7 +534,7 @@ class ForceCurve:
             "X_peak": force_place,
             "F_steady": self.steady_force,
             "D0": critical.D0 if critical else None,
-            "D1": loading_rate(self.config),
+            "D1": self.config.slider.loading_rate(self.config),
             "D2": critical.D2 if critical else None,
             "D3": critical.D3 if critical else None,
             "error": self.error,

@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mesoslip import _core
-from mesoslip.configuration.threshold_law import LAWS
+from mesoslip.configuration.contacts.tables import COUPLINGS
 from mesoslip.errors import RunError
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
-
-COUPLINGS = {"scaled": 1, "equal": 2}
-INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
 
 
 class Scales(NamedTuple):
@@ -33,13 +30,13 @@ def law_arguments(config: Config, newborn_width: float = 0.0) -> tuple[Any, ...]
     """What the kernels of the master equation are told of contacts; ``newborn_width`` in m."""
     contacts = config.contacts
     return (
-        LAWS[contacts.threshold.law],
+        contacts.threshold.code,
         contacts.threshold.relative_width,
         COUPLINGS[contacts.coupling],
         contacts.back_force_ratio,
         newborn_width * contacts.stiffness / contacts.static_force,
         int(contacts.reattach),
-        INITIAL_STATES[contacts.initial],
+        config.initial_code,
     )
 
 

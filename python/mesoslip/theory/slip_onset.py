@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from mesoslip import _core
-from mesoslip.configuration.tables import RigidSlider
+from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.output.store import program_attributes, variable
 from mesoslip.theory.force_curve import ForceCurve

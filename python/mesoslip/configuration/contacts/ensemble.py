@@ -1,0 +1,34 @@
+"""N contacts that know nothing of each other, the earthquake-like model."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
+from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.configuration.table import Complaints
+from mesoslip.configuration.tables import Run
+
+
+class EnsembleContacts(ContactKind):
+    """Contacts one by one; they have places if [interaction] says so, with a strength of 0."""
+
+    kernel_kind: ClassVar[str] = "ensemble"
+
+    @classmethod
+    def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:
+        return run.engine == "eq" and (interaction is None or interaction.strength == 0)
+
+    @property
+    def bytes_per_contact(self) -> int:
+        return 260 if self.on_lattice else 150
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+        columns = rows = 0
+        if self.interaction is not None:
+            columns, rows = self.interaction.columns, self.interaction.rows
+        return common_parameters(config) | {"columns": columns, "rows": rows}
+
+    def problems(self, config: Setting) -> Complaints:
+        if self.interaction is not None:
+            yield from self.interaction.problems(config.contacts)

@@ -1,0 +1,34 @@
+"""N contacts on a lattice, whose neighbours pull at each other."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
+from mesoslip.configuration.contacts.tables import LATTICES, Interaction
+from mesoslip.configuration.table import Complaints
+from mesoslip.configuration.tables import Run
+
+
+class LatticeContacts(ContactKind):
+    """Contacts one by one, with bonds between neighbours (S25 to S27)."""
+
+    kernel_kind: ClassVar[str] = "lattice"
+    bytes_per_contact: ClassVar[int] = 260
+
+    interaction: Interaction
+
+    @classmethod
+    def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:
+        return run.engine == "eq" and interaction is not None and interaction.strength > 0
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+        return common_parameters(config) | {
+            "bond": self.interaction.bond_stiffness(config.contacts),
+            "lattice": LATTICES[self.interaction.lattice],
+            "columns": self.interaction.columns,
+            "rows": self.interaction.rows,
+        }
+
+    def problems(self, config: Setting) -> Complaints:
+        yield from self.interaction.problems(config.contacts)

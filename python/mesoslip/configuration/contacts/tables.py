@@ -1,0 +1,199 @@
+"""The tables of the contacts: [contacts], [contacts.threshold], and [interaction]."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Self
+
+from pydantic import Field, StrictBool, StrictInt, model_validator
+
+from mesoslip.configuration.table import (
+    Area,
+    Complaint,
+    Complaints,
+    Density,
+    Force,
+    Length,
+    Number,
+    Rate,
+    Stiffness,
+    Table,
+    Time,
+    choice,
+    problem,
+)
+from mesoslip.configuration.threshold_law import LAWS, ThresholdLaw
+
+# Choices, and their codes in the kernels.
+COUPLINGS = {"scaled": 1, "equal": 2}
+INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
+LATTICES = {"triangular": 1, "square": 2}
+
+# Neighbours of a contact on each lattice.
+NEIGHBOURS = {"triangular": 6, "square": 4}
+
+# Part of the thresholds that must be above the back force, or drawing them takes too long.
+LEAST_ACCEPTED = 0.5
+
+# Stiffness of all bonds of a contact over its own, beyond which the force that breaks it, the
+# difference of what it and what its neighbours pull, has fewer than ten digits.
+STRONGEST_BONDS = 1e6
+
+
+class Threshold(Table):
+    """Law of the relative thresholds: mean 1, and a standard deviation."""
+
+    law: Annotated[str, choice(LAWS)] = "gaussian"
+    relative_width: Annotated[Number, Field(gt=0)]
+
+    @model_validator(mode="after")
+    def _not_too_wide(self) -> Self:
+        law = LAWS[self.law]
+        # A width given by four digits of an irrational bound is meant to be the bound.
+        if self.relative_width > law.widest * (1 + 1e-4):
+            raise problem(
+                "relative_width",
+                f"must be at most {law.widest:.4g} for the {self.law} law{law.if_wider}",
+            )
+        return self
+
+    @property
+    def code(self) -> int:
+        """The law's code in the kernels."""
+        return LAWS[self.law].code
+
+    def probability_above(self, threshold: float) -> float:
+        """Probability that a draw of the law is above a relative threshold."""
+        return ThresholdLaw(self.law, self.relative_width, threshold).acceptance
+
+
+class Contacts(Table):
+    """The contacts of the interface; forces, stiffness and area are those of all together."""
+
+    count: Annotated[StrictInt, Field(ge=1, lt=2**31)]
+    static_force: Annotated[Force, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(gt=0)]
+    area: Annotated[Area, Field(gt=0)] | None = None
+    film_thickness: Annotated[Length, Field(gt=0)] | None = None
+    film_density: Annotated[Density, Field(gt=0)] | None = None
+    drag_rate: Annotated[Rate, Field(ge=0)] = 0.0
+    delay: Annotated[Time, Field(ge=0)] = 0.0
+    back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    coupling: Annotated[str, choice(COUPLINGS)] = "scaled"
+    initial: Annotated[str, choice(INITIAL_STATES)] = "relaxed"
+    reattach: StrictBool = True
+    threshold: Threshold
+
+    @model_validator(mode="after")
+    def _mass_for_drag(self) -> Self:
+        if self.drag_rate > 0:
+            for key in ("area", "film_thickness", "film_density"):
+                if getattr(self, key) is None:
+                    raise problem(key, "needed for the mass of the contacts, as drag_rate is given")
+        return self
+
+    @model_validator(mode="after")
+    def _contacts_attach(self) -> Self:
+        above = self.threshold.probability_above(self.back_force_ratio)
+        if above < LEAST_ACCEPTED:
+            raise problem(
+                "back_force_ratio",
+                f"only {above:.3g} of the thresholds are above the back force, at least "
+                f"{LEAST_ACCEPTED} must be: choose a lower back_force_ratio or a narrower "
+                "threshold law",
+            )
+        return self
+
+    @property
+    def contact_static_force(self) -> float:
+        """f_s [N]."""
+        return self.static_force / self.count
+
+    @property
+    def contact_stiffness(self) -> float:
+        """k [N/m]."""
+        return self.stiffness / self.count
+
+    @property
+    def contact_mass(self) -> float:
+        """m = ρ (A/N) h [kg]; 0 where the film is not described."""
+        if self.area is None or self.film_thickness is None or self.film_density is None:
+            return 0.0
+        return self.film_density * self.area / self.count * self.film_thickness
+
+    @property
+    def contact_drag(self) -> float:
+        """m η [N s/m]."""
+        return self.contact_mass * self.drag_rate
+
+    @property
+    def break_stretch(self) -> float:
+        """Mean stretch at which a contact breaks, f_s/k [m]."""
+        return self.static_force / self.stiffness
+
+
+class Interaction(Table):
+    """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
+
+    strength: Annotated[Number, Field(le=1e100)]
+    lattice: Annotated[str, choice(LATTICES)] = "triangular"
+    columns: Annotated[StrictInt, Field(ge=2)]
+    rows: Annotated[StrictInt, Field(ge=2)]
+
+    @model_validator(mode="after")
+    def _contacts_attach(self) -> Self:
+        if self.strength < 0:
+            raise problem(
+                "strength",
+                "must not be negative, as neighbours repel each other: where they attract, "
+                "k + G z may be negative, and no stretch has the force at which a contact attaches "
+                f"(is {self.strength:g})",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _rows_match(self) -> Self:
+        if self.lattice == "triangular" and self.rows % 2:
+            raise problem(
+                "rows",
+                "must be even on a triangular lattice without edges, whose odd rows are half a "
+                f"place aside (is {self.rows})",
+            )
+        return self
+
+    @property
+    def neighbours(self) -> int:
+        """Number of neighbours of a contact."""
+        return NEIGHBOURS[self.lattice]
+
+    def bond_stiffness(self, contacts: Contacts) -> float:
+        """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without an area."""
+        if contacts.area is None:
+            return 0.0
+        spacing = math.sqrt(contacts.area / contacts.count)
+        return 3 * self.strength * contacts.contact_static_force / spacing
+
+    def problems(self, contacts: Contacts) -> Complaints:
+        """What is wrong between the lattice and the contacts that it is to hold."""
+        places = self.columns * self.rows
+        if places != contacts.count:
+            yield Complaint(
+                "interaction.columns",
+                f"times rows must be contacts.count: {self.columns} x {self.rows} = "
+                f"{places}, not {contacts.count}",
+                self.columns,
+            )
+        if contacts.area is None:
+            yield Complaint(
+                "contacts.area", "needed for the distance between neighbours, a = (A/N)^(1/2)"
+            )
+        relative = self.neighbours * self.bond_stiffness(contacts) / contacts.contact_stiffness
+        if relative > STRONGEST_BONDS:
+            strongest = self.strength * (STRONGEST_BONDS / relative)
+            yield Complaint(
+                "interaction.strength",
+                "so strong that a contact cannot attach: the force at which it does, (k + G z) x "
+                "less the pull of its neighbours, is a difference of terms "
+                f"{relative:.1g} times as large, without digits enough; at most {strongest:.3g}",
+                self.strength,
+            )

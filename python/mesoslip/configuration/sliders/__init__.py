@@ -1,0 +1,47 @@
+"""Kinds of sliders, each in a room of its own and named here once.
+
+Adding a kind is adding a file with a `SliderTable` and naming it in `KINDS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Discriminator, Tag
+
+from mesoslip.configuration.sliders.base import SliderTable
+from mesoslip.configuration.sliders.layered import LayeredSlider
+from mesoslip.configuration.sliders.prescribed import PrescribedSlider
+from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
+from mesoslip.configuration.sliders.rigid import RigidSlider
+
+KINDS: tuple[type[SliderTable], ...] = (
+    RigidSlider,
+    LayeredSlider,
+    PrescribedSlider,
+    QuasistaticSlider,
+)
+
+# The first one is meant where the file does not say.
+SLIDERS: dict[str, type[SliderTable]] = {kind.model_fields["kind"].default: kind for kind in KINDS}
+DEFAULT = next(iter(SLIDERS))
+
+
+def _kind_of(table: Any) -> Any:
+    """Name of the kind that a table of a file, or a slider, is of."""
+    if isinstance(table, Mapping):
+        return table.get("kind", DEFAULT)
+    return getattr(table, "kind", DEFAULT)
+
+
+# For the type checker a slider is what all kinds have in common, which is what others may ask.
+if TYPE_CHECKING:
+    Slider: TypeAlias = SliderTable
+else:
+    Slider = Annotated[
+        reduce(or_, (Annotated[kind, Tag(name)] for name, kind in SLIDERS.items())),
+        Discriminator(_kind_of),
+    ]

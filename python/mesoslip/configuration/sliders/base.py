@@ -1,0 +1,108 @@
+"""What every kind of slider answers."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import ClassVar, NamedTuple, Protocol
+
+from mesoslip.configuration.contacts.base import ContactKind
+from mesoslip.configuration.contacts.tables import Contacts
+from mesoslip.configuration.table import Complaints, Table
+from mesoslip.configuration.tables import Drive, Output
+
+
+class Quantity(NamedTuple):
+    """A derived quantity: its value in SI, the unit, and what it is."""
+
+    name: str
+    value: float
+    unit: str
+    meaning: str
+
+
+class Setting(Protocol):
+    """What a slider knows of the configuration that it is in."""
+
+    @property
+    def drive(self) -> Drive: ...
+    @property
+    def drive_speed(self) -> float: ...
+    @property
+    def expected_duration(self) -> float: ...
+    @property
+    def contacts(self) -> Contacts: ...
+    @property
+    def contact_kind(self) -> ContactKind: ...
+    @property
+    def output(self) -> Output: ...
+
+
+class SliderTable(Table):
+    """A kind of slider: its keys in the file, what the kernel is told, what it takes and refuses.
+
+    What is defined here holds of a slider without inertia, slips, or layers.
+
+    Attributes
+    ----------
+    jumps
+        Whether the slider has no inertia: contacts break in avalanches while the drive stands.
+    ignores_delay
+        Whether contacts attach at once and bear no drag, whatever their delay and film.
+    driven_by_force
+        Whether the drive may be a force, without a spring.
+    """
+
+    jumps: ClassVar[bool] = False
+    ignores_delay: ClassVar[bool] = False
+    driven_by_force: ClassVar[bool] = False
+
+    kind: str
+
+    @property
+    def kernel_kind(self) -> str:
+        """The kernel's name of the kind."""
+        return self.kind
+
+    @abstractmethod
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+        """What the kernel is told of the slider, in SI."""
+
+    @property
+    @abstractmethod
+    def spring_stiffness(self) -> float:
+        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
+
+    @property
+    def quiet_time(self) -> float:
+        """Time without fast motion after which a slip is over [s]."""
+        return 1.0
+
+    def slip_velocity(self, config: Setting) -> float:  # noqa: ARG002
+        """Velocity above the drive's that makes a slip [m/s]; 0 where there are no slips."""
+        return 0.0
+
+    def loading_rate(self, config: Setting) -> float | None:  # noqa: ARG002
+        """D1 = v_d √(KM)/F_s (S46); None if the drive stands, or without spring or mass."""
+        return None
+
+    @property
+    def extra_traces(self) -> tuple[str, ...]:
+        """Names of what is traced besides what all sliders have."""
+        return ()
+
+    def layers_recorded(self, config: Setting) -> int:  # noqa: ARG002
+        """Number of layers whose displacements are recorded."""
+        return 0
+
+    def solver_name(self, config: Setting) -> str | None:  # noqa: ARG002
+        """How the motion is integrated, where there is a choice."""
+        return None
+
+    def problems(self, config: Setting) -> Complaints:  # noqa: ARG002
+        """The combinations that this kind refuses."""
+        yield from ()
+
+    def quantities(self, config: Setting) -> Iterator[Quantity]:  # noqa: ARG002
+        """What follows from the slider's keys in closed form."""
+        yield from ()

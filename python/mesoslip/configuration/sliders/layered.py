@@ -1,0 +1,196 @@
+"""An elastic block of layers (S24), and the base that it may slide on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StrictInt, ValidationError, model_validator
+
+from mesoslip.configuration.sliders.base import Quantity, Setting
+from mesoslip.configuration.sliders.inertial import InertialSlider
+from mesoslip.configuration.table import (
+    Complaint,
+    Complaints,
+    Density,
+    Length,
+    Mass,
+    Number,
+    Pressure,
+    Rate,
+    Stiffness,
+    Table,
+    choice,
+)
+
+# Methods of integration, and their codes in the kernel.
+SOLVERS = {"series": 0, "adams": 1, "bdf": 2}
+AUTOMATIC = "auto"
+
+# Work of a run by series, steps times layers, beyond which stiff formulas take over.
+MOST_SERIES_WORK = 1e11
+
+# Displacements below this part of the spring's extension under F_s do not matter to CVODE.
+TINY_STRETCH = 1e-6
+
+
+class Base(Table):
+    """The lower body: a mass on a spring to the ground, which damping holds back."""
+
+    mass: Annotated[Mass, Field(gt=0)]
+    stiffness: Annotated[Stiffness, Field(gt=0)]
+    damping: Annotated[Rate, Field(ge=0)] = 0.0
+
+
+class Solver(Table):
+    """How layers are integrated: by series, exact to rounding, or by CVODE's formulas."""
+
+    method: Annotated[str, choice({AUTOMATIC: None, **SOLVERS})] = AUTOMATIC
+    relative_tolerance: Annotated[Number, Field(ge=1e-13, le=1e-2)] = 1e-8
+
+
+class Cantilever(Table):
+    """A round rod that is held at one end, pulled at the other."""
+
+    length: Annotated[Length, Field(gt=0)]
+    radius: Annotated[Length, Field(gt=0)]
+    density: Annotated[Density, Field(gt=0)]
+    young_modulus: Annotated[Pressure, Field(gt=0)]
+
+    @property
+    def mass(self) -> float:
+        """M = ρ π r² L [kg]."""
+        return self.density * math.pi * self.radius**2 * self.length
+
+    @property
+    def stiffness(self) -> float:
+        """K = 3 E I/L³ with I = π r⁴/4 [N/m]."""
+        return 3 * self.young_modulus * math.pi * self.radius**4 / 4 / self.length**3
+
+    @property
+    def bending_frequency(self) -> float:
+        """Lowest frequency of bending, (β₁/L)² √(E I/(ρ S)), β₁ = 1.875 [1/s]."""
+        lowest = 1.8751040687119611
+        stiffness_over_mass = self.young_modulus * self.radius**2 / (4 * self.density)
+        return (lowest / self.length) ** 2 * math.sqrt(stiffness_over_mass)
+
+
+class LayeredSlider(InertialSlider):
+    """An elastic block: layers joined by springs, of which the first bears the contacts."""
+
+    kind: Literal["layered"] = "layered"
+    layers: Annotated[StrictInt, Field(ge=1, le=100_000)]
+    layer_damping: Annotated[Rate, Field(ge=0)] = 0.0
+    base: Base | None = None
+    solver: Solver = Solver()
+    cantilever: Cantilever | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_cantilever(cls, tables: Any) -> Any:
+        """Mass and stiffness of the cantilever, unless they are given."""
+        if not isinstance(tables, Mapping) or not isinstance(tables.get("cantilever"), Mapping):
+            return tables
+        try:
+            cantilever = Cantilever.model_validate(tables["cantilever"])
+        except ValidationError:
+            return tables
+        return {"mass": cantilever.mass, "stiffness": cantilever.stiffness, **tables}
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """Frequencies of the chain while no contact is pinned, on a fixed base [1/s]."""
+        n = self.layers
+        return tuple(
+            2 * n * self.omega_s * math.sin((2 * j - 1) * math.pi / (2 * (2 * n + 1)))
+            for j in range(1, n + 1)
+        )
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+        relative = self.solver.relative_tolerance
+        base = self.base
+        return {
+            "layers": self.layers,
+            "mass": self.mass,
+            "stiffness": self.stiffness,
+            "damping": self.layer_damping,
+            "base_mass": 0.0 if base is None else base.mass,
+            "base_stiffness": 0.0 if base is None else base.stiffness,
+            "base_damping": 0.0 if base is None else base.damping,
+            "solver": SOLVERS[self.solver_name(config)],
+            "relative_tolerance": relative,
+            "absolute_tolerance": relative
+            * TINY_STRETCH
+            * config.contacts.static_force
+            / self.stiffness,
+        }
+
+    @property
+    def extra_traces(self) -> tuple[str, ...]:
+        return ("elastic_force",) if self.base is None else ("elastic_force", "base_displacement")
+
+    def layers_recorded(self, config: Setting) -> int:
+        return self.layers if config.output.layers else 0
+
+    def solver_name(self, config: Setting) -> str:
+        """The method, chosen for a run if it is "auto".
+
+        Series need a few steps for each period of the fastest rate, however little it matters to
+        the motion: where that would take too long, BDF steps over it.
+        """
+        if self.solver.method != AUTOMATIC:
+            return self.solver.method
+        if not config.contact_kind.is_discrete:
+            return "series"
+        mass = self.mass / self.layers
+        drag = config.contacts.count * config.contacts.contact_drag
+        rate = 2 * self.layers * self.omega_s
+        rate += math.sqrt(config.contacts.stiffness / mass) + drag / mass + 4 * self.layer_damping
+        if self.base is not None:
+            stiffness = self.base.stiffness + config.contacts.stiffness
+            rate += math.sqrt(stiffness / self.base.mass) + drag / self.base.mass
+            rate += self.base.damping
+        work = config.expected_duration * rate * (self.layers + 10)
+        return "series" if work < MOST_SERIES_WORK else "bdf"
+
+    def problems(self, config: Setting) -> Complaints:
+        if not config.contact_kind.is_discrete and self.solver.method not in {AUTOMATIC, "series"}:
+            yield Complaint(
+                "slider.solver.method",
+                'must be "series" with engine "me", whose contacts change their law at every step',
+                self.solver.method,
+            )
+
+    def quantities(self, config: Setting) -> Iterator[Quantity]:
+        yield Quantity("slider_mass", self.mass, "kg", "mass of all layers, M")
+        yield Quantity(
+            "slider_stiffness", self.stiffness, "N/m", "static stiffness of all springs, K"
+        )
+        frequencies = self.frequencies
+        yield Quantity(
+            "chain_frequency",
+            frequencies[0],
+            "1/s",
+            "lowest frequency of the chain without contacts",
+        )
+        yield Quantity("chain_frequency_highest", frequencies[-1], "1/s", "highest one")
+        if self.base is not None:
+            film_mass = config.contacts.count * config.contacts.contact_mass
+            mass = self.base.mass + self.mass + film_mass
+            yield Quantity(
+                "pinned_base_frequency",
+                math.sqrt(self.base.stiffness / mass),
+                "1/s",
+                "frequency of base and slider pinned together, [K_B/(M_B + M + Nm)]^(1/2)",
+            )
+        if self.cantilever is not None:
+            bending = self.cantilever.bending_frequency
+            yield Quantity(
+                "bending_frequency", bending, "1/s", "lowest bending frequency of the cantilever"
+            )
+            ratio = bending / math.sqrt(self.cantilever.stiffness / self.cantilever.mass)
+            yield Quantity(
+                "bending_ratio", ratio, "1", "that over (K/M)^(1/2) of the cantilever, 2.03"
+            )
+        yield from super().quantities(config)

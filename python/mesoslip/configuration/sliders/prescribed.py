@@ -1,0 +1,21 @@
+"""A block that goes where the drive goes."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from mesoslip.configuration.sliders.base import Setting, SliderTable
+
+
+class PrescribedSlider(SliderTable):
+    """A block that goes where the drive goes, K = ∞."""
+
+    kind: Literal["prescribed"] = "prescribed"
+
+    @property
+    def spring_stiffness(self) -> float:
+        return math.inf
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
+        return {}

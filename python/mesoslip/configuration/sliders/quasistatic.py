@@ -1,0 +1,60 @@
+"""A block without inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from mesoslip.configuration.sliders.base import Quantity, Setting, SliderTable
+from mesoslip.configuration.table import Complaint, Complaints, Stiffness
+
+
+class QuasistaticSlider(SliderTable):
+    """A block without inertia that follows the stable equilibrium of spring and contacts.
+
+    Its contacts attach at once and bear no drag, whatever their delay and film. A drive by force
+    needs no spring.
+    """
+
+    jumps: ClassVar[bool] = True
+    ignores_delay: ClassVar[bool] = True
+    driven_by_force: ClassVar[bool] = True
+
+    kind: Literal["quasistatic"] = "quasistatic"
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+
+    @property
+    def spring_stiffness(self) -> float:
+        return self.stiffness or 0.0
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
+        return {"stiffness": self.spring_stiffness}
+
+    def problems(self, config: Setting) -> Complaints:
+        by_force = config.drive.force_rate is not None
+        if not by_force and self.stiffness is None:
+            yield Complaint("slider.stiffness", "missing; only a drive by force needs no spring")
+        elif by_force and self.stiffness is not None:
+            yield Complaint(
+                "slider.stiffness",
+                "has no meaning with drive.force_rate, which acts on the slider without a spring",
+                self.stiffness,
+            )
+        if not config.contact_kind.is_discrete:
+            yield Complaint(
+                "slider.kind",
+                'needs engine "eq"; the force of infinitely many contacts over the displacement '
+                "of a slider without inertia is that of mesoslip curve",
+                self.kind,
+            )
+
+    def quantities(self, config: Setting) -> Iterator[Quantity]:
+        if self.stiffness is not None and config.contacts.reattach:
+            yield Quantity(
+                "mean_avalanche_size",
+                1 + config.contacts.stiffness / self.stiffness,
+                "1",
+                "mean size of avalanches in stationary sliding without interaction, 1 + Nk/K",
+            )

@@ -1,284 +1,457 @@
 ! The boundary to Python: flat subroutines with explicit shapes, wrapped by f2py.
 !
+! A simulation lives here; Python holds its handle, two numbers that only these procedures read.
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
 
-!> Run N contacts, or infinitely many, for some advances of the slider.
-subroutine run_segment(engine, count, static_force, stiffness, drag, delay, back_force_ratio, &
-   & coupling, reattach, law, relative_width, initial, seed, realization, bond, lattice, columns, &
-   & lattice_rows, slider_kind, mass, spring, damping, layers, layer_damping, base, solver, &
-   & tolerances, stages, stage_end, stage_velocity, interval, slip_interval, slip_velocity, &
-   & quiet_time, least_avalanche, snapshot_size, most_avalanches, snapshot_times, snapshot_time, &
-   & started, reals, integers, &
-   & state_real, state_integer, records, record, detached, detached_contact, &
-   & tracked, track, &
-   & resolution, &
-   & populations, population, packets, packet, layer_state, trace_capacity, trace, &
-   & slip_trace_capacity, slip_trace, layers_recorded, layer_trace, slip_capacity, slips, &
-   & avalanche_capacity, avalanches, snapshot_capacity, snapshot_contacts, snapshot_place, &
-   & snapshot, most_advances, rows, ending, full, time, breaks, detached_count, advances, &
-   & integrator, energy, avalanche_total, avalanche_slip, displacement, status, message)
+!> Set up a simulation without parts.
+subroutine open_simulation(handle)
    !f2py threadsafe
-   use mesoslip_numerics_kinds, only: wp
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_contacts_threshold_law, only: new_threshold_law
-   use mesoslip_contacts_ensemble, only: contact_ensemble_type, new_contact_ensemble
-   use mesoslip_contacts_lattice, only: contact_lattice_type, interaction_type, new_contact_lattice
-   use mesoslip_contacts_populations, only: contact_populations_type, new_contact_populations
-   use mesoslip_contacts_set, only: contact_arrays_type
-   use mesoslip_contacts_base, only: contact_parameters_type
-   use mesoslip_sliders_layered, only: layered_parameters_type, slider_layered_type
-   use mesoslip_sliders_prescribed, only: slider_prescribed_type
-   use mesoslip_sliders_quasistatic, only: slider_quasistatic_type
-   use mesoslip_sliders_rigid, only: slider_rigid_type
-   use mesoslip_recording_recorder, only: recorder_parameters_type
+   use mesoslip_handles, only: open_handle
+   implicit none
+   !> The handle
+   integer(8), intent(inout) :: handle(2)
+
+   call open_handle(handle)
+end subroutine open_simulation
+
+!> Free a simulation; its handle is of no use afterwards.
+subroutine close_simulation(handle)
+   !f2py threadsafe
+   use mesoslip_handles, only: close_handle
+   implicit none
+   !> The handle; closing it again does nothing
+   integer(8), intent(inout) :: handle(2)
+
+   call close_handle(handle)
+end subroutine close_simulation
+
+!> Give a simulation its contacts.
+subroutine set_contacts(handle, kind, length, names, values, seed, realization, status, message)
+   !f2py threadsafe
+   use mesoslip_contacts, only: make_contacts
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_simulation, only: simulation_type
    implicit none
-   !> 1 for N contacts, 2 for infinitely many
-   integer, intent(in) :: engine
-   !> Number of contacts, mean threshold, stiffness and drag of one, delay, backward force
-   integer, intent(in) :: count
-   real(8), intent(in) :: static_force, stiffness, drag, delay, back_force_ratio
-   !> Codes of coupling, threshold law and initial state; whether contacts attach again
-   integer, intent(in) :: coupling, reattach, law, initial
-   real(8), intent(in) :: relative_width
+   integer(8), intent(in) :: handle(2)
+   !> Kind of the contacts, and what they are made of, each number by its name
+   character(len=*), intent(in) :: kind
+   integer, intent(in) :: length
+   character(len=32), intent(in) :: names(length)
+   real(8), intent(in) :: values(length)
    !> Key of the random numbers
    integer(8), intent(in) :: seed, realization
-   !> Stiffness of the bond between neighbours; code of their lattice, its columns and rows, all 0
-   !> for contacts without a place
-   real(8), intent(in) :: bond
-   integer, intent(in) :: lattice, columns, lattice_rows
-   !> Kind of the slider, its mass, spring constant and damping rate
-   integer, intent(in) :: slider_kind
-   real(8), intent(in) :: mass, spring, damping
-   !> Number of layers, their damping rate; mass, stiffness and damping rate of the base; solver,
-   !> and its tolerances, relative and absolute
-   integer, intent(in) :: layers, solver
-   real(8), intent(in) :: layer_damping, base(3), tolerances(2)
-   !> Stages of the drive
-   integer, intent(in) :: stages
-   real(8), intent(in) :: stage_end(stages), stage_velocity(stages)
-   !> What to record
-   real(8), intent(in) :: interval, slip_interval, slip_velocity, quiet_time
-   !> Least sizes of avalanches in the catalogue and with a snapshot, 0 for none; avalanches after
-   !> which the run is over, 0 for any number; times of snapshots
-   real(8), intent(in) :: least_avalanche, snapshot_size
-   integer(8), intent(in) :: most_avalanches
-   integer, intent(in) :: snapshot_times
-   real(8), intent(in) :: snapshot_time(snapshot_times)
-   !> Whether the state is that of a run under way, rather than to be made
-   integer, intent(in) :: started
-   !> State of the run
-   integer, intent(in) :: reals, integers
-   real(8), intent(inout) :: state_real(reals)
-   integer(8), intent(inout) :: state_integer(integers)
-   !> Contacts, for engine 1: as many records as contacts
-   integer, intent(in) :: records
-   real(8), intent(inout), target :: record(5, records), detached(2, records)
-   integer, intent(inout), target :: detached_contact(records)
-   !> Contacts of the present avalanche: as many as contacts when they are on a lattice, or none
-   integer, intent(in) :: tracked
-   integer, intent(inout), target :: track(2, tracked)
-   !> Populations and packets of detached contacts, for engine 2, and their resolution
-   real(8), intent(in) :: resolution
-   integer, intent(in) :: populations, packets
-   real(8), intent(inout), target :: population(populations, 12), packet(4, packets)
-   !> Displacements and velocities of base and layers
-   real(8), intent(inout), target :: layer_state(layers + 1, 2)
-   !> Arrays to record into
-   integer, intent(in) :: trace_capacity, slip_trace_capacity, slip_capacity
-   real(8), intent(inout), target :: trace(9, trace_capacity)
-   real(8), intent(inout), target :: slip_trace(10, slip_trace_capacity)
-   !> Layers whose displacements go with the trace: none or all of them
-   integer, intent(in) :: layers_recorded
-   real(8), intent(inout), target :: layer_trace(layers_recorded, trace_capacity)
-   real(8), intent(inout), target :: slips(7, slip_capacity)
-   integer, intent(in) :: avalanche_capacity, snapshot_capacity, snapshot_contacts
-   real(8), intent(inout), target :: avalanches(10, avalanche_capacity)
-   real(8), intent(inout), target :: snapshot_place(3, snapshot_capacity)
-   real(8), intent(inout), target :: snapshot(3, snapshot_contacts, snapshot_capacity)
-   !> Largest number of advances
-   integer(8), intent(in) :: most_advances
-   !> Rows of trace, slip_trace, slips, avalanches and snapshots that were filled
-   integer, intent(out) :: rows(5)
-   !> Why the run is over, 0 if it is not; whether there is no room for more populations; the time
-   !> it has come to
-   integer, intent(out) :: ending, full
-   real(8), intent(out) :: time
-   !> Terms of the energy balance; breaks and advances so far, contacts that are detached
-   real(8), intent(out) :: energy(8), breaks, detached_count
-   integer(8), intent(out) :: advances
-   !> Steps, evaluations and failed steps of the slider's integrator in this call
-   integer(8), intent(out) :: integrator(3)
-   !> Avalanches so far, and the slip in them; displacement of the slider
-   integer(8), intent(out) :: avalanche_total
-   real(8), intent(out) :: avalanche_slip, displacement
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
-   integer, parameter :: engine_contacts = 1, engine_master_equation = 2
-   integer, parameter :: kind_rigid = 1, kind_prescribed = 2, kind_layered = 3, &
-      & kind_quasistatic = 4, kind_force = 5
-   type(simulation_type) :: simulation
-   type(contact_ensemble_type), allocatable :: ensemble
-   type(contact_lattice_type), allocatable :: neighbours
-   type(contact_arrays_type) :: arrays
-   type(contact_populations_type), allocatable :: all
-   type(slider_layered_type), allocatable :: elastic
-   type(contact_parameters_type) :: parameters
-   type(recorder_parameters_type) :: recorder_parameters
-   type(archive_type) :: archive
+   type(simulation_type), pointer :: simulation
+   type(parameters_type) :: parameters
    type(error_type), allocatable :: error
 
-   rows = 0
-   ending = 0
-   avalanche_total = 0
-   avalanche_slip = 0.0_wp
-   displacement = 0.0_wp
-   full = 0
-   time = 0.0_wp
-   breaks = 0.0_wp
-   detached_count = 0.0_wp
-   advances = 0
-   integrator = 0
-   energy = 0.0_wp
-   status = 0
-   message = ""
-
-   call new_threshold_law(parameters%law, law, relative_width, back_force_ratio, error)
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-      return
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      call new_parameters(parameters, names, values)
+      call make_contacts(simulation%contacts, kind, parameters, seed, realization, error)
    end if
-   parameters%count = count
-   parameters%static_force = static_force
-   parameters%stiffness = stiffness
-   parameters%drag = drag
-   parameters%delay = delay
-   parameters%back_force_ratio = back_force_ratio
-   parameters%coupling = coupling
-   parameters%reattach = reattach /= 0
-   parameters%seed = seed
-   parameters%realization = realization
-   select case (engine)
-   case (engine_contacts)
-      arrays%record => record
-      arrays%detached => detached
-      arrays%detached_contact => detached_contact
-      ! Without a bond contacts know nothing of each other, wherever they are.
-      if (bond > 0.0_wp) then
-         allocate (neighbours)
-         call new_contact_lattice(neighbours, parameters, &
-            & interaction_type(bond, lattice, columns, lattice_rows), arrays, error)
-         neighbours%track%columns = columns
-         neighbours%track%rows = lattice_rows
-         neighbours%track%contact => track
-         call move_alloc(neighbours, simulation%contacts)
-      else
-         allocate (ensemble)
-         call new_contact_ensemble(ensemble, parameters, arrays, error)
-         ensemble%track%columns = columns
-         ensemble%track%rows = lattice_rows
-         ensemble%track%contact => track
-         call move_alloc(ensemble, simulation%contacts)
-      end if
-   case (engine_master_equation)
-      allocate (all)
-      call new_contact_populations(all, parameters, resolution, population, packet, error)
-      call move_alloc(all, simulation%contacts)
-   case default
-      call raise(error, status_invalid, "unknown engine")
-   end select
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-      return
-   end if
+   call report(error, status, message)
+end subroutine set_contacts
 
-   select case (slider_kind)
-   case (kind_rigid)
-      allocate (simulation%slider, source=slider_rigid_type(mass=mass, stiffness=spring, &
-         & damping=damping))
-   case (kind_prescribed)
-      allocate (simulation%slider, source=slider_prescribed_type())
-   case (kind_layered)
-      allocate (elastic)
-      elastic%parameters = layered_parameters_type(layers=layers, mass=mass, stiffness=spring, &
-         & damping=layer_damping, base_mass=base(1), base_stiffness=base(2), &
-         & base_damping=base(3), solver=solver, relative=tolerances(1), absolute=tolerances(2))
-      call elastic%attach(layer_state)
-      call move_alloc(elastic, simulation%slider)
-   case (kind_quasistatic)
-      allocate (simulation%slider, source=slider_quasistatic_type(stiffness=spring))
-   case (kind_force)
-      allocate (simulation%slider, source=slider_quasistatic_type())
-      simulation%under_force = .true.
-   case default
-      status = status_invalid
-      message = "unknown kind of slider"
-      return
-   end select
-   simulation%stage_end = stage_end
-   simulation%stage_velocity = stage_velocity
-   recorder_parameters%interval = interval
-   recorder_parameters%slip_interval = slip_interval
-   recorder_parameters%slip_velocity = slip_velocity
-   recorder_parameters%quiet_time = quiet_time
-   recorder_parameters%duration = stage_end(stages)
-   recorder_parameters%contacts = count
-   simulation%recorder%parameters = recorder_parameters
-   call simulation%recorder%attach(trace, slip_trace, slips, layer_trace)
-
-   simulation%avalanches%parameters%least_size = least_avalanche
-   simulation%avalanches%parameters%snapshot_size = snapshot_size
-   if (most_avalanches > 0) simulation%avalanches%parameters%most_avalanches = most_avalanches
-   call simulation%avalanches%attach(avalanches, snapshot_place, snapshot, snapshot_time)
-
-   archive%reals = state_real
-   archive%integers = state_integer
-   if (started /= 0) then
-      call simulation%exchange(archive)
-   else
-      call simulation%start(initial)
-   end if
-
-   call simulation%run(most_advances, error)
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-   end if
-
-   time = simulation%slider%time
-   breaks = simulation%contacts%breaks
-   detached_count = simulation%contacts%detached_count
-   advances = simulation%advances
-   energy = simulation%energy_balance()
-   ending = simulation%ending
-   avalanche_total = simulation%avalanches%avalanches
-   avalanche_slip = simulation%avalanches%slip
-   displacement = simulation%slider%origin + simulation%slider%displacement
-   if (.not. simulation%contacts%has_room()) full = 1
-   rows = [simulation%recorder%trace_count, simulation%recorder%slip_trace_count, &
-      & simulation%recorder%slip_count, simulation%avalanches%avalanche_count, &
-      & simulation%avalanches%snapshot_count]
-   archive = archive_type(reals=state_real, integers=state_integer, saving=.true.)
-   call simulation%exchange(archive)
-   state_real = archive%reals
-   state_integer = archive%integers
-   integrator = simulation%slider%integrator_counts()
-   call simulation%slider%close()
-end subroutine run_segment
-
-!> Sizes of the state of a run.
-subroutine state_sizes(reals, integers)
+!> Give a simulation its slider.
+subroutine set_slider(handle, kind, length, names, values, status, message)
    !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
+   use mesoslip_simulation, only: simulation_type
+   use mesoslip_sliders, only: make_slider
    implicit none
-   integer, intent(out) :: reals, integers
+   integer(8), intent(in) :: handle(2)
+   !> Kind of the slider, and what it is made of, each number by its name
+   character(len=*), intent(in) :: kind
+   integer, intent(in) :: length
+   character(len=32), intent(in) :: names(length)
+   real(8), intent(in) :: values(length)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
 
-   reals = 96
-   integers = 48
-end subroutine state_sizes
+   type(simulation_type), pointer :: simulation
+   type(parameters_type) :: parameters
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      call new_parameters(parameters, names, values)
+      call make_slider(simulation%slider, kind, parameters, error)
+   end if
+   call report(error, status, message)
+end subroutine set_slider
+
+!> Give a simulation the stages of its drive.
+subroutine set_drive(handle, stages, stage_end, stage_velocity, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of stages; when each ends [s], and the velocity of the drive in it [m/s]
+   integer, intent(in) :: stages
+   real(8), intent(in) :: stage_end(stages), stage_velocity(stages)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      simulation%stage_end = stage_end
+      simulation%stage_velocity = stage_velocity
+   end if
+   call report(error, status, message)
+end subroutine set_drive
+
+!> Tell a simulation, which has its contacts, what to record of the motion.
+subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &
+   & layers, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_recording_recorder, only: recorder_parameters_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Interval of the trace, and of the finer traces, 0 for none [s]
+   real(8), intent(in) :: interval, slip_interval
+   !> Velocity above the drive's that makes a slip [m/s], 0 for none; half a period of the setup,
+   !> duration of the run [s]
+   real(8), intent(in) :: slip_velocity, quiet_time, duration
+   !> Layers whose displacements go with the trace
+   integer, intent(in) :: layers
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      if (allocated(simulation%contacts)) then
+         call simulation%recorder%open(recorder_parameters_type(interval=interval, &
+            & slip_interval=slip_interval, slip_velocity=slip_velocity, quiet_time=quiet_time, &
+            & duration=duration, contacts=simulation%contacts%parameters%count, layers=layers))
+      else
+         call raise(error, status_invalid, "contacts come before what is recorded of them")
+      end if
+   end if
+   call report(error, status, message)
+end subroutine set_recorder
+
+!> Tell a simulation, which has its contacts, what to record of avalanches.
+subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, snapshots, &
+   & snapshot_time, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_recording_avalanches, only: avalanche_parameters_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Least sizes of avalanches in the catalogue and with a snapshot, 0 for none
+   real(8), intent(in) :: least_size, snapshot_size
+   !> Avalanches after which the run is over, 0 for any number
+   integer(8), intent(in) :: most_avalanches
+   !> Times of snapshots [s]
+   integer, intent(in) :: snapshots
+   real(8), intent(in) :: snapshot_time(snapshots)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(avalanche_parameters_type) :: parameters
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      parameters%least_size = least_size
+      parameters%snapshot_size = snapshot_size
+      if (most_avalanches > 0) parameters%most_avalanches = most_avalanches
+      if (allocated(simulation%contacts)) then
+         call simulation%avalanches%open(parameters, snapshot_time, simulation%contacts%followed())
+      else
+         call raise(error, status_invalid, "contacts come before what is recorded of them")
+      end if
+   end if
+   call report(error, status, message)
+end subroutine set_avalanches
+
+!> Start a simulation that has all its parts.
+subroutine start_simulation(handle, initial, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Code of the initial state of the contacts
+   integer, intent(in) :: initial
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%start(initial)
+   call report(error, status, message)
+end subroutine start_simulation
+
+!> Go on for some advances or some work, or until much waits to be drained, or until the end.
+subroutine advance_simulation(handle, most_advances, most_work, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Largest number of advances; work in units of an advance of a rigid slider
+   integer(8), intent(in) :: most_advances
+   real(8), intent(in) :: most_work
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%run(most_advances, most_work, error)
+   call report(error, status, message)
+end subroutine advance_simulation
+
+!> How far a simulation has come.
+subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, avalanche_slip, &
+   & advances, avalanches, integrator, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Why the run is over, 0 if it is not
+   integer, intent(out) :: ending
+   !> Time [s], displacement of the slider [m], breaks so far, contacts that are detached, slip in
+   !> avalanches [m]
+   real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip
+   !> Advances and avalanches so far; steps, evaluations and failed steps of the integrator
+   integer(8), intent(out) :: advances, avalanches, integrator(3)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   ending = 0
+   time = 0.0d0
+   displacement = 0.0d0
+   breaks = 0.0d0
+   detached = 0.0d0
+   avalanche_slip = 0.0d0
+   advances = 0
+   avalanches = 0
+   integrator = 0
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) then
+      ending = simulation%ending
+      time = simulation%slider%time
+      displacement = simulation%slider%origin + simulation%slider%displacement
+      breaks = simulation%contacts%breaks
+      detached = simulation%contacts%detached_count
+      avalanche_slip = simulation%avalanches%slip
+      advances = simulation%advances
+      avalanches = simulation%avalanches%avalanches
+      integrator = simulation%slider%integrator_counts
+   end if
+   call report(error, status, message)
+end subroutine ask_simulation
+
+!> Terms of the energy balance of a simulation.
+subroutine ask_energy(handle, energy, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Work of the drive; energy of the slider and its spring, of the contacts; losses by damping, by
+   !> drag, by breaking; gain by attaching; what the balance lacks [J]
+   real(8), intent(out) :: energy(8)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   energy = 0.0d0
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) energy = simulation%energy_balance()
+   call report(error, status, message)
+end subroutine ask_energy
+
+!> What each contact is: origin [m], stiffness [N/m], breaking stretch [m], renewals.
+subroutine ask_contacts(handle, count, values, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of contacts
+   integer, intent(in) :: count
+   !> Stiffness is 0 while a contact is detached
+   real(8), intent(out) :: values(4, count)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   values = 0.0d0
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) then
+      if (simulation%contacts%followed() == count) then
+         call simulation%contacts%records(values)
+      else
+         call raise(error, status_invalid, "contacts are not followed one by one, or not as many")
+      end if
+   end if
+   call report(error, status, message)
+end subroutine ask_contacts
+
+!> Rows of a table that wait to be drained.
+subroutine count_rows(handle, table, columns, rows, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_recording_buffer, only: buffer_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Name of the table
+   character(len=*), intent(in) :: table
+   !> Numbers in a row, and rows
+   integer, intent(out) :: columns, rows
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(buffer_type), pointer :: buffer
+   type(error_type), allocatable :: error
+
+   columns = 0
+   rows = 0
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) then
+      buffer => simulation%table(table)
+      if (associated(buffer)) then
+         columns = size(buffer%row, 1)
+         rows = simulation%rows_to_drain(table)
+      else
+         call raise(error, status_invalid, "unknown table '" // table // "'")
+      end if
+   end if
+   call report(error, status, message)
+end subroutine count_rows
+
+!> Take the first rows of a table away.
+subroutine drain_rows(handle, table, columns, rows, values, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Name of the table
+   character(len=*), intent(in) :: table
+   !> Numbers in a row, and rows: as many as wait or fewer
+   integer, intent(in) :: columns, rows
+   real(8), intent(inout) :: values(columns, rows)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%drain(table, values, error)
+   call report(error, status, message)
+end subroutine drain_rows
+
+!> Put the state of a simulation into an archive, which the simulation keeps until it is fetched.
+subroutine save_simulation(handle, length, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of words of the archive
+   integer(8), intent(out) :: length
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   length = 0
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%save(length, error)
+   call report(error, status, message)
+end subroutine save_simulation
+
+!> Fetch the archive that a simulation has kept.
+subroutine fetch_state(handle, length, words, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of words of the archive
+   integer(8), intent(in) :: length
+   integer(8), intent(inout) :: words(length)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%fetch(words, error)
+   call report(error, status, message)
+end subroutine fetch_state
+
+!> Go on from an archive, in a simulation that has all its parts and was not started.
+subroutine restore_simulation(handle, length, words, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> The archive
+   integer(8), intent(in) :: length
+   integer(8), intent(in) :: words(length)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%restore(words, error)
+   call report(error, status, message)
+end subroutine restore_simulation
 
 !> Thresholds, densities or survival probabilities of a threshold law.
 subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, argument, value, &

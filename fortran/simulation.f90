@@ -1,9 +1,10 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_simulation
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_errors, only: error_type, raise, status_stalled
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_avalanches, only: avalanche_recorder_type
    use mesoslip_contacts_base, only: contacts_type
    use mesoslip_sliders_base, only: slider_type
@@ -52,10 +53,14 @@ module mesoslip_simulation
       real(wp), allocatable :: stage_velocity(:)
       !> Advances of the slider so far
       integer(i8) :: advances = 0
-      !> Whether the drive is a force
-      logical :: under_force = .false.
       !> Why the run is over, an ending_ code
       integer :: ending = ending_none
+
+      !> Whether the run has been started
+      logical :: is_started = .false.
+
+      !> A state that was put away and has not been fetched
+      type(archive_type), private :: kept
 
       integer, private :: stage = 1
       !> Advances since time or displacement changed
@@ -70,10 +75,32 @@ module mesoslip_simulation
       procedure :: energy_balance
       !> Put the state into an archive or take it out
       procedure :: exchange
+      !> A table of what was recorded, rows of it that can be taken away, and taking them away
+      procedure :: table
+      procedure :: rows_to_drain
+      procedure :: drain
+      !> Put the state away, fetch it, and go on from it
+      procedure :: save
+      procedure :: fetch
+      procedure :: restore
+      !> Whether all parts are there
+      procedure :: is_whole
       procedure, private :: advance, follow, finish, is_broken, slides
    end type simulation_type
 
 contains
+
+   !> Whether all parts are there: a slider, contacts, and a drive.
+   pure function is_whole(self)
+      !> The simulation
+      class(simulation_type), intent(in) :: self
+      !> Whether they are
+      logical :: is_whole
+
+      is_whole = allocated(self%slider) .and. allocated(self%contacts) &
+         & .and. allocated(self%stage_end) .and. allocated(self%recorder%trace%row) &
+         & .and. allocated(self%avalanches%catalogue%row)
+   end function is_whole
 
    !> Prepare the start of a run: contacts drawn, slider at rest and in balance.
    subroutine start(self, initial)
@@ -82,6 +109,7 @@ contains
       !> Initial state of the contacts, an initial_ code of the ensemble
       integer, intent(in) :: initial
 
+      self%is_started = .true.
       call self%contacts%initialize(initial)
       call self%slider%drive(self%stage_velocity(1))
       call self%slider%start(self%contacts%law())
@@ -96,25 +124,32 @@ contains
       call self%avalanches%see_advance(self%slider, self%contacts)
    end subroutine start
 
-   !> Go on for some advances, or until the recorder is full, or until the end.
-   subroutine run(self, most_advances, error)
+   !> Go on for some advances or some work, or until much waits to be taken away, or until the end.
+   subroutine run(self, most_advances, most_work, error)
       !> The simulation
       class(simulation_type), intent(inout) :: self
       !> Number of advances of the slider
       integer(i8), intent(in) :: most_advances
+      !> Work, in units of an advance of a rigid slider or a contact that breaks
+      real(wp), intent(in) :: most_work
       !> Set if the motion makes no progress
       type(error_type), allocatable, intent(out) :: error
 
       integer(i8) :: last
-      real(wp) :: time, displacement, most_breaks
+      real(wp) :: time, displacement, most_breaks, work
 
       ! One advance may break very many contacts, and a segment must not last for minutes.
       last = self%advances + most_advances
-      most_breaks = self%contacts%breaks + real(most_advances, wp)
-      do while (self%advances < last .and. self%contacts%breaks <= most_breaks)
+      most_breaks = self%contacts%breaks + most_work
+      work = 0.0_wp
+      do
          if (self%ending /= ending_none) exit
-         if (.not. (self%recorder%has_room() .and. self%contacts%has_room() &
-            & .and. self%avalanches%has_room())) exit
+         if (self%slider%can_pause) then
+            if (self%advances >= last .or. work >= most_work) exit
+            if (self%contacts%breaks > most_breaks) exit
+            if (self%recorder%is_full() .or. self%avalanches%is_full()) exit
+         end if
+         work = work + self%slider%cost + self%contacts%cost
          time = self%slider%time
          displacement = self%slider%displacement
          call self%advance(last, most_breaks)
@@ -221,7 +256,7 @@ contains
       class(simulation_type), intent(in) :: self
       logical :: slides
 
-      slides = self%under_force &
+      slides = self%slider%under_force &
          & .and. self%avalanches%size > most_lives * self%contacts%parameters%count
    end function slides
 
@@ -291,16 +326,146 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      call archive%section("simulation")
+      call archive%exchange("stage", self%stage)
+      call archive%exchange("idle", self%idle)
+      call archive%exchange("start_energy", self%start_energy)
+      call archive%exchange("advances", self%advances)
+      call archive%exchange("ending", self%ending)
+      call archive%exchange("is_started", self%is_started)
       call self%slider%exchange(archive)
       call self%contacts%exchange(archive)
       call self%recorder%exchange(archive)
-      call archive%exchange(self%stage)
-      call archive%exchange(self%idle)
-      call archive%exchange(self%start_energy)
-      call archive%exchange(self%advances)
-      call archive%exchange(self%ending)
       call self%avalanches%exchange(archive)
-      if (.not. archive%saving) call self%contacts%rebuild(self%slider%displacement)
+      call archive%finish()
+      if (archive%saving .or. allocated(archive%failure)) return
+      call self%contacts%rebuild(self%slider%displacement)
    end subroutine exchange
+
+   !> A table of what was recorded.
+   function table(self, name) result(buffer)
+      !> The simulation
+      class(simulation_type), intent(inout), target :: self
+      !> Its name
+      character(len=*), intent(in) :: name
+      !> The table; null if there is none of this name
+      type(buffer_type), pointer :: buffer
+
+      select case (name)
+      case ("trace")
+         buffer => self%recorder%trace
+      case ("slip_trace")
+         buffer => self%recorder%slip_trace
+      case ("slips")
+         buffer => self%recorder%slips
+      case ("layers")
+         buffer => self%recorder%layers
+      case ("avalanches")
+         buffer => self%avalanches%catalogue
+      case ("snapshot_places")
+         buffer => self%avalanches%places
+      case ("snapshots")
+         buffer => self%avalanches%snapshots
+      case default
+         buffer => null()
+      end select
+   end function table
+
+   !> Rows of a table that can be taken away.
+   function rows_to_drain(self, name) result(rows)
+      !> The simulation
+      class(simulation_type), intent(inout), target :: self
+      !> Name of the table
+      character(len=*), intent(in) :: name
+      !> Their number
+      integer :: rows
+
+      type(buffer_type), pointer :: buffer
+
+      buffer => self%table(name)
+      rows = 0
+      if (associated(buffer)) rows = buffer%count
+      if (name == "slip_trace") rows = self%recorder%final_slip_samples()
+   end function rows_to_drain
+
+   !> Take the first rows of a table away.
+   subroutine drain(self, name, values, error)
+      !> The simulation
+      class(simulation_type), intent(inout), target :: self
+      !> Name of the table
+      character(len=*), intent(in) :: name
+      !> The rows, shape (numbers in a row, rows)
+      real(wp), intent(inout) :: values(:, :)
+      !> Set if there is no such table, or it has not as many rows, or others
+      type(error_type), allocatable, intent(out) :: error
+
+      type(buffer_type), pointer :: buffer
+      integer :: rows
+
+      buffer => self%table(name)
+      rows = self%rows_to_drain(name)
+      if (.not. associated(buffer)) then
+         call raise(error, status_invalid, "unknown table '" // name // "'")
+      else if (size(values, 1) /= size(buffer%row, 1) .or. size(values, 2) > rows) then
+         call raise(error, status_invalid, "the table '" // name // "' has other rows")
+      else if (name == "slip_trace") then
+         call self%recorder%drain_slip_trace(values)
+      else
+         call buffer%drain(values)
+      end if
+   end subroutine drain
+
+   !> Put the state away.
+   subroutine save(self, length, error)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> Words of the state
+      integer(i8), intent(out) :: length
+      !> Set if the run cannot be taken up from here
+      type(error_type), allocatable, intent(out) :: error
+
+      self%kept = archive_type(saving=.true.)
+      call self%exchange(self%kept)
+      length = self%kept%length
+      if (allocated(self%kept%failure)) error = self%kept%failure
+   end subroutine save
+
+   !> Fetch the state that was put away; it is forgotten.
+   subroutine fetch(self, words, error)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> The state, as many words as it has
+      integer(i8), intent(inout) :: words(:)
+      !> Set if there is none, or one of another length
+      type(error_type), allocatable, intent(out) :: error
+
+      if (size(words, kind=i8) == self%kept%length .and. self%kept%length > 0) then
+         words = self%kept%word(:self%kept%length)
+         self%kept = archive_type()
+      else
+         call raise(error, status_invalid, "no state of this length was put away")
+      end if
+   end subroutine fetch
+
+   !> Go on from a state that was put away.
+   subroutine restore(self, words, error)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> The state
+      integer(i8), intent(in) :: words(:)
+      !> Set if the state is of another simulation, or damaged
+      type(error_type), allocatable, intent(out) :: error
+
+      type(archive_type) :: archive
+
+      if (self%is_started) then
+         call raise(error, status_invalid, "the simulation has been started already")
+         return
+      end if
+      archive%word = words
+      archive%length = size(words, kind=i8)
+      call self%exchange(archive)
+      if (allocated(archive%failure)) error = archive%failure
+   end subroutine restore
 
 end module mesoslip_simulation

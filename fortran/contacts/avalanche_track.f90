@@ -2,10 +2,11 @@
 !> they reach.
 module mesoslip_contacts_avalanche_track
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    implicit none
    private
 
-   public :: avalanche_track_type
+   public :: avalanche_track_type, new_avalanche_track
    public :: track_length, row_generation, row_member
 
    !> Numbers kept for a contact
@@ -26,8 +27,8 @@ module mesoslip_contacts_avalanche_track
       integer :: area = 0
       !> Number of the present generation
       integer :: generation = 0
-      !> State of the track, an array of the caller, shape (track_length, count)
-      integer, pointer, contiguous :: contact(:, :) => null()
+      !> State of the track, shape (track_length, count); without a lattice there is none
+      integer, allocatable :: contact(:, :)
    contains
       !> A contact breaks
       procedure :: add
@@ -40,6 +41,27 @@ module mesoslip_contacts_avalanche_track
    end type avalanche_track_type
 
 contains
+
+   !> Set up a track without an avalanche.
+   subroutine new_avalanche_track(self, columns, rows, error)
+      !> The track
+      type(avalanche_track_type), intent(out) :: self
+      !> Columns and rows of the lattice; no columns when contacts are not on one
+      integer, intent(in) :: columns, rows
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: stat
+
+      self%columns = columns
+      self%rows = rows
+      allocate (self%contact(track_length, columns * rows), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the avalanches of contacts")
+         return
+      end if
+      self%contact = 0
+   end subroutine new_avalanche_track
 
    !> A contact breaks; if it breaks again in the same avalanche it keeps its generation.
    pure subroutine add(self, contact)
@@ -127,15 +149,16 @@ contains
       self%generation = 0
    end subroutine clear
 
-   !> Put the state into an archive or take it out; the array of the caller is the rest of it.
+   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The track
       class(avalanche_track_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%area)
-      call archive%exchange(self%generation)
+      call archive%exchange("area", self%area)
+      call archive%exchange("generation", self%generation)
+      call archive%exchange("track", self%contact)
    end subroutine exchange
 
 end module mesoslip_contacts_avalanche_track

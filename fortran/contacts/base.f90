@@ -7,20 +7,25 @@ module mesoslip_contacts_base
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_contacts_mechanics, only: coupling_scaled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_contacts_threshold_law, only: threshold_law_type
+   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
    implicit none
    private
 
    public :: contacts_type, contact_parameters_type
-   public :: extent_length, snapshot_length
+   public :: take_contact_parameters, exchange_contacts
+   public :: extent_length, snapshot_length, contact_record_length
 
    !> Numbers of an avalanche's extent: contacts that broke, columns and rows around them,
    !> generations
    integer, parameter :: extent_length = 4
    !> Numbers of a contact in a snapshot: stretch, force over threshold, generation
    integer, parameter :: snapshot_length = 3
+   !> Numbers that tell what a contact is: origin [m], stiffness [N/m], 0 while it is detached,
+   !> breaking stretch [m], number of renewals
+   integer, parameter :: contact_record_length = 4
 
    !> What the contacts are made of.
    type :: contact_parameters_type
@@ -54,6 +59,8 @@ module mesoslip_contacts_base
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
+      !> Cost of a response over that of one contact that breaks
+      real(wp) :: cost = 1.0_wp
       !> Set when the contacts cannot go on
       type(error_type), allocatable :: failure
    contains
@@ -65,20 +72,22 @@ module mesoslip_contacts_base
       procedure(offer_interface), deferred :: offer
       !> Break and attach contacts after a motion of the slider
       procedure(respond_interface), deferred :: respond
-      !> Whether the caller's arrays have room for one more step
-      procedure(has_room_interface), deferred :: has_room
       !> Move the origin of displacements
       procedure(shift_origin_interface), deferred :: shift_origin
       !> Elastic energy of the pinned contacts
       procedure(elastic_energy_interface), deferred :: elastic_energy
-      !> Put the state into an archive or take it out; the arrays of the caller are the rest of it
+      !> Put the state into an archive or take it out
       procedure(exchange_interface), deferred :: exchange
       !> Make anew what is derived from the state, after it was taken from an archive
       procedure(rebuild_interface), deferred :: rebuild
       !> Extent of the avalanche that is over; it is forgotten
       procedure :: take_extent
+      !> Number of contacts that are followed one by one
+      procedure :: followed
       !> How the contacts are
       procedure :: snapshot
+      !> What each contact is
+      procedure :: records
    end type contacts_type
 
    abstract interface
@@ -125,16 +134,6 @@ module mesoslip_contacts_base
          !> Where the slider was when it was offered a law, and where it is
          type(pose_type), intent(in) :: before, after
       end subroutine respond_interface
-
-      !> Whether the caller's arrays have room for one more step.
-      pure function has_room_interface(self) result(has_room)
-         import :: contacts_type
-         implicit none
-         !> The contacts
-         class(contacts_type), intent(in) :: self
-         !> Whether they can respond once more
-         logical :: has_room
-      end function has_room_interface
 
       !> Move the origin of displacements.
       subroutine shift_origin_interface(self, shift, displacement)
@@ -193,6 +192,16 @@ contains
       extent = 0
    end subroutine take_extent
 
+   !> Number of contacts that are followed one by one: none unless a kind of contacts says so.
+   pure function followed(self) result(number)
+      !> The contacts
+      class(contacts_type), intent(in) :: self
+      !> Their number, which is that of the columns of snapshot and records
+      integer :: number
+
+      number = 0
+   end function followed
+
    !> How the contacts are; nothing for contacts that are not followed one by one.
    pure subroutine snapshot(self, displacement, values)
       !> The contacts
@@ -204,5 +213,59 @@ contains
 
       values = 0.0_wp
    end subroutine snapshot
+
+   !> What each contact is; nothing for contacts that are not followed one by one.
+   pure subroutine records(self, values)
+      !> The contacts
+      class(contacts_type), intent(in) :: self
+      !> Numbers in the order of contact_record_length, shape (contact_record_length, followed)
+      real(wp), intent(out) :: values(:, :)
+
+      values = 0.0_wp
+   end subroutine records
+
+   !> Put what all kinds of contacts keep into an archive, or take it out.
+   subroutine exchange_contacts(self, archive)
+      !> The contacts
+      class(contacts_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange("detached_count", self%detached_count)
+      call archive%exchange("breaks", self%breaks)
+      call archive%exchange("break_loss", self%break_loss)
+      call archive%exchange("birth_gain", self%birth_gain)
+      call archive%exchange("cost", self%cost)
+   end subroutine exchange_contacts
+
+   !> Take what all kinds of contacts are made of.
+   subroutine take_contact_parameters(self, parameters, seed, realization, error)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(out) :: self
+      !> Named numbers
+      type(parameters_type), intent(inout) :: parameters
+      !> Key of the random numbers
+      integer(i8), intent(in) :: seed, realization
+      !> Set if a number is missing, or the law of thresholds is none
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: law
+      real(wp) :: width
+
+      self%seed = seed
+      self%realization = realization
+      call parameters%take("count", self%count, error)
+      call parameters%take("static_force", self%static_force, error)
+      call parameters%take("stiffness", self%stiffness, error)
+      call parameters%take("drag", self%drag, error)
+      call parameters%take("delay", self%delay, error)
+      call parameters%take("back_force_ratio", self%back_force_ratio, error)
+      call parameters%take("coupling", self%coupling, error)
+      call parameters%take("reattach", self%reattach, error)
+      call parameters%take("law", law, error)
+      call parameters%take("relative_width", width, error)
+      if (allocated(error)) return
+      call new_threshold_law(self%law, law, width, self%back_force_ratio, error)
+   end subroutine take_contact_parameters
 
 end module mesoslip_contacts_base

@@ -6,17 +6,17 @@ module mesoslip_contacts_ensemble
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_contacts_base, only: contact_parameters_type
-   use mesoslip_contacts_set, only: contact_arrays_type, contact_set_type, exchange_set, &
-      & law_set
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
+   use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set
    use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate, behind_coordinate
    use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
    implicit none
    private
 
-   public :: contact_ensemble_type, new_contact_ensemble
+   public :: contact_ensemble_type, new_contact_ensemble, make_contact_ensemble
 
    !> A probability too small to meet among the keys of a ring of buckets.
    real(wp), parameter :: rare = 1.0e-4_wp
@@ -41,26 +41,50 @@ module mesoslip_contacts_ensemble
 
 contains
 
-   !> Set up an ensemble on arrays of the caller.
-   subroutine new_contact_ensemble(self, parameters, arrays, error)
+   !> Set up an ensemble.
+   subroutine new_contact_ensemble(self, parameters, columns, rows, error)
       !> The ensemble
       type(contact_ensemble_type), intent(out) :: self
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters
-      !> Arrays for the state
-      type(contact_arrays_type), intent(in) :: arrays
+      !> Columns and rows of a lattice on which contacts have places; no columns for none
+      integer, intent(in) :: columns, rows
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: longest
 
       self%parameters = parameters
-      self%arrays = arrays
+      call self%allocate_records(columns, rows, error)
+      if (allocated(error)) return
       ! A contact attached while the slider moves back has the back force to lose as well.
       longest = parameters%static_force / parameters%stiffness &
          & * max(parameters%law%quantile(rare), 1.0_wp) * (1.0_wp + parameters%back_force_ratio)
       call new_contact_queue(self%queue, parameters%count, 1.1_wp * longest, error)
    end subroutine new_contact_ensemble
+
+   !> Set up an ensemble from named numbers.
+   subroutine make_contact_ensemble(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: columns and rows
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_ensemble_type), allocatable :: ensemble
+      integer :: columns, rows
+
+      call parameters%take("columns", columns, error)
+      call parameters%take("rows", rows, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      allocate (ensemble)
+      call new_contact_ensemble(ensemble, common, columns, rows, error)
+      call move_alloc(ensemble, contacts)
+   end subroutine make_contact_ensemble
 
    !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
@@ -110,8 +134,8 @@ contains
       back_force = after%sense * self%parameters%back_force_ratio * self%parameters%static_force
       do while (self%next_attachment <= after%time)
          call self%take_hold(after%displacement, back_force, 0.0_wp, contact)
-         origin = self%arrays%record(row_origin, contact)
-         limit = self%arrays%record(row_limit, contact)
+         origin = self%record(row_origin, contact)
+         limit = self%record(row_limit, contact)
          call self%queue%insert(contact, self%direction * origin + limit)
          self%behind = max(self%behind, self%direction * origin - limit)
       end do
@@ -133,7 +157,7 @@ contains
       if (self%queue%first_key > self%direction * displacement) return
       self%track%generation = self%track%generation + 1
       do while (self%queue%first_key <= self%direction * displacement)
-         call self%queue%pop(self%arrays%record, contact)
+         call self%queue%pop(self%record, contact)
          call self%let_go(contact, displacement, time)
       end do
    end subroutine break_due
@@ -173,9 +197,9 @@ contains
 
       call self%queue%clear(self%direction, self%direction * displacement)
       do contact = 1, self%parameters%count
-         if (self%arrays%record(row_stiffness, contact) > 0.0_wp) then
+         if (self%record(row_stiffness, contact) > 0.0_wp) then
             call self%queue%insert(contact, &
-               & ahead_coordinate(self%arrays%record(:, contact), self%direction))
+               & ahead_coordinate(self%record(:, contact), self%direction))
          end if
       end do
    end subroutine rebuild
@@ -189,23 +213,24 @@ contains
 
       coordinate = -huge(1.0_wp)
       do contact = 1, self%parameters%count
-         if (self%arrays%record(row_stiffness, contact) > 0.0_wp) then
+         if (self%record(row_stiffness, contact) > 0.0_wp) then
             coordinate = max(coordinate, &
-               & behind_coordinate(self%arrays%record(:, contact), self%direction))
+               & behind_coordinate(self%record(:, contact), self%direction))
          end if
       end do
    end function farthest_behind
 
-   !> Put the state into an archive or take it out; the arrays of the caller are the rest of it.
+   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      call archive%section("contact ensemble")
       call exchange_set(self, archive)
-      call archive%exchange(self%behind)
-      call archive%exchange(self%direction)
+      call archive%exchange("behind", self%behind)
+      call archive%exchange("direction", self%direction)
    end subroutine exchange
 
 end module mesoslip_contacts_ensemble

@@ -7,19 +7,20 @@
 module mesoslip_contacts_lattice
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory, &
       & status_stalled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts_break_tree, only: break_tree_type, new_break_tree
-   use mesoslip_contacts_base, only: contact_parameters_type
-   use mesoslip_contacts_set, only: contact_arrays_type, contact_set_type, law_set, &
-      & snapshot_set
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
+   use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set, snapshot_set
    use mesoslip_contacts_record, only: record_length, row_limit, row_origin, row_stiffness
    use mesoslip_contacts_neighbours, only: coordination, find_neighbours
    implicit none
    private
 
-   public :: contact_lattice_type, interaction_type, new_contact_lattice
+   public :: contact_lattice_type, interaction_type, new_contact_lattice, make_contact_lattice
 
    !> Breaks of each contact in one cascade, on average, beyond which it is taken to have no end.
    real(wp), parameter :: most_lives = 1000.0_wp
@@ -50,36 +51,35 @@ module mesoslip_contacts_lattice
       procedure :: shift_origin
       procedure :: rebuild
       procedure :: snapshot
+      procedure :: exchange
       procedure, private, non_overridable :: cascade, attach_due, refresh, refresh_neighbours
    end type contact_lattice_type
 
 contains
 
-   !> Set up contacts on a lattice, on arrays of the caller.
-   subroutine new_contact_lattice(self, parameters, interaction, arrays, error)
+   !> Set up contacts on a lattice.
+   subroutine new_contact_lattice(self, parameters, interaction, error)
       !> The contacts
       type(contact_lattice_type), intent(out) :: self
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters
       !> How they act on each other
       type(interaction_type), intent(in) :: interaction
-      !> Arrays for the state
-      type(contact_arrays_type), intent(in) :: arrays
       !> Set if the lattice does not hold as many contacts, or there is not enough memory
       type(error_type), allocatable, intent(out) :: error
 
       integer :: neighbours, stat
 
       neighbours = coordination(interaction%lattice)
-      if (neighbours == 0 .or. interaction%columns * interaction%rows /= parameters%count) then
-         call raise(error, status_invalid, "columns times rows of the lattice must be the number " &
-            & // "of contacts")
+      if (neighbours == 0 .or. interaction%columns < 1) then
+         call raise(error, status_invalid, "unknown lattice")
          return
       end if
       self%parameters = parameters
-      self%arrays = arrays
       self%bond = interaction%bond
       self%bonds = real(neighbours, wp) * interaction%bond
+      call self%allocate_records(interaction%columns, interaction%rows, error)
+      if (allocated(error)) return
       allocate (self%neighbour(neighbours, parameters%count), stat=stat)
       if (stat == 0) allocate (self%generation(parameters%count), stat=stat)
       if (stat /= 0) then
@@ -90,6 +90,31 @@ contains
          & self%neighbour)
       call new_break_tree(self%tree, parameters%count, error)
    end subroutine new_contact_lattice
+
+   !> Set up contacts on a lattice from named numbers.
+   subroutine make_contact_lattice(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: bond, lattice, columns and rows
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_lattice_type), allocatable :: lattice
+      type(interaction_type) :: interaction
+
+      call parameters%take("bond", interaction%bond, error)
+      call parameters%take("lattice", interaction%lattice, error)
+      call parameters%take("columns", interaction%columns, error)
+      call parameters%take("rows", interaction%rows, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      allocate (lattice)
+      call new_contact_lattice(lattice, common, interaction, error)
+      call move_alloc(lattice, contacts)
+   end subroutine make_contact_lattice
 
    !> Draw all contacts for the start of a run, and let go those that cannot bear their neighbours.
    subroutine initialize(self, state)
@@ -185,10 +210,10 @@ contains
 
       back_force = sense * self%parameters%back_force_ratio * self%parameters%static_force
       do while (self%next_attachment <= time)
-         contact = self%arrays%detached_contact(self%first_detached + 1)
+         contact = self%detached_contact(self%first_detached + 1)
          pull = 0.0_wp
          do side = 1, size(self%neighbour, 1)
-            associate (record => self%arrays%record(:, self%neighbour(side, contact)))
+            associate (record => self%record(:, self%neighbour(side, contact)))
                if (record(row_stiffness) > 0.0_wp) pull = pull + (displacement - record(row_origin))
             end associate
          end do
@@ -206,10 +231,10 @@ contains
       ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
       if (size(self%neighbour, 1) == 6) then
          call refresh_all(self%neighbour(:, contact), 6, self%parameters%count, &
-            & self%arrays%record, self%neighbour, self%bond, self%tree)
+            & self%record, self%neighbour, self%bond, self%tree)
       else
          call refresh_all(self%neighbour(:, contact), 4, self%parameters%count, &
-            & self%arrays%record, self%neighbour, self%bond, self%tree)
+            & self%record, self%neighbour, self%bond, self%tree)
       end if
    end subroutine refresh_neighbours
 
@@ -220,7 +245,7 @@ contains
 
       real(wp) :: centre, limit
 
-      call bearing(contact, size(self%neighbour, 1), self%parameters%count, self%arrays%record, &
+      call bearing(contact, size(self%neighbour, 1), self%parameters%count, self%record, &
          & self%neighbour, self%bond, centre, limit)
       call self%tree%set(contact, centre + limit, centre - limit)
    end subroutine refresh
@@ -296,9 +321,9 @@ contains
 
       call self%tree%clear()
       do contact = 1, self%parameters%count
-         if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
-            & self%arrays%record, self%neighbour, self%bond, centre, limit)
+            & self%record, self%neighbour, self%bond, centre, limit)
          call self%tree%put(contact, centre + limit, centre - limit)
       end do
       call self%tree%arrange()
@@ -319,11 +344,22 @@ contains
 
       call snapshot_set(self, displacement, values)
       do contact = 1, self%parameters%count
-         if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
-            & self%arrays%record, self%neighbour, self%bond, centre, limit)
+            & self%record, self%neighbour, self%bond, centre, limit)
          values(2, contact) = (displacement - centre) / limit
       end do
    end subroutine snapshot
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The contacts
+      class(contact_lattice_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("contact lattice")
+      call exchange_set(self, archive)
+   end subroutine exchange
 
 end module mesoslip_contacts_lattice

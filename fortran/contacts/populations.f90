@@ -12,16 +12,16 @@ module mesoslip_contacts_populations
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
       & initial_steady, initial_uniform
-   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
    implicit none
    private
 
-   public :: contact_populations_type, new_contact_populations
-   public :: population_length, packet_length
+   public :: contact_populations_type, new_contact_populations, make_contact_populations
 
    !> Moments of the thresholds of a population's pinned contacts: their number, stiffness, one over
    !> it, twice the energy that they lose in breaking, and mass.
@@ -60,6 +60,10 @@ module mesoslip_contacts_populations
    real(wp), parameter :: longest_time = 1.0e30_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: shortest_even = 0.02_wp
+   !> Populations and packets for which there is room at first
+   integer, parameter :: first_places = 64
+   !> Populations whose work is that of one contact that breaks
+   real(wp), parameter :: populations_per_cost = 16.0_wp
    !> A gap that counts as none, over the length of a step.
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
@@ -100,41 +104,39 @@ module mesoslip_contacts_populations
       real(wp), private :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
       !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
       type(partial_moments_type), private :: moments(2)
-      real(wp), pointer, contiguous, private :: population(:, :) => null()
-      real(wp), pointer, contiguous, private :: packet(:, :) => null()
+      !> Populations, shape (places, population_length), as many as are in use or more
+      real(wp), allocatable, private :: population(:, :)
+      !> Packets of detached contacts, shape (packet_length, places)
+      real(wp), allocatable, private :: packet(:, :)
    contains
       procedure :: initialize
       procedure :: law
       procedure :: offer
       procedure :: respond
-      procedure :: has_room
       procedure :: shift_origin
       procedure :: elastic_energy
       procedure :: exchange
       procedure :: rebuild
-      procedure, private :: add_population, bear, try, break_tried
+      !> Number of contacts that are pinned
+      procedure :: pinned
+      procedure, private :: add_population, bear, try, break_tried, make_room, make_room_for_packets
       procedure, private :: expect, attach_due
    end type contact_populations_type
 
 contains
 
-   !> Set up populations on arrays of the caller.
-   subroutine new_contact_populations(self, parameters, resolution, population, packet, error)
+   !> Set up populations.
+   subroutine new_contact_populations(self, parameters, resolution, error)
       !> The populations
       type(contact_populations_type), intent(out) :: self
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters
       !> Length of a step over the spread of the breaking stretches, positive
       real(wp), intent(in) :: resolution
-      !> Populations, shape (capacity, population_length)
-      real(wp), intent(inout), target, contiguous :: population(:, :)
-      !> Packets of detached contacts, shape (packet_length, capacity)
-      real(wp), intent(inout), target, contiguous :: packet(:, :)
       !> Set if the resolution is not positive
       type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: exponent(moments_length), one_over_stretch, all(moments_length)
-      integer :: capacity
 
       if (.not. resolution > 0.0_wp) then
          call raise(error, status_invalid, "the resolution of populations must be positive")
@@ -145,11 +147,8 @@ contains
       self%step = resolution * min(parameters%law%width, widest_spread) * self%stretch
       if (parameters%coupling == coupling_scaled) self%step = 0.5_wp * self%step
       self%most_attached = parameters%count * resolution * most_attached_part
-      self%population => population
-      self%packet => packet
-      capacity = size(population, 1)
-      allocate (self%trial_population(capacity), self%trial_broken(capacity))
-      allocate (self%trial_moments(moments_length, capacity))
+      allocate (self%population(first_places, population_length), source=0.0_wp)
+      allocate (self%packet(packet_length, first_places), source=0.0_wp)
 
       exponent = [0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp]
       one_over_stretch = -1.0_wp
@@ -165,6 +164,28 @@ contains
          & * parameters%static_force * self%stretch
    end subroutine new_contact_populations
 
+   !> Set up populations from named numbers.
+   subroutine make_contact_populations(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other number: resolution
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing, or the resolution is not positive
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_populations_type), allocatable :: populations
+      real(wp) :: resolution
+
+      call parameters%take("resolution", resolution, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      allocate (populations)
+      call new_contact_populations(populations, common, resolution, error)
+      call move_alloc(populations, contacts)
+   end subroutine make_contact_populations
+
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state)
       !> The populations
@@ -173,10 +194,8 @@ contains
       integer, intent(in) :: state
 
       real(wp) :: longest, total, back, cell, middle, edge, even
-      integer :: rows
 
       associate (parameters => self%parameters, moments => self%moments(1))
-         rows = size(self%population, 1)
          if (state /= initial_steady .and. state /= initial_uniform) then
             call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, 0.0_wp)
          else
@@ -186,7 +205,7 @@ contains
             edge = 0.0_wp
             even = 1.0_wp
             if (parameters%law%width > widest_spread) even = shortest_even
-            do while (edge < longest .and. self%count < rows - 1)
+            do while (edge < longest)
                ! The tails of wide laws are spread over many stretches, and smooth; many of their
                ! thresholds are small.
                cell = min(self%step / self%stretch * max(even, edge), longest - edge)
@@ -219,6 +238,7 @@ contains
 
       real(wp) :: moments(moments_length)
 
+      call self%make_room()
       self%count = self%count + 1
       call self%moments(law)%interpolate(broken, moments)
       associate (place => self%count, population => self%population)
@@ -234,6 +254,18 @@ contains
          self%behind = max(self%behind, population(place, row_behind))
       end associate
    end subroutine add_population
+
+   !> Make room for one more population.
+   subroutine make_room(self)
+      class(contact_populations_type), intent(inout) :: self
+
+      real(wp), allocatable :: larger(:, :)
+
+      if (self%count < size(self%population, 1)) return
+      allocate (larger(2 * self%count, population_length), source=0.0_wp)
+      larger(:self%count, :) = self%population
+      call move_alloc(larger, self%population)
+   end subroutine make_room
 
    !> Displacement at which contacts of a population break next in a direction.
    pure function next_break(self, place, sense) result(displacement)
@@ -397,6 +429,17 @@ contains
       row = merge(row_ahead, row_behind, sense > 0.0_wp)
       next = huge(1.0_wp)
       self%trials = 0
+      if (allocated(self%trial_population)) then
+         if (size(self%trial_population) < self%count) then
+            deallocate (self%trial_population, self%trial_broken, self%trial_moments)
+         end if
+      end if
+      if (.not. allocated(self%trial_population)) then
+         associate (places => size(self%population, 1))
+            allocate (self%trial_population(places), self%trial_broken(places))
+            allocate (self%trial_moments(moments_length, places))
+         end associate
+      end if
       self%trial_end = displacement
       self%trial_sense = sense
       self%trial_breaks = 0.0_wp
@@ -503,11 +546,7 @@ contains
          end if
          call self%break_tried()
          if (self%parameters%reattach .and. self%trial_breaks > 0.0_wp) then
-            if (self%last == size(self%packet, 2)) then
-               self%last = self%last - self%first + 1
-               self%packet(:, :self%last) = self%packet(:, self%first:)
-               self%first = 1
-            end if
+            if (self%last == size(self%packet, 2)) call self%make_room_for_packets()
             self%last = self%last + 1
             self%packet(:, self%last) = [before%time, after%time, self%trial_breaks, &
                & self%trial_mass]
@@ -515,7 +554,27 @@ contains
       end if
       if (self%first <= self%last) call self%attach_due(before, after)
       self%detached_count = self%detached_number%total()
+      self%cost = 1.0_wp + self%count / populations_per_cost
    end subroutine respond
+
+   !> Make room for one more packet: where some have attached, or in a larger array.
+   subroutine make_room_for_packets(self)
+      class(contact_populations_type), intent(inout) :: self
+
+      real(wp), allocatable :: larger(:, :)
+      integer :: waiting
+
+      waiting = self%last - self%first + 1
+      if (2 * waiting > size(self%packet, 2)) then
+         allocate (larger(packet_length, 2 * size(self%packet, 2)), source=0.0_wp)
+         larger(:, :waiting) = self%packet(:, self%first:self%last)
+         call move_alloc(larger, self%packet)
+      else
+         self%packet(:, :waiting) = self%packet(:, self%first:self%last)
+      end if
+      self%first = 1
+      self%last = waiting
+   end subroutine make_room_for_packets
 
    !> Times at which a packet attaches, from its first contact that has not yet to its last.
    pure subroutine due_times(self, place, early, late)
@@ -638,17 +697,6 @@ contains
          & + t**2 * ((1.0_wp + 2.0_wp * s) * after%displacement - s * length * after%velocity)
    end function position_at
 
-   !> Whether there is room for one more population and packet.
-   pure function has_room(self)
-      !> The populations
-      class(contact_populations_type), intent(in) :: self
-      !> Whether they can respond once more
-      logical :: has_room
-
-      has_room = self%count < size(self%population, 1) &
-         & .and. self%last - self%first + 1 < size(self%packet, 2)
-   end function has_room
-
    !> Move the origin of displacements.
    subroutine shift_origin(self, shift, displacement)
       !> The populations
@@ -665,6 +713,16 @@ contains
       end associate
       call self%bear()
    end subroutine shift_origin
+
+   !> Number of contacts that are pinned.
+   pure function pinned(self) result(total)
+      !> The populations
+      class(contact_populations_type), intent(in) :: self
+      !> Their number, in the mean of what it may be
+      real(wp) :: total
+
+      total = sum(self%population(:self%count, row_moments + number))
+   end function pinned
 
    !> Elastic energy of the pinned contacts.
    pure function elastic_energy(self, displacement) result(energy)
@@ -690,30 +748,30 @@ contains
       energy = 0.5_wp * self%parameters%static_force * self%stretch * total%total()
    end function elastic_energy
 
-   !> Put the state into an archive or take it out; the arrays of the caller are the rest of it.
+   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The populations
       class(contact_populations_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%count)
-      call archive%exchange(self%first)
-      call archive%exchange(self%last)
-      call archive%exchange(self%breaks)
-      call archive%exchange(self%detached_count)
-      call archive%exchange(self%break_loss)
-      call archive%exchange(self%birth_gain)
-      call archive%exchange(self%attached_part)
-      call archive%exchange(self%detached_number)
-      call archive%exchange(self%detached_mass)
-      call archive%exchange(self%ahead)
-      call archive%exchange(self%behind)
-      call archive%exchange(self%stiffness)
-      call archive%exchange(self%offset)
+      call archive%section("contact populations")
+      call exchange_contacts(self, archive)
+      call archive%exchange("population", self%population)
+      call archive%exchange("packet", self%packet)
+      call archive%exchange("count", self%count)
+      call archive%exchange("first", self%first)
+      call archive%exchange("last", self%last)
+      call archive%exchange("attached_part", self%attached_part)
+      call archive%exchange("detached_number", self%detached_number)
+      call archive%exchange("detached_mass", self%detached_mass)
+      call archive%exchange("ahead", self%ahead)
+      call archive%exchange("behind", self%behind)
+      call archive%exchange("stiffness", self%stiffness)
+      call archive%exchange("offset", self%offset)
    end subroutine exchange
 
-   !> Nothing is derived from the state: all of it is in the archive and the caller's arrays.
+   !> Nothing is derived from the state: all of it is in the archive.
    subroutine rebuild(self, displacement)
       !> The populations
       class(contact_populations_type), intent(inout) :: self

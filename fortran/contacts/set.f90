@@ -1,23 +1,25 @@
 !> N contacts one by one: their records and random numbers, how one lets go and takes hold.
 !>
 !> The earthquake-like model but for the order in which contacts break, which is left to those who
-!> extend it. Displacements are relative to an origin that the caller moves along. State is plain
-!> arrays owned by the caller.
+!> extend it. Displacements are relative to an origin that the caller moves along.
 module mesoslip_contacts_set
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_contacts_avalanche_track, only: avalanche_track_type, row_generation
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_contacts_avalanche_track, only: avalanche_track_type, new_avalanche_track, &
+      & row_generation
    use mesoslip_numerics_random, only: uniform_pair
    use mesoslip_interface_law, only: interface_law_type
-   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, extent_length
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts, &
+      & extent_length
    use mesoslip_contacts_mechanics, only: coupling_scaled, initial_steady, initial_uniform
-   use mesoslip_contacts_record, only: row_limit, row_next, row_origin, row_renewal, &
-      & row_stiffness
+   use mesoslip_contacts_record, only: record_length, row_limit, row_next, row_origin, &
+      & row_renewal, row_stiffness
    implicit none
    private
 
-   public :: contact_set_type, contact_arrays_type, exchange_set, law_set, snapshot_set
+   public :: contact_set_type, exchange_set, law_set, snapshot_set
    public :: detached_length
 
    !> Numbers kept for a detached contact
@@ -27,20 +29,14 @@ module mesoslip_contacts_set
    !> Its drag while it is detached [N s/m]
    integer, parameter :: row_drag = 2
 
-   !> Arrays of the caller that hold the state of the contacts.
-   type :: contact_arrays_type
-      !> Records of the contacts, shape (record_length, count)
-      real(wp), pointer, contiguous :: record(:, :) => null()
-      !> A ring of detached contacts in the order of attaching, shape (detached_length, count)
-      real(wp), pointer, contiguous :: detached(:, :) => null()
-      !> Numbers of the contacts in that ring, shape (count)
-      integer, pointer, contiguous :: detached_contact(:) => null()
-   end type contact_arrays_type
-
    !> N contacts one by one.
    type, abstract, extends(contacts_type) :: contact_set_type
-      !> State of the contacts
-      type(contact_arrays_type) :: arrays
+      !> Records of the contacts, shape (record_length, count)
+      real(wp), allocatable :: record(:, :)
+      !> A ring of detached contacts in the order of attaching, shape (detached_length, count)
+      real(wp), allocatable :: detached(:, :)
+      !> Numbers of the contacts in that ring, shape (count)
+      integer, allocatable :: detached_contact(:)
       !> Time at which the next contact attaches; huge when there is none [s]
       real(wp) :: next_attachment = huge(1.0_wp)
       !> Totals of stiffness and of stiffness times origin of the pinned, of drag of the detached
@@ -51,11 +47,13 @@ module mesoslip_contacts_set
       integer :: waiting = 0, first_detached = 0
    contains
       procedure :: law => law_set
-      procedure :: has_room
       procedure :: elastic_energy
-      procedure :: exchange => exchange_set
       procedure :: snapshot => snapshot_set
+      procedure :: followed
+      procedure :: records
       procedure :: take_extent
+      !> Make room for the contacts
+      procedure, non_overridable :: allocate_records
       !> Draw all contacts for the start of a run
       procedure, non_overridable :: draw
       !> What happens to a contact that breaks
@@ -70,6 +68,37 @@ module mesoslip_contacts_set
    end type contact_set_type
 
 contains
+
+   !> Make room for the contacts, and for their avalanches if they are on a lattice.
+   subroutine allocate_records(self, columns, rows, error)
+      !> The contacts, their parameters set
+      class(contact_set_type), intent(inout) :: self
+      !> Columns and rows of the lattice; no columns when contacts are not on one
+      integer, intent(in) :: columns, rows
+      !> Set if there is not enough memory, or the lattice does not hold the contacts
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: stat
+
+      if (columns > 0 .and. columns * rows /= self%parameters%count) then
+         call raise(error, status_invalid, "columns times rows of the lattice must be the number " &
+            & // "of contacts")
+         return
+      end if
+      associate (count => self%parameters%count)
+         allocate (self%record(record_length, count), stat=stat)
+         if (stat == 0) allocate (self%detached(detached_length, count), stat=stat)
+         if (stat == 0) allocate (self%detached_contact(count), stat=stat)
+      end associate
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the contacts")
+         return
+      end if
+      self%record = 0.0_wp
+      self%detached = 0.0_wp
+      self%detached_contact = 0
+      call new_avalanche_track(self%track, columns, rows, error)
+   end subroutine allocate_records
 
    !> Draw all contacts for the start of a run.
    subroutine draw(self, state)
@@ -108,10 +137,10 @@ contains
          case default
             stretch = 0.0_wp
          end select
-         self%arrays%record(row_origin, contact) = -stretch
-         self%arrays%record(row_stiffness, contact) = stiffness
-         self%arrays%record(row_limit, contact) = limit
-         self%arrays%record(row_renewal, contact) = 0.0_wp
+         self%record(row_origin, contact) = -stretch
+         self%record(row_stiffness, contact) = stiffness
+         self%record(row_limit, contact) = limit
+         self%record(row_renewal, contact) = 0.0_wp
          call self%draw_next(contact, 1.0_wp)
       end do
       call self%bear()
@@ -129,16 +158,6 @@ contains
       law%drag = self%drag%total()
    end function law_set
 
-   !> Whether there is room for one more step: the arrays have a place for each contact.
-   pure function has_room(self)
-      !> The contacts
-      class(contact_set_type), intent(in) :: self
-      !> Always
-      logical :: has_room
-
-      has_room = size(self%arrays%record, 2) >= self%parameters%count
-   end function has_room
-
    !> What happens to a contact that breaks: it leaves its force, and waits to attach again.
    subroutine let_go(self, contact, displacement, time)
       !> The contacts
@@ -151,7 +170,7 @@ contains
       integer :: place
       real(wp) :: stiffness, origin, drag
 
-      associate (record => self%arrays%record(:, contact))
+      associate (record => self%record(:, contact))
          origin = record(row_origin)
          stiffness = record(row_stiffness)
          record(row_stiffness) = 0.0_wp
@@ -176,11 +195,11 @@ contains
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
       end if
-      self%arrays%detached_contact(place + 1) = contact
-      self%arrays%detached(row_due, place + 1) = time + self%parameters%delay
-      self%arrays%detached(row_drag, place + 1) = drag
+      self%detached_contact(place + 1) = contact
+      self%detached(row_due, place + 1) = time + self%parameters%delay
+      self%detached(row_drag, place + 1) = drag
       if (self%waiting == 1 .and. self%parameters%reattach) then
-         self%next_attachment = self%arrays%detached(row_due, place + 1)
+         self%next_attachment = self%detached(row_due, place + 1)
       end if
    end subroutine let_go
 
@@ -201,17 +220,17 @@ contains
       real(wp) :: stiffness, limit, origin
 
       place = self%first_detached + 1
-      contact = self%arrays%detached_contact(place)
-      call born(self%parameters, self%arrays%record(row_next, contact), stiffness, limit)
+      contact = self%detached_contact(place)
+      call born(self%parameters, self%record(row_next, contact), stiffness, limit)
       origin = displacement - force / (stiffness + bond)
 
-      call self%drag%add(-self%arrays%detached(row_drag, place))
+      call self%drag%add(-self%detached(row_drag, place))
       self%waiting = self%waiting - 1
       self%first_detached = place
       if (place == self%parameters%count) self%first_detached = 0
       self%next_attachment = huge(1.0_wp)
       if (self%waiting > 0) then
-         self%next_attachment = self%arrays%detached(row_due, self%first_detached + 1)
+         self%next_attachment = self%detached(row_due, self%first_detached + 1)
       else
          self%drag = accumulator_type()
       end if
@@ -219,7 +238,7 @@ contains
       call self%birth_gain%add(0.5_wp * stiffness * (displacement - origin)**2)
       call self%stiffness%add(stiffness)
       call self%offset%add(stiffness * origin)
-      associate (record => self%arrays%record(:, contact))
+      associate (record => self%record(:, contact))
          record(row_origin) = origin
          record(row_stiffness) = stiffness
          record(row_limit) = limit
@@ -238,7 +257,7 @@ contains
 
       call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
          & int(renewal, i8), 0_i8, uniform)
-      self%arrays%record(row_next, contact) = self%parameters%law%quantile(uniform(1))
+      self%record(row_next, contact) = self%parameters%law%quantile(uniform(1))
    end subroutine draw_next
 
    !> Move all origins.
@@ -251,7 +270,7 @@ contains
       integer :: contact
 
       do contact = 1, self%parameters%count
-         self%arrays%record(row_origin, contact) = self%arrays%record(row_origin, contact) - shift
+         self%record(row_origin, contact) = self%record(row_origin, contact) - shift
       end do
       call self%bear()
    end subroutine shift_records
@@ -286,9 +305,9 @@ contains
          if (self%track%columns > 0) then
             values(3, contact) = real(self%track%contact(row_generation, contact), wp)
          end if
-         if (.not. self%arrays%record(row_stiffness, contact) > 0.0_wp) cycle
-         values(1, contact) = displacement - self%arrays%record(row_origin, contact)
-         values(2, contact) = values(1, contact) / self%arrays%record(row_limit, contact)
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         values(1, contact) = displacement - self%record(row_origin, contact)
+         values(2, contact) = values(1, contact) / self%record(row_limit, contact)
       end do
    end subroutine snapshot_set
 
@@ -301,9 +320,9 @@ contains
       self%stiffness = accumulator_type()
       self%offset = accumulator_type()
       do contact = 1, self%parameters%count
-         call self%stiffness%add(self%arrays%record(row_stiffness, contact))
-         call self%offset%add(self%arrays%record(row_stiffness, contact) &
-            & * self%arrays%record(row_origin, contact))
+         call self%stiffness%add(self%record(row_stiffness, contact))
+         call self%offset%add(self%record(row_stiffness, contact) &
+            & * self%record(row_origin, contact))
       end do
    end subroutine bear
 
@@ -320,29 +339,50 @@ contains
       type(accumulator_type) :: total
 
       do contact = 1, self%parameters%count
-         call total%add(0.5_wp * self%arrays%record(row_stiffness, contact) &
-            & * (displacement - self%arrays%record(row_origin, contact))**2)
+         call total%add(0.5_wp * self%record(row_stiffness, contact) &
+            & * (displacement - self%record(row_origin, contact))**2)
       end do
       energy = total%total()
    end function elastic_energy
 
-   !> Put the state into an archive or take it out; the arrays of the caller are the rest of it.
+   !> Number of contacts that are followed one by one.
+   pure function followed(self) result(number)
+      !> The contacts
+      class(contact_set_type), intent(in) :: self
+      !> All of them
+      integer :: number
+
+      number = self%parameters%count
+   end function followed
+
+   !> What each contact is.
+   pure subroutine records(self, values)
+      !> The contacts
+      class(contact_set_type), intent(in) :: self
+      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch [m], number of
+      !> renewals of each contact, shape (contact_record_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      values = self%record([row_origin, row_stiffness, row_limit, row_renewal], :)
+   end subroutine records
+
+   !> Put the state into an archive or take it out.
    subroutine exchange_set(self, archive)
       !> The contacts
       class(contact_set_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%waiting)
-      call archive%exchange(self%first_detached)
-      call archive%exchange(self%next_attachment)
-      call archive%exchange(self%breaks)
-      call archive%exchange(self%detached_count)
-      call archive%exchange(self%break_loss)
-      call archive%exchange(self%birth_gain)
-      call archive%exchange(self%stiffness)
-      call archive%exchange(self%offset)
-      call archive%exchange(self%drag)
+      call exchange_contacts(self, archive)
+      call archive%exchange("record", self%record)
+      call archive%exchange("detached", self%detached)
+      call archive%exchange("detached_contact", self%detached_contact)
+      call archive%exchange("waiting", self%waiting)
+      call archive%exchange("first_detached", self%first_detached)
+      call archive%exchange("next_attachment", self%next_attachment)
+      call archive%exchange("stiffness", self%stiffness)
+      call archive%exchange("offset", self%offset)
+      call archive%exchange("drag", self%drag)
       call self%track%exchange(archive)
    end subroutine exchange_set
 

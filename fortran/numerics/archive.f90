@@ -1,83 +1,326 @@
-!> State as plain arrays: each part of a simulation puts its numbers into an archive, or gets them.
+!> The state of a run for a checkpoint: each object registers its own, by name.
+!>
+!> One procedure of an object both puts its state into an archive and takes it out, so that the two
+!> cannot differ. Every entry has a name and a shape, which are checked when it is taken out: a
+!> state of another kind, or of another version of the program, is an error and not a wrong result.
 module mesoslip_numerics_archive
-   use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_kinds, only: i8, wp
    implicit none
    private
 
    public :: archive_type
 
-   !> Numbers of a state, with a place where the next one goes.
+   !> Words of an entry's name, eight characters each, and of its heading: name, kind, shape
+   integer, parameter :: name_words = 4, heading_words = name_words + 3
+   integer, parameter :: name_length = 8 * name_words
+
+   integer(i8), parameter :: kind_section = 0, kind_real = 1, kind_integer = 2
+
+   !> A state as words of 64 bits, with a place where the next entry goes.
    type :: archive_type
-      !> Real numbers of the state
-      real(wp), allocatable :: reals(:)
-      !> Whole numbers of the state
-      integer(i8), allocatable :: integers(:)
+      !> The words, as many as are in use or more
+      integer(i8), allocatable :: word(:)
+      !> Number of words in use
+      integer(i8) :: length = 0
       !> Whether values are put into the archive, rather than taken from it
       logical :: saving = .false.
-      integer, private :: real_place = 0, integer_place = 0
+      !> Set when what is to be taken out is not there
+      type(error_type), allocatable :: failure
+      integer(i8), private :: place = 0
    contains
+      !> Begin the entries of an object
+      procedure :: section
       !> Put one value into the archive, or take it out
       generic :: exchange => exchange_real, exchange_integer, exchange_long, exchange_logical, &
-         & exchange_accumulator
+         & exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube, &
+         & exchange_integers, exchange_integer_matrix
+      !> Make sure that all has been taken out
+      procedure :: finish
       procedure, private :: exchange_real, exchange_integer, exchange_long, exchange_logical
-      procedure, private :: exchange_accumulator
+      procedure, private :: exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube
+      procedure, private :: exchange_integers, exchange_integer_matrix
+      procedure, private :: heading, exchange_words, reserve
    end type archive_type
 
 contains
 
-   subroutine exchange_real(self, value)
+   !> Begin the entries of an object: whoever takes them out must be of the same kind.
+   subroutine section(self, name)
+      !> The archive
       class(archive_type), intent(inout) :: self
+      !> Kind of the object
+      character(len=*), intent(in) :: name
+
+      integer :: extent(2)
+
+      extent = 0
+      call self%heading(name, kind_section, extent)
+   end subroutine section
+
+   !> Make sure that all has been taken out.
+   subroutine finish(self)
+      !> The archive
+      class(archive_type), intent(inout) :: self
+
+      if (allocated(self%failure) .or. self%saving) return
+      if (self%place /= self%length) call raise(self%failure, status_invalid, &
+         & "the checkpoint holds more than this version of the program keeps")
+   end subroutine finish
+
+   !> Name and shape of the next entry: put them in, or compare them.
+   subroutine heading(self, name, kind, extent)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer(i8), intent(in) :: kind
+      !> Shape of the entry, as it is when saving, as it was then when not
+      integer, intent(inout) :: extent(2)
+
+      character(len=name_length) :: padded, found
+      integer(i8) :: words(heading_words)
+
+      if (allocated(self%failure)) return
+      padded = name
+      if (self%saving) then
+         words(:name_words) = transfer(padded, words, name_words)
+         words(name_words + 1:) = [kind, int(extent, i8)]
+         call self%reserve(int(heading_words, i8))
+         self%word(self%place + 1:self%place + heading_words) = words
+         self%place = self%place + heading_words
+         self%length = self%place
+         return
+      end if
+      if (self%place + heading_words > self%length) then
+         call raise(self%failure, status_invalid, "the checkpoint ends before '" // name // "'")
+         return
+      end if
+      words = self%word(self%place + 1:self%place + heading_words)
+      self%place = self%place + heading_words
+      found = transfer(words(:name_words), found)
+      extent = int(words(name_words + 2:))
+      if (found /= padded .or. words(name_words + 1) /= kind .or. any(extent < 0)) then
+         call raise(self%failure, status_invalid, "the checkpoint has '" // trim(found) &
+            & // "' where this version of the program has '" // name // "'")
+      end if
+   end subroutine heading
+
+   !> Put words in, or take them out.
+   subroutine exchange_words(self, words)
+      class(archive_type), intent(inout) :: self
+      integer(i8), intent(inout) :: words(:)
+
+      integer(i8) :: length
+
+      if (allocated(self%failure)) return
+      length = size(words, kind=i8)
+      if (self%saving) then
+         call self%reserve(length)
+         self%word(self%place + 1:self%place + length) = words
+         self%length = self%place + length
+      else if (self%place + length <= self%length) then
+         words = self%word(self%place + 1:self%place + length)
+      else
+         call raise(self%failure, status_invalid, "the checkpoint ends too early")
+      end if
+      self%place = self%place + length
+   end subroutine exchange_words
+
+   !> Put the numbers of an array in, or take them out, of any shape.
+   subroutine exchange_flat(self, length, value)
+      type(archive_type), intent(inout) :: self
+      integer(i8), intent(in) :: length
+      real(wp), intent(inout) :: value(length)
+
+      integer(i8), parameter :: most = 1024_i8
+      integer(i8) :: words(most), first, number
+
+      do first = 1, length, most
+         number = min(most, length - first + 1)
+         words(:number) = transfer(value(first:first + number - 1), words, int(number))
+         call self%exchange_words(words(:number))
+         value(first:first + number - 1) = transfer(words(:number), value, int(number))
+      end do
+   end subroutine exchange_flat
+
+   !> Make room for more words.
+   subroutine reserve(self, more)
+      class(archive_type), intent(inout) :: self
+      integer(i8), intent(in) :: more
+
+      integer(i8), parameter :: least = 1024_i8
+      integer(i8), allocatable :: longer(:)
+
+      if (.not. allocated(self%word)) allocate (self%word(max(least, more)))
+      if (self%place + more <= size(self%word, kind=i8)) return
+      allocate (longer(max(2_i8 * size(self%word, kind=i8), self%place + more)))
+      longer(:self%place) = self%word(:self%place)
+      call move_alloc(longer, self%word)
+   end subroutine reserve
+
+   subroutine exchange_real(self, name, value)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
       real(wp), intent(inout) :: value
 
-      self%real_place = self%real_place + 1
-      if (self%saving) then
-         self%reals(self%real_place) = value
-      else
-         value = self%reals(self%real_place)
-      end if
+      integer(i8) :: word(1)
+      integer :: extent(2)
+
+      extent = 1
+      call self%heading(name, kind_real, extent)
+      word = transfer(value, word)
+      call self%exchange_words(word)
+      value = transfer(word(1), value)
    end subroutine exchange_real
 
-   subroutine exchange_long(self, value)
+   subroutine exchange_long(self, name, value)
       class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
       integer(i8), intent(inout) :: value
 
-      self%integer_place = self%integer_place + 1
-      if (self%saving) then
-         self%integers(self%integer_place) = value
-      else
-         value = self%integers(self%integer_place)
-      end if
+      integer(i8) :: word(1)
+      integer :: extent(2)
+
+      extent = 1
+      call self%heading(name, kind_integer, extent)
+      word = value
+      call self%exchange_words(word)
+      value = word(1)
    end subroutine exchange_long
 
-   subroutine exchange_integer(self, value)
+   subroutine exchange_integer(self, name, value)
       class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
       integer, intent(inout) :: value
 
       integer(i8) :: long
 
       long = int(value, i8)
-      call self%exchange_long(long)
+      call self%exchange_long(name, long)
       value = int(long)
    end subroutine exchange_integer
 
-   subroutine exchange_logical(self, value)
+   subroutine exchange_logical(self, name, value)
       class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
       logical, intent(inout) :: value
 
       integer(i8) :: long
 
       long = merge(1_i8, 0_i8, value)
-      call self%exchange_long(long)
+      call self%exchange_long(name, long)
       value = long /= 0_i8
    end subroutine exchange_logical
 
-   subroutine exchange_accumulator(self, value)
+   subroutine exchange_accumulator(self, name, value)
       class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
       type(accumulator_type), intent(inout) :: value
 
-      call self%exchange_real(value%high)
-      call self%exchange_real(value%low)
+      call self%exchange_real(name, value%high)
+      call self%exchange_real(name, value%low)
    end subroutine exchange_accumulator
+
+   !> Arrays take the shape that they have in the archive.
+   subroutine exchange_reals(self, name, value)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(inout), allocatable :: value(:)
+
+      integer :: extent(2)
+
+      extent = 1
+      if (self%saving) extent(1) = size(value)
+      call self%heading(name, kind_real, extent)
+      if (allocated(self%failure)) return
+      if (.not. self%saving) then
+         if (allocated(value)) deallocate (value)
+         allocate (value(extent(1)))
+      end if
+      call exchange_flat(self, size(value, kind=i8), value)
+   end subroutine exchange_reals
+
+   subroutine exchange_matrix(self, name, value)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(inout), allocatable :: value(:, :)
+
+      integer :: extent(2)
+
+      extent = 0
+      if (self%saving) extent = shape(value)
+      call self%heading(name, kind_real, extent)
+      if (allocated(self%failure)) return
+      if (.not. self%saving) then
+         if (allocated(value)) deallocate (value)
+         allocate (value(extent(1), extent(2)))
+      end if
+      call exchange_flat(self, size(value, kind=i8), value)
+   end subroutine exchange_matrix
+
+   !> An array of three dimensions keeps its bounds: it must have its shape before.
+   subroutine exchange_cube(self, name, value)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      real(wp), intent(inout), contiguous :: value(:, :, :)
+
+      integer :: extent(2), found(2)
+
+      extent = [size(value, 1) * size(value, 2), size(value, 3)]
+      found = extent
+      call self%heading(name, kind_real, found)
+      if (allocated(self%failure)) return
+      if (any(found /= extent)) then
+         call raise(self%failure, status_invalid, "the checkpoint has another size of '" &
+            & // name // "'")
+         return
+      end if
+      call exchange_flat(self, size(value, kind=i8), value)
+   end subroutine exchange_cube
+
+   subroutine exchange_integers(self, name, value)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(inout), allocatable :: value(:)
+
+      integer(i8), allocatable :: words(:)
+      integer :: extent(2)
+
+      extent = 1
+      if (self%saving) extent(1) = size(value)
+      call self%heading(name, kind_integer, extent)
+      if (allocated(self%failure)) return
+      if (self%saving) then
+         words = int(value, i8)
+      else
+         allocate (words(extent(1)))
+      end if
+      call self%exchange_words(words)
+      if (.not. self%saving) value = int(words)
+   end subroutine exchange_integers
+
+   subroutine exchange_integer_matrix(self, name, value)
+      class(archive_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(inout), allocatable :: value(:, :)
+
+      integer, allocatable :: flat(:)
+      integer :: extent(2)
+
+      extent = 0
+      if (self%saving) then
+         extent = shape(value)
+         flat = reshape(value, [size(value)])
+      end if
+      call self%heading(name, kind_section, extent)
+      call self%exchange_integers(name, flat)
+      if (allocated(self%failure) .or. self%saving) return
+      if (size(flat) == product(extent)) then
+         value = reshape(flat, extent)
+      else
+         call raise(self%failure, status_invalid, "the checkpoint has another size of '" &
+            & // name // "'")
+      end if
+   end subroutine exchange_integer_matrix
 
 end module mesoslip_numerics_archive

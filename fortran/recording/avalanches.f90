@@ -5,7 +5,8 @@
 module mesoslip_recording_avalanches
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_contacts_base, only: contacts_type, extent_length
+   use mesoslip_recording_buffer, only: buffer_type
+   use mesoslip_contacts_base, only: contacts_type, extent_length, snapshot_length
    use mesoslip_interface_law, only: interface_law_type
    use mesoslip_sliders_base, only: motion_type, slider_type
    implicit none
@@ -20,6 +21,10 @@ module mesoslip_recording_avalanches
    !> Numbers that tell where a snapshot was taken: time, displacement, size of the avalanche or 0
    integer, parameter :: snapshot_place_length = 3
 
+   !> Avalanches for which there is room at first; avalanches, and numbers in snapshots, that wait
+   !> before the run pauses to have them taken away
+   integer, parameter :: first_avalanches = 1000, many_avalanches = 100000, many_numbers = 6000000
+
    !> What to record.
    type :: avalanche_parameters_type
       !> Least size of an avalanche in the catalogue; 0 for no catalogue
@@ -30,12 +35,12 @@ module mesoslip_recording_avalanches
       integer(i8) :: most_avalanches = huge(1_i8)
    end type avalanche_parameters_type
 
-   !> Records avalanches and snapshots into arrays of the caller.
+   !> Records avalanches and snapshots into tables that the caller empties.
    type :: avalanche_recorder_type
       !> What to record
       type(avalanche_parameters_type) :: parameters
-      !> Avalanches and snapshots in the caller's arrays so far
-      integer :: avalanche_count = 0, snapshot_count = 0
+      !> Avalanches, where snapshots were taken, and the snapshots, all contacts of one in a row
+      type(buffer_type) :: catalogue, places, snapshots
       !> Avalanches so far, and breaks in all of them
       integer(i8) :: avalanches = 0
       !> Breaks in the present avalanche
@@ -46,18 +51,17 @@ module mesoslip_recording_avalanches
       !> Times at which snapshots are taken [s], and how many of them have been
       real(wp), allocatable, private :: snapshot_time(:)
       integer, private :: taken = 0
+      !> Snapshots that may wait
+      integer, private :: many = 1
       !> Breaks up to now
       real(wp), private :: breaks = 0.0_wp
       !> Time, displacement and contact force at the start of the present avalanche
       real(wp), private :: time = 0.0_wp, displacement = 0.0_wp, force = 0.0_wp
-      real(wp), pointer, contiguous, private :: avalanche(:, :) => null()
-      real(wp), pointer, contiguous, private :: place(:, :) => null()
-      real(wp), pointer, contiguous, private :: snapshot(:, :, :) => null()
    contains
-      !> Use arrays of the caller
-      procedure :: attach
-      !> Whether the caller's arrays have room for one more step
-      procedure :: has_room
+      !> Make room for what will be recorded
+      procedure :: open
+      !> Whether so much waits that it should be taken away
+      procedure :: is_full
       !> Look at an advance of the slider, before the contacts respond
       procedure :: see_advance
       !> Look at the response of the contacts
@@ -66,48 +70,45 @@ module mesoslip_recording_avalanches
       procedure :: close
       !> Put the state into an archive or take it out
       procedure :: exchange
-      procedure, private :: open, take_snapshot
+      procedure, private :: begin, take_snapshot
    end type avalanche_recorder_type
 
 contains
 
-   !> Use arrays of the caller, empty.
-   subroutine attach(self, avalanche, place, snapshot, snapshot_time)
+   !> Make room for what will be recorded.
+   subroutine open(self, parameters, snapshot_time, contacts)
       !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
-      !> Avalanches, shape (avalanche_length, capacity)
-      real(wp), intent(inout), target, contiguous :: avalanche(:, :)
-      !> Where snapshots were taken, shape (snapshot_place_length, capacity)
-      real(wp), intent(inout), target, contiguous :: place(:, :)
-      !> Snapshots, shape (snapshot_length, contacts, capacity)
-      real(wp), intent(inout), target, contiguous :: snapshot(:, :, :)
+      !> What to record
+      type(avalanche_parameters_type), intent(in) :: parameters
       !> Times at which snapshots are taken, growing [s]
       real(wp), intent(in) :: snapshot_time(:)
+      !> Number of contacts in a snapshot
+      integer, intent(in) :: contacts
 
+      integer :: room
+
+      self%parameters = parameters
       self%snapshot_time = snapshot_time
-      self%avalanche => avalanche
-      self%place => place
-      self%snapshot => snapshot
-   end subroutine attach
+      room = 0
+      if (parameters%least_size > 0.0_wp) room = first_avalanches
+      call self%catalogue%open(avalanche_length, room)
+      room = 0
+      if (parameters%snapshot_size > 0.0_wp .or. size(snapshot_time) > 0) room = 1
+      call self%places%open(snapshot_place_length, room)
+      call self%snapshots%open(snapshot_length * contacts, room)
+      self%many = max(1, many_numbers / max(1, snapshot_length * contacts))
+   end subroutine open
 
-   !> Whether the caller's arrays have room for one more step.
-   pure function has_room(self)
+   !> Whether so much waits that it should be taken away.
+   pure function is_full(self)
       !> The recorder
       class(avalanche_recorder_type), intent(in) :: self
-      !> Whether the next advance and its response can be recorded
-      logical :: has_room
+      !> Whether it does
+      logical :: is_full
 
-      integer :: snapshots
-
-      has_room = .true.
-      if (self%parameters%least_size > 0.0_wp) then
-         has_room = self%avalanche_count < size(self%avalanche, 2)
-      end if
-      ! One advance may come past many times, but ends one avalanche at most.
-      snapshots = size(self%snapshot_time) - self%taken
-      if (self%parameters%snapshot_size > 0.0_wp) snapshots = snapshots + 1
-      has_room = has_room .and. self%snapshot_count + snapshots <= size(self%place, 2)
-   end function has_room
+      is_full = self%catalogue%count >= many_avalanches .or. self%snapshots%count >= self%many
+   end function is_full
 
    !> Look at an advance of the slider, before the contacts respond.
    subroutine see_advance(self, slider, contacts)
@@ -144,14 +145,14 @@ contains
       type(interface_law_type), intent(in) :: law
 
       if (.not. contacts%breaks > self%breaks) return
-      if (.not. self%size > 0.0_wp) call self%open(slider, law)
+      if (.not. self%size > 0.0_wp) call self%begin(slider, law)
       self%size = self%size + (contacts%breaks - self%breaks)
       self%breaks = contacts%breaks
       if (.not. slider%instant) call self%close(slider, contacts, slider%displacement)
    end subroutine see_response
 
    !> An avalanche begins.
-   subroutine open(self, slider, law)
+   subroutine begin(self, slider, law)
       class(avalanche_recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
       type(interface_law_type), intent(in) :: law
@@ -159,7 +160,7 @@ contains
       self%time = slider%time
       self%displacement = slider%origin + slider%displacement
       self%force = law%stiffness * slider%displacement - law%offset
-   end subroutine open
+   end subroutine begin
 
    !> Close the present avalanche.
    subroutine close(self, slider, contacts, displacement)
@@ -187,10 +188,9 @@ contains
       call contacts%take_extent(extent)
       if (self%parameters%least_size > 0.0_wp .and. self%size >= self%parameters%least_size) then
          law = contacts%law()
-         self%avalanche_count = self%avalanche_count + 1
-         self%avalanche(:, self%avalanche_count) = [self%time, self%displacement, self%size, &
+         call self%catalogue%add([self%time, self%displacement, self%size, &
             & self%force, self%force - (law%stiffness * displacement - law%offset), slip, &
-            & real(extent, wp)]
+            & real(extent, wp)])
       end if
       self%size = 0.0_wp
    end subroutine close
@@ -202,9 +202,12 @@ contains
       !> Time [s], displacement, and displacement from the moving origin [m]
       real(wp), intent(in) :: time, displacement, relative
 
-      self%snapshot_count = self%snapshot_count + 1
-      self%place(:, self%snapshot_count) = [time, displacement, self%size]
-      call contacts%snapshot(relative, self%snapshot(:, :, self%snapshot_count))
+      real(wp), allocatable :: values(:, :)
+
+      allocate (values(snapshot_length, contacts%followed()))
+      call contacts%snapshot(relative, values)
+      call self%places%add([time, displacement, self%size])
+      call self%snapshots%add(reshape(values, [size(values)]))
    end subroutine take_snapshot
 
    !> Put the state into an archive or take it out.
@@ -214,14 +217,18 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%avalanches)
-      call archive%exchange(self%size)
-      call archive%exchange(self%slip)
-      call archive%exchange(self%taken)
-      call archive%exchange(self%breaks)
-      call archive%exchange(self%time)
-      call archive%exchange(self%displacement)
-      call archive%exchange(self%force)
+      call archive%section("avalanches")
+      call archive%exchange("avalanches", self%avalanches)
+      call archive%exchange("size", self%size)
+      call archive%exchange("slip", self%slip)
+      call archive%exchange("taken", self%taken)
+      call archive%exchange("breaks", self%breaks)
+      call archive%exchange("time", self%time)
+      call archive%exchange("displacement", self%displacement)
+      call archive%exchange("force", self%force)
+      call self%catalogue%exchange("catalogue", archive)
+      call self%places%exchange("places", archive)
+      call self%snapshots%exchange("snapshots", archive)
    end subroutine exchange
 
 end module mesoslip_recording_avalanches

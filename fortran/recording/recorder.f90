@@ -13,6 +13,7 @@
 module mesoslip_recording_recorder
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type, slider_type
    implicit none
    private
@@ -30,6 +31,8 @@ module mesoslip_recording_recorder
    integer, parameter :: slip_length = 7
    !> Steps must be shorter than this many samples of either trace.
    integer, parameter :: most_samples_in_step = 1000
+   !> Samples of either trace, and slips, that wait before the run pauses to have them taken away
+   integer, parameter :: many_samples = 20000, many_slips = 2000
 
    !> A part of an interval that counts as nothing.
    real(wp), parameter :: tiny_part = 1.0e-6_wp
@@ -50,14 +53,16 @@ module mesoslip_recording_recorder
       real(wp) :: duration = 0.0_wp
       !> Contacts in all
       integer :: contacts = 0
+      !> Layers whose displacements go with the trace
+      integer :: layers = 0
    end type recorder_parameters_type
 
-   !> Records a run into arrays of the caller.
+   !> Records a run into tables that the caller empties.
    type :: recorder_type
       !> What to record
       type(recorder_parameters_type) :: parameters
-      !> Samples and slips in the caller's arrays so far
-      integer :: trace_count = 0, slip_trace_count = 0, slip_count = 0
+      !> Samples, samples of slip traces, slips, and displacements of the layers at the samples
+      type(buffer_type) :: trace, slip_trace, slips, layers
       !> Samples of slip traces that will not be taken back
       integer, private :: kept_count = 0
 
@@ -77,16 +82,15 @@ module mesoslip_recording_recorder
       real(wp), private :: force_after = 0.0_wp, peak_velocity = 0.0_wp
       real(wp), private :: breaks_before = 0.0_wp, breaks_after = 0.0_wp
       logical, private :: has_least = .false.
-
-      real(wp), pointer, contiguous, private :: trace(:, :) => null()
-      real(wp), pointer, contiguous, private :: slip_trace(:, :) => null()
-      real(wp), pointer, contiguous, private :: slips(:, :) => null()
-      real(wp), pointer, contiguous, private :: layers(:, :) => null()
    contains
-      !> Use arrays of the caller
-      procedure :: attach
-      !> Whether the caller's arrays have room for one more step
-      procedure :: has_room
+      !> Make room for what will be recorded
+      procedure :: open
+      !> Whether so much waits that it should be taken away
+      procedure :: is_full
+      !> Samples of slip traces that can be taken away
+      procedure :: final_slip_samples
+      !> Take samples of slip traces away
+      procedure :: drain_slip_trace
       !> Record the last advance of a slider
       procedure :: record
       !> Close a slip at the end of the run
@@ -98,37 +102,52 @@ module mesoslip_recording_recorder
 
 contains
 
-   !> Use arrays of the caller, empty.
-   subroutine attach(self, trace, slip_trace, slips, layers)
+   !> Make room for what will be recorded.
+   subroutine open(self, parameters)
       !> The recorder
       class(recorder_type), intent(inout) :: self
-      !> Samples, shape (trace_length, capacity)
-      real(wp), intent(inout), target, contiguous :: trace(:, :)
-      !> Samples of slip traces, shape (slip_trace_length, capacity)
-      real(wp), intent(inout), target, contiguous :: slip_trace(:, :)
-      !> Slips, shape (slip_length, capacity)
-      real(wp), intent(inout), target, contiguous :: slips(:, :)
-      !> Displacements of the layers at the samples of the trace, shape (layers, capacity); without
-      !> layers none are recorded
-      real(wp), intent(inout), target, contiguous :: layers(:, :)
+      !> What to record
+      type(recorder_parameters_type), intent(in) :: parameters
 
-      self%layers => layers
-      self%trace => trace
-      self%slip_trace => slip_trace
-      self%slips => slips
-   end subroutine attach
+      self%parameters = parameters
+      call self%trace%open(trace_length, many_samples + most_samples_in_step)
+      call self%slip_trace%open(slip_trace_length, many_samples + most_samples_in_step)
+      call self%slips%open(slip_length, many_slips)
+      call self%layers%open(parameters%layers, many_samples + most_samples_in_step)
+   end subroutine open
 
-   !> Whether the caller's arrays have room for one more step.
-   pure function has_room(self)
+   !> Whether so much waits that it should be taken away.
+   pure function is_full(self)
       !> The recorder
       class(recorder_type), intent(in) :: self
-      !> Whether the next advance can be recorded
-      logical :: has_room
+      !> Whether it does
+      logical :: is_full
 
-      has_room = self%trace_count + most_samples_in_step < size(self%trace, 2) &
-         & .and. self%slip_trace_count + most_samples_in_step < size(self%slip_trace, 2) &
-         & .and. self%slip_count < size(self%slips, 2)
-   end function has_room
+      is_full = self%trace%count >= many_samples .or. self%final_slip_samples() >= many_samples &
+         & .or. self%slips%count >= many_slips
+   end function is_full
+
+   !> Samples of slip traces that can be taken away: not those of what may come to no slip.
+   pure function final_slip_samples(self) result(number)
+      !> The recorder
+      class(recorder_type), intent(in) :: self
+      !> Their number
+      integer :: number
+
+      number = self%slip_trace%count
+      if (self%phase == phase_fast) number = self%kept_count
+   end function final_slip_samples
+
+   !> Take samples of slip traces away.
+   subroutine drain_slip_trace(self, values)
+      !> The recorder
+      class(recorder_type), intent(inout) :: self
+      !> As many samples as can be taken or fewer, shape (slip_trace_length, samples)
+      real(wp), intent(out) :: values(:, :)
+
+      call self%slip_trace%drain(values)
+      self%kept_count = max(0, self%kept_count - size(values, 2))
+   end subroutine drain_slip_trace
 
    !> Record the last advance of a slider, before the events at its end.
    subroutine record(self, slider, detached, breaks)
@@ -163,7 +182,7 @@ contains
             self%phase = phase_slip
          else if (excess <= 0.0_wp) then
             self%phase = phase_slow
-            self%slip_trace_count = min(self%slip_trace_count, self%kept_count)
+            self%slip_trace%count = min(self%slip_trace%count, self%kept_count)
             return
          end if
       end if
@@ -179,10 +198,12 @@ contains
       real(wp), intent(in) :: detached
 
       do while (self%next_sample <= slider%time)
-         self%trace_count = self%trace_count + 1
-         self%trace(:, self%trace_count) = sample(slider%observe(self%next_sample), detached)
-         if (size(self%layers, 1) > 0) call slider%observe_layers(self%next_sample, &
-            & self%layers(:, self%trace_count))
+         call self%trace%add(sample(slider%observe(self%next_sample), detached))
+         if (self%parameters%layers > 0) then
+            call self%layers%reserve()
+            self%layers%count = self%layers%count + 1
+            call slider%observe_layers(self%next_sample, self%layers%row(:, self%layers%count))
+         end if
          self%samples = self%samples + 1
          self%next_sample = real(self%samples, wp) * self%parameters%interval
          ! The end of the run is a sample if rounding alone keeps it from being one.
@@ -211,7 +232,7 @@ contains
       self%slip_samples = 0
       self%next_slip_sample = huge(1.0_wp)
       if (self%parameters%slip_interval > 0.0_wp) self%next_slip_sample = self%start_time
-      self%kept_count = self%slip_trace_count
+      self%kept_count = self%slip_trace%count
    end subroutine begin_fast
 
    !> Follow a slip through the last advance of a slider.
@@ -270,17 +291,16 @@ contains
          self%force_after = motion%elastic_force
          self%breaks_after = breaks
       end if
-      self%slip_count = self%slip_count + 1
-      self%slips(:, self%slip_count) = [real(self%slip, wp), self%start_time, self%end_time, &
+      call self%slips%add([real(self%slip, wp), self%start_time, self%end_time, &
          & self%force_before, self%force_after, self%sense * self%peak_velocity, &
-         & self%breaks_after - self%breaks_before]
+         & self%breaks_after - self%breaks_before])
       self%slip = self%slip + 1
-      self%kept_count = self%slip_trace_count
+      self%kept_count = self%slip_trace%count
    end subroutine close_slip
 
    !> Close a slip at the end of the run, if its spring force has passed the least.
    subroutine finish(self, slider, breaks)
-      !> The recorder, with room for one slip
+      !> The recorder
       class(recorder_type), intent(inout) :: self
       !> The slider at the end of the run
       class(slider_type), intent(in) :: slider
@@ -290,7 +310,7 @@ contains
       if (self%phase == phase_slip .and. self%has_least) then
          call self%close_slip(slider%observe(slider%time), breaks)
       else
-         self%slip_trace_count = min(self%slip_trace_count, self%kept_count)
+         self%slip_trace%count = min(self%slip_trace%count, self%kept_count)
       end if
       self%phase = phase_slow
    end subroutine finish
@@ -302,10 +322,8 @@ contains
       real(wp), intent(in) :: detached
 
       do while (self%next_slip_sample <= slider%time)
-         self%slip_trace_count = self%slip_trace_count + 1
-         self%slip_trace(:trace_length, self%slip_trace_count) &
-            & = sample(slider%observe(self%next_slip_sample), detached)
-         self%slip_trace(slip_trace_length, self%slip_trace_count) = real(self%slip, wp)
+         call self%slip_trace%add([sample(slider%observe(self%next_slip_sample), detached), &
+            & real(self%slip, wp)])
          self%slip_samples = self%slip_samples + 1
          self%next_slip_sample = self%start_time &
             & + real(self%slip_samples, wp) * self%parameters%slip_interval
@@ -384,23 +402,29 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%samples)
-      call archive%exchange(self%next_sample)
-      call archive%exchange(self%phase)
-      call archive%exchange(self%slip)
-      call archive%exchange(self%slip_samples)
-      call archive%exchange(self%next_slip_sample)
-      call archive%exchange(self%sense)
-      call archive%exchange(self%last_excess)
-      call archive%exchange(self%last_fast)
-      call archive%exchange(self%start_time)
-      call archive%exchange(self%end_time)
-      call archive%exchange(self%force_before)
-      call archive%exchange(self%force_after)
-      call archive%exchange(self%peak_velocity)
-      call archive%exchange(self%breaks_before)
-      call archive%exchange(self%breaks_after)
-      call archive%exchange(self%has_least)
+      call archive%section("recorder")
+      call archive%exchange("samples", self%samples)
+      call archive%exchange("next_sample", self%next_sample)
+      call archive%exchange("phase", self%phase)
+      call archive%exchange("slip", self%slip)
+      call archive%exchange("slip_samples", self%slip_samples)
+      call archive%exchange("next_slip_sample", self%next_slip_sample)
+      call archive%exchange("sense", self%sense)
+      call archive%exchange("last_excess", self%last_excess)
+      call archive%exchange("last_fast", self%last_fast)
+      call archive%exchange("start_time", self%start_time)
+      call archive%exchange("end_time", self%end_time)
+      call archive%exchange("force_before", self%force_before)
+      call archive%exchange("force_after", self%force_after)
+      call archive%exchange("peak_velocity", self%peak_velocity)
+      call archive%exchange("breaks_before", self%breaks_before)
+      call archive%exchange("breaks_after", self%breaks_after)
+      call archive%exchange("has_least", self%has_least)
+      call archive%exchange("kept_count", self%kept_count)
+      call self%trace%exchange("trace", archive)
+      call self%slip_trace%exchange("slip_trace", archive)
+      call self%slips%exchange("slips", archive)
+      call self%layers%exchange("layers", archive)
    end subroutine exchange
 
 end module mesoslip_recording_recorder

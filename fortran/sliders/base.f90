@@ -11,7 +11,7 @@ module mesoslip_sliders_base
    implicit none
    private
 
-   public :: slider_type, motion_type, exchange_slider, shift_slider
+   public :: slider_type, motion_type, exchange_slider, exchange_law, shift_slider
 
    !> The motion at one time.
    type :: motion_type
@@ -56,6 +56,16 @@ module mesoslip_sliders_base
       real(wp) :: rest_displacement = 0.0_wp
       !> Set when nothing holds it any more
       logical :: unbound = .false.
+      !> Whether the drive is a force, under which contacts may break without end
+      logical :: under_force = .false.
+      !> Whether a run that is put away here goes on to the bit
+      logical :: can_pause = .true.
+      !> Layers whose displacements can be observed
+      integer :: layer_count = 0
+      !> Cost of an advance over that of a rigid slider
+      real(wp) :: cost = 1.0_wp
+      !> Steps, evaluations and failed steps of its integrator, if it has one
+      integer(i8) :: integrator_counts(3) = 0_i8
       !> Set when the slider cannot go on
       type(error_type), allocatable :: failure
    contains
@@ -77,10 +87,6 @@ module mesoslip_sliders_base
       procedure :: shift_origin => shift_slider
       !> Displacements of the layers at a time of the last advance
       procedure :: observe_layers
-      !> Numbers that tell what the slider's integrator did
-      procedure :: integrator_counts
-      !> Free what the slider holds
-      procedure :: close => close_slider
       !> Put the state into an archive or take it out
       procedure :: exchange => exchange_slider
    end type slider_type
@@ -181,7 +187,7 @@ contains
       self%origin = self%origin + shift
    end subroutine shift_slider
 
-   !> Displacements of the layers at a time of the last advance; nothing for a rigid slider.
+   !> Displacements of the layers at a time of the last advance: without layers, that of the slider.
    pure subroutine observe_layers(self, time, displacement)
       !> The slider
       class(slider_type), intent(in) :: self
@@ -190,27 +196,11 @@ contains
       !> Absolute displacements, shape (layers) [m]
       real(wp), intent(out) :: displacement(:)
 
-      displacement = self%origin + self%displacement + 0.0_wp * time
+      type(motion_type) :: motion
+
+      motion = self%observe(time)
+      displacement = motion%displacement
    end subroutine observe_layers
-
-   !> Steps, evaluations and failed steps of the slider's integrator; none without one.
-   function integrator_counts(self) result(counts)
-      !> The slider
-      class(slider_type), intent(in) :: self
-      !> These three
-      integer(i8) :: counts(3)
-
-      counts = 0_i8
-      if (allocated(self%failure)) counts(3) = 1_i8
-   end function integrator_counts
-
-   !> Free what the slider holds; nothing for most.
-   subroutine close_slider(self)
-      !> The slider
-      class(slider_type), intent(inout) :: self
-
-      self%step_time = self%time
-   end subroutine close_slider
 
    !> Put the state into an archive or take it out.
    subroutine exchange_slider(self, archive)
@@ -219,18 +209,37 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange(self%time)
-      call archive%exchange(self%origin)
-      call archive%exchange(self%displacement)
-      call archive%exchange(self%velocity)
-      call archive%exchange(self%acceleration)
-      call archive%exchange(self%sense)
-      call archive%exchange(self%drive_velocity)
-      call archive%exchange(self%drive_time)
-      call archive%exchange(self%drive_displacement)
-      call archive%exchange(self%drive_work)
-      call archive%exchange(self%drag_loss)
-      call archive%exchange(self%damping_loss)
+      call archive%exchange("time", self%time)
+      call archive%exchange("origin", self%origin)
+      call archive%exchange("displacement", self%displacement)
+      call archive%exchange("velocity", self%velocity)
+      call archive%exchange("acceleration", self%acceleration)
+      call archive%exchange("start_acceleration", self%start_acceleration)
+      call archive%exchange("sense", self%sense)
+      call archive%exchange("drive_velocity", self%drive_velocity)
+      call archive%exchange("drive_time", self%drive_time)
+      call archive%exchange("drive_displacement", self%drive_displacement)
+      call archive%exchange("step_time", self%step_time)
+      call archive%exchange("drive_work", self%drive_work)
+      call archive%exchange("drag_loss", self%drag_loss)
+      call archive%exchange("damping_loss", self%damping_loss)
+      call archive%exchange("instant", self%instant)
+      call archive%exchange("settled", self%settled)
+      call archive%exchange("rest_displacement", self%rest_displacement)
+      call archive%exchange("unbound", self%unbound)
+      call archive%exchange("can_pause", self%can_pause)
    end subroutine exchange_slider
+
+   !> Put a law of the contact force into an archive or take it out.
+   subroutine exchange_law(law, archive)
+      !> The law
+      type(interface_law_type), intent(inout) :: law
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange("law stiffness", law%stiffness)
+      call archive%exchange("law offset", law%offset)
+      call archive%exchange("law drag", law%drag)
+   end subroutine exchange_law
 
 end module mesoslip_sliders_base

@@ -15,14 +15,17 @@ module mesoslip_sliders_layered
       & FSUNBandMatrix_StoredUpperBandwidth
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, shift_slider
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law, &
+      & shift_slider
    use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf
    implicit none
    private
 
-   public :: slider_layered_type, layered_parameters_type
+   public :: slider_layered_type, layered_parameters_type, new_slider_layered, make_slider_layered
    public :: solver_series, solver_adams, solver_bdf
 
    !> Taylor series, and CVODE with either family of formulas
@@ -37,6 +40,10 @@ module mesoslip_sliders_layered
 
    !> Half the bandwidth of the Jacobian, with displacements and velocities in turn.
    integer, parameter :: half_bandwidth = 3
+   !> Layers whose series take as long as an advance of a rigid slider
+   real(wp), parameter :: layers_per_cost = 4.0_wp
+   !> Steps of CVODE without an event after which it starts anew, so that a run can be put away
+   integer, parameter :: most_steps = 2000
    !> Points of the rule by which losses are integrated
    integer, parameter :: points = 12
 
@@ -73,7 +80,7 @@ module mesoslip_sliders_layered
       !> The system during the last advance
       type(system_type), pointer, private :: system => null()
       !> Displacement and velocity of the base, then of each layer, shape (0:layers, 2)
-      real(wp), pointer, contiguous, private :: state(:, :) => null()
+      real(wp), allocatable, private :: state(:, :)
       !> Taylor coefficients of both, shape (0:layers, 2, 0:longest_series)
       real(wp), allocatable, private :: series(:, :, :)
       !> The same of the velocity of layer 1 relative to the base
@@ -90,47 +97,79 @@ module mesoslip_sliders_layered
       real(wp), private :: start_time = 0.0_wp
       !> CVODE's time, which has more digits than the time of the run
       real(wp), private :: local_time = 0.0_wp
-      !> Whether CVODE has to start anew
+      !> Whether CVODE has to start anew, and its steps since it did
       logical, private :: is_stale = .true.
+      integer, private :: steps = 0
+      !> What CVODE did before the run was put away
+      integer(i8), private :: counts_before(3) = 0_i8
    contains
-      !> Use a state of the caller
-      procedure :: attach
       procedure :: start
       procedure :: advance
       procedure :: observe
       procedure :: observe_layers
       procedure :: energy
       procedure :: shift_origin
-      procedure :: integrator_counts
-      procedure :: close
       procedure :: exchange
       procedure, private :: expand, step_cvode, restart, take_back, add_work
+      final :: close
    end type slider_layered_type
 
 contains
 
-   !> Use a state of the caller.
-   subroutine attach(self, state)
-      !> The slider, its parameters set
-      class(slider_layered_type), intent(inout) :: self
-      !> Displacement and velocity of base and layers, shape (layers + 1, 2)
-      real(wp), intent(inout), target, contiguous :: state(:, :)
+   !> Set up an elastic slider from named numbers.
+   subroutine make_slider_layered(slider, parameters, error)
+      !> The slider
+      class(slider_type), allocatable, intent(out) :: slider
+      !> What it is made of; no mass of the base for none
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(slider_layered_type), allocatable :: self
+      type(layered_parameters_type) :: values
+
+      call parameters%take("layers", values%layers, error)
+      call parameters%take("mass", values%mass, error)
+      call parameters%take("stiffness", values%stiffness, error)
+      call parameters%take("damping", values%damping, error)
+      call parameters%take("base_mass", values%base_mass, error)
+      call parameters%take("base_stiffness", values%base_stiffness, error)
+      call parameters%take("base_damping", values%base_damping, error)
+      call parameters%take("solver", values%solver, error)
+      call parameters%take("relative_tolerance", values%relative, error)
+      call parameters%take("absolute_tolerance", values%absolute, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      allocate (self)
+      call new_slider_layered(self, values)
+      call move_alloc(self, slider)
+   end subroutine make_slider_layered
+
+   !> Set up an elastic slider.
+   subroutine new_slider_layered(self, parameters)
+      !> The slider
+      type(slider_layered_type), intent(inout) :: self
+      !> What it is made of
+      type(layered_parameters_type), intent(in) :: parameters
 
       integer :: term
 
-      self%state(0:self%parameters%layers, 1:2) => state
-      allocate (self%series(0:self%parameters%layers, 2, 0:longest_series), source=0.0_wp)
+      self%parameters = parameters
+      self%layer_count = parameters%layers
+      self%cost = 1.0_wp + parameters%layers / layers_per_cost
+      allocate (self%state(0:parameters%layers, 2), source=0.0_wp)
+      allocate (self%series(0:parameters%layers, 2, 0:longest_series), source=0.0_wp)
       call gauss_legendre(self%point, self%weight)
       ! The first term left out is below 1e-17 of what a free motion has.
       do term = 1, longest_series
          self%reach(term) = exp((log(1.0e-17_wp) + log_gamma(term + 1.0_wp)) / term)
       end do
       allocate (self%system)
-      self%system%parameters = self%parameters
-      self%system%layer_mass = self%parameters%mass / self%parameters%layers
-      self%system%spring = self%parameters%stiffness * self%parameters%layers
-      self%system%dashpot = self%parameters%damping * self%system%layer_mass
-   end subroutine attach
+      self%system%parameters = parameters
+      self%system%layer_mass = parameters%mass / parameters%layers
+      self%system%spring = parameters%stiffness * parameters%layers
+      self%system%dashpot = parameters%damping * self%system%layer_mass
+   end subroutine new_slider_layered
 
    !> Put the slider at rest in balance with the contacts.
    subroutine start(self, law)
@@ -256,6 +295,13 @@ contains
       self%acceleration = slope(self%sliding, self%terms, step)
       self%start_acceleration = self%sliding(1)
       call self%add_work(step)
+      if (self%parameters%solver /= solver_series) then
+         self%steps = self%steps + 1
+         if (self%steps >= most_steps) self%is_stale = .true.
+         ! What CVODE remembers of its last steps cannot be put away: only where it forgets them.
+         self%can_pause = self%is_stale
+         self%integrator_counts = self%counts_before + int(self%cvode%counts(), i8)
+      end if
    end subroutine advance
 
    !> Bound on the rates of a system.
@@ -429,6 +475,7 @@ contains
          end if
       end if
       self%is_stale = .false.
+      self%steps = 0
    end subroutine restart
 
    !> Rates of the state in CVODE's order.
@@ -663,20 +710,10 @@ contains
       self%is_stale = .true.
    end subroutine shift_origin
 
-   !> Steps, evaluations and failed steps of CVODE.
-   function integrator_counts(self) result(counts)
-      !> The slider
-      class(slider_layered_type), intent(in) :: self
-      !> These three
-      integer(i8) :: counts(3)
-
-      counts = int(self%cvode%counts(), i8)
-   end function integrator_counts
-
    !> Free what the slider holds.
    subroutine close(self)
       !> The slider
-      class(slider_layered_type), intent(inout) :: self
+      type(slider_layered_type), intent(inout) :: self
 
       call self%cvode%close()
       if (associated(self%vector)) deallocate (self%vector)
@@ -690,7 +727,25 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      real(wp), allocatable :: state(:, :)
+
+      call archive%section("layered slider")
       call exchange_slider(self, archive)
+      call exchange_law(self%system%law, archive)
+      call archive%exchange("drive", self%system%drive)
+      call archive%exchange("drive_velocity", self%system%drive_velocity)
+      state = self%state
+      call archive%exchange("state", state)
+      if (all(shape(state) == shape(self%state))) self%state = state
+      call archive%exchange("series", self%series)
+      call archive%exchange("start_displacement", self%start_displacement)
+      call archive%exchange("terms", self%terms)
+      call archive%exchange("steps", self%integrator_counts(1))
+      call archive%exchange("evaluations", self%integrator_counts(2))
+      call archive%exchange("failed_steps", self%integrator_counts(3))
+      if (archive%saving) return
+      self%counts_before = self%integrator_counts
+      call self%cvode%close()
       self%is_stale = .true.
    end subroutine exchange
 

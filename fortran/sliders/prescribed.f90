@@ -1,12 +1,16 @@
 !> A slider that goes exactly where the drive goes: a velocity-controlled block, K = infinity.
 module mesoslip_sliders_prescribed
+   use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
-   use mesoslip_sliders_base, only: motion_type, slider_type
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
+      & exchange_law
    implicit none
    private
 
-   public :: slider_prescribed_type
+   public :: slider_prescribed_type, make_slider_prescribed
 
    !> A slider whose displacement is that of the drive.
    type, extends(slider_type) :: slider_prescribed_type
@@ -17,9 +21,27 @@ module mesoslip_sliders_prescribed
       procedure :: advance
       procedure :: observe
       procedure :: energy
+      procedure :: exchange
    end type slider_prescribed_type
 
 contains
+
+   !> Set up a slider that goes where the drive goes from named numbers.
+   subroutine make_slider_prescribed(slider, parameters, error)
+      !> The slider
+      class(slider_type), allocatable, intent(out) :: slider
+      !> No numbers
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(slider_prescribed_type), allocatable :: self
+
+      allocate (self)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      call move_alloc(self, slider)
+   end subroutine make_slider_prescribed
 
    !> Put the slider where the drive is, moving with it.
    subroutine start(self, law)
@@ -98,5 +120,17 @@ contains
 
       energy = 0.0_wp
    end function energy
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The slider
+      class(slider_prescribed_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("prescribed slider")
+      call exchange_slider(self, archive)
+      call exchange_law(self%law, archive)
+   end subroutine exchange
 
 end module mesoslip_sliders_prescribed

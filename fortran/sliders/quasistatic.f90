@@ -5,13 +5,17 @@
 !> stands still; then it goes with the drive. The drive moves the end of the spring, or, without a
 !> spring, is a force itself.
 module mesoslip_sliders_quasistatic
+   use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
-   use mesoslip_sliders_base, only: motion_type, slider_type, shift_slider
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
+      & exchange_law, shift_slider
    implicit none
    private
 
-   public :: slider_quasistatic_type
+   public :: slider_quasistatic_type, make_slider_quasistatic
 
    !> A slider in equilibrium.
    type, extends(slider_type) :: slider_quasistatic_type
@@ -26,10 +30,30 @@ module mesoslip_sliders_quasistatic
       procedure :: observe
       procedure :: energy
       procedure :: shift_origin
+      procedure :: exchange
       procedure, non_overridable, private :: pull
    end type slider_quasistatic_type
 
 contains
+
+   !> Set up a slider in equilibrium from named numbers.
+   subroutine make_slider_quasistatic(slider, parameters, error)
+      !> The slider
+      class(slider_type), allocatable, intent(out) :: slider
+      !> Stiffness of the drive's spring; 0 if the drive is a force
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(slider_quasistatic_type), allocatable :: self
+
+      allocate (self)
+      call parameters%take("stiffness", self%stiffness, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      self%under_force = .not. self%stiffness > 0.0_wp
+      call move_alloc(self, slider)
+   end subroutine make_slider_quasistatic
 
    !> Put the slider in balance with the contacts.
    subroutine start(self, law)
@@ -56,6 +80,7 @@ contains
       type(window_type), intent(in) :: window
 
       real(wp) :: stiffness, start, target, way, pull, rate, limit
+      logical :: reaches
 
       self%instant = .true.
       self%law = law
@@ -88,8 +113,11 @@ contains
       self%velocity = rate / stiffness
       limit = window%upper
       if (self%velocity < 0.0_wp) limit = window%lower
-      if (abs(self%velocity) > 0.0_wp &
-         & .and. (limit - start) / self%velocity <= window%end_time - self%time) then
+      reaches = .false.
+      if (abs(self%velocity) > 0.0_wp) then
+         reaches = (limit - start) / self%velocity <= window%end_time - self%time
+      end if
+      if (reaches) then
          self%time = min(self%time + (limit - start) / self%velocity, window%end_time)
          self%displacement = limit
       else
@@ -168,5 +196,17 @@ contains
       call shift_slider(self, shift)
       if (.not. self%stiffness > 0.0_wp) self%drive_displacement = force
    end subroutine shift_origin
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The slider
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("quasistatic slider")
+      call exchange_slider(self, archive)
+      call exchange_law(self%law, archive)
+   end subroutine exchange
 
 end module mesoslip_sliders_quasistatic

@@ -7,12 +7,15 @@
 module mesoslip_sliders_rigid
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
+      & exchange_law
    implicit none
    private
 
-   public :: slider_rigid_type
+   public :: slider_rigid_type, make_slider_rigid
 
    !> Terms of the series for short, middling and long steps, and the lengths of these in units of
    !> the fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
@@ -71,6 +74,26 @@ module mesoslip_sliders_rigid
    end type slider_rigid_type
 
 contains
+
+   !> Set up a rigid slider from named numbers.
+   subroutine make_slider_rigid(slider, parameters, error)
+      !> The slider
+      class(slider_type), allocatable, intent(out) :: slider
+      !> Mass, stiffness and damping
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(slider_rigid_type), allocatable :: self
+
+      allocate (self)
+      call parameters%take("mass", self%mass, error)
+      call parameters%take("stiffness", self%stiffness, error)
+      call parameters%take("damping", self%damping, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      call move_alloc(self, slider)
+   end subroutine make_slider_rigid
 
    !> Put the slider at rest in balance with the contacts.
    subroutine start(self, law)
@@ -371,8 +394,17 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      real(wp), allocatable :: series(:)
+
+      call archive%section("rigid slider")
       call exchange_slider(self, archive)
-      call archive%exchange(self%mean_velocity)
+      call archive%exchange("mean_velocity", self%mean_velocity)
+      call exchange_law(self%law, archive)
+      call archive%exchange("start_displacement", self%start_displacement)
+      call archive%exchange("terms", self%terms)
+      series = self%series
+      call archive%exchange("series", series)
+      if (size(series) == size(self%series)) self%series = series
    end subroutine exchange
 
    !> Integral of the integral of a series from zero.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output import store
-from mesoslip.simulation import engine
+from mesoslip.simulation.runner import run_realizations
 from mesoslip.theory.derived import Derived, derived_quantities
 
 PathLike = str | os.PathLike[str]
@@ -74,10 +73,9 @@ def run(
         If the run fails.
     """
     config = as_config(config)
-    start = time.perf_counter()
-    realizations, complete = engine.run_realizations(config, workers=workers, progress=progress)
+    results = run_realizations(config, workers=workers, progress=progress)
     return store.build(
-        config, realizations, complete=complete, wall_seconds=time.perf_counter() - start
+        config, results.realizations, complete=results.complete, wall_seconds=results.wall_seconds
     )
 
 

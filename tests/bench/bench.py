@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from fixed_step import numba_run, numpy_steps, verlet_run
 from mesoslip import Config, ForceCurve
-from mesoslip.simulation.engine import Realization
+from mesoslip.simulation.realization import Realization
 
 ROOT = Path(__file__).parents[2]
 KLEIN = ROOT / "runs" / "klein.toml"

@@ -1,12 +1,11 @@
 !> Contacts with a place: who breaks first, who is next to whom, how far an avalanche reaches.
 program test_lattice
-   use mesoslip_contacts_avalanche_track, only: avalanche_track_type, track_length
+   use mesoslip_contacts_avalanche_track, only: avalanche_track_type, new_avalanche_track
    use mesoslip_contacts_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_lattice, only: contact_lattice_type, interaction_type, &
       & new_contact_lattice
    use mesoslip_contacts_mechanics, only: coupling_equal, initial_uniform
-   use mesoslip_contacts_record, only: record_length, row_stiffness
-   use mesoslip_contacts_set, only: contact_arrays_type, detached_length
+   use mesoslip_contacts_record, only: row_stiffness
    use mesoslip_contacts_base, only: contact_parameters_type, extent_length
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: pose_type
@@ -130,14 +129,11 @@ contains
       integer, intent(in) :: columns, rows
 
       type(avalanche_track_type) :: track
-      integer, target :: contact(track_length, columns * rows)
+      type(error_type), allocatable :: error
       integer :: trial, number, place, width, height, size_wanted
       logical :: is_smallest, column(0:columns - 1), row(0:rows - 1)
 
-      contact = 0
-      track%columns = columns
-      track%rows = rows
-      track%contact => contact
+      call new_avalanche_track(track, columns, rows, error)
       is_smallest = .true.
       do trial = 1, 200
          size_wanted = 1 + int(deviate()**3 * columns * rows)
@@ -152,11 +148,11 @@ contains
             column(modulo(place - 1, columns)) = .true.
             row((place - 1) / columns) = .true.
          end do
-         is_smallest = is_smallest .and. track%area == count(contact(1, :) > 0)
+         is_smallest = is_smallest .and. track%area == count(track%contact(1, :) > 0)
          call track%extent(width, height)
          is_smallest = is_smallest .and. width == shortest(column) .and. height == shortest(row)
          call track%clear()
-         is_smallest = is_smallest .and. all(contact(1, :) == 0) .and. track%area == 0
+         is_smallest = is_smallest .and. all(track%contact(1, :) == 0) .and. track%area == 0
       end do
       call check(is_smallest, "the smallest rectangle around an avalanche")
    end subroutine reach
@@ -180,14 +176,11 @@ contains
    subroutine balances()
       integer, parameter :: columns = 12, rows = 10, number = columns * rows
       type(contact_lattice_type) :: contacts
-      real(wp), target :: record(record_length, number), detached(detached_length, number)
-      integer, target :: detached_contact(number), track(track_length, number)
       real(wp) :: displacement
       integer :: step, extent(extent_length)
       logical :: is_whole, bears
 
-      call build(contacts, columns, rows, 5.0_wp, 1.0e-3_wp, record, detached, detached_contact, &
-         & track)
+      call build(contacts, columns, rows, 5.0_wp, 1.0e-3_wp)
       call contacts%initialize(initial_uniform)
       call check(contacts%detached_count > 0.0_wp .and. contacts%breaks <= 0.0_wp, &
          & "what neighbours push over at the start is detached, and no break")
@@ -198,7 +191,7 @@ contains
          call contacts%respond(pose_type(), pose_type(time=1.0e-4_wp * step, &
             & displacement=displacement, sense=sign(1.0_wp, cos(0.1_wp * step))))
          is_whole = is_whole .and. nint(contacts%detached_count) &
-            & == count(.not. record(row_stiffness, :) > 0.0_wp)
+            & == count(.not. contacts%record(row_stiffness, :) > 0.0_wp)
          bears = bears .and. bearing(contacts, displacement)
          call contacts%take_extent(extent)
       end do
@@ -222,11 +215,8 @@ contains
    subroutine ends_cascade()
       integer, parameter :: columns = 4, rows = 4, number = columns * rows
       type(contact_lattice_type) :: contacts
-      real(wp), target :: record(record_length, number), detached(detached_length, number)
-      integer, target :: detached_contact(number), track(track_length, number)
 
-      call build(contacts, columns, rows, 1.0e5_wp, 0.0_wp, record, detached, detached_contact, &
-         & track)
+      call build(contacts, columns, rows, 1.0e5_wp, 0.0_wp)
       call contacts%initialize(initial_uniform)
       call contacts%respond(pose_type(), pose_type(displacement=3.0_wp))
       call check(.not. allocated(contacts%failure), "a cascade without delay ends")
@@ -237,26 +227,21 @@ contains
    subroutine refuses()
       type(contact_lattice_type) :: contacts
       type(contact_parameters_type) :: parameters
-      type(contact_arrays_type) :: arrays
       type(error_type), allocatable :: error
 
       parameters%count = 10
       call new_contact_lattice(contacts, parameters, &
-         & interaction_type(1.0_wp, lattice_square, 3, 3), arrays, error)
+         & interaction_type(1.0_wp, lattice_square, 3, 3), error)
       call check(allocated(error), "a lattice of another size is refused")
    end subroutine refuses
 
    !> Contacts of unit threshold and stiffness on a lattice.
-   subroutine build(contacts, columns, rows, bond, delay, record, detached, detached_contact, &
-      & track)
+   subroutine build(contacts, columns, rows, bond, delay)
       type(contact_lattice_type), intent(out) :: contacts
       integer, intent(in) :: columns, rows
       real(wp), intent(in) :: bond, delay
-      real(wp), intent(inout), target, contiguous :: record(:, :), detached(:, :)
-      integer, intent(inout), target, contiguous :: detached_contact(:), track(:, :)
 
       type(contact_parameters_type) :: parameters
-      type(contact_arrays_type) :: arrays
       type(error_type), allocatable :: error
 
       call new_threshold_law(parameters%law, law_gaussian, 0.2_wp, 0.1_wp, error)
@@ -267,16 +252,8 @@ contains
       parameters%back_force_ratio = 0.1_wp
       parameters%coupling = coupling_equal
       parameters%seed = 1_i8
-      record = 0.0_wp
-      track = 0
-      arrays%record => record
-      arrays%detached => detached
-      arrays%detached_contact => detached_contact
       call new_contact_lattice(contacts, parameters, &
-         & interaction_type(bond, lattice_square, columns, rows), arrays, error)
-      contacts%track%columns = columns
-      contacts%track%rows = rows
-      contacts%track%contact => track
+         & interaction_type(bond, lattice_square, columns, rows), error)
    end subroutine build
 
 end program test_lattice

@@ -1,68 +1,71 @@
 !> Whole runs under all run-time checks: energy, conservation, reversal, and a state put away and
 !> taken up again.
 program test_simulation
-   use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_recording_avalanches, only: avalanche_length, snapshot_place_length
-   use mesoslip_contacts_ensemble, only: contact_ensemble_type, new_contact_ensemble
-   use mesoslip_contacts_set, only: contact_arrays_type, detached_length
+   use mesoslip_contacts, only: make_contacts
+   use mesoslip_contacts_base, only: contact_record_length
    use mesoslip_contacts_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
       & initial_steady
-   use mesoslip_contacts_record, only: record_length, row_stiffness
-   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian
+   use mesoslip_handles, only: close_handle, find_simulation, open_handle
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_recording_recorder, only: recorder_parameters_type, slip_length, &
-      & slip_trace_length, trace_length
+   use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
+   use mesoslip_recording_avalanches, only: avalanche_parameters_type
+   use mesoslip_recording_buffer, only: buffer_type
+   use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_simulation, only: ending_drive, energy_length, simulation_type
-   use mesoslip_sliders_layered, only: layered_parameters_type, slider_layered_type, &
-      & solver_adams, solver_bdf, solver_series
-   use mesoslip_sliders_prescribed, only: slider_prescribed_type
-   use mesoslip_sliders_rigid, only: slider_rigid_type
-   use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian, new_threshold_law
+   use mesoslip_sliders, only: make_slider
+   use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
    use testing, only: check, check_close, finish
    implicit none
 
-   integer, parameter :: count = 200, rows = 30000, reals = 96, integers = 48
+   integer, parameter :: count = 200, columns = 20, layers = 6
    integer(i8), parameter :: forever = 1000000000_i8
-   real(wp), target :: record(record_length, count), detached(detached_length, count)
-   integer, target :: detached_contact(count)
-   real(wp), target :: trace(trace_length, rows), slip_trace(slip_trace_length, rows)
-   real(wp), target :: slips(slip_length, rows), layers(0, rows)
-   real(wp), target :: avalanches(avalanche_length, 1), place(snapshot_place_length, 1)
-   real(wp), target :: snapshot(0, 0, 1)
+   real(wp), parameter :: any_work = 1.0e18_wp
 
-   call closes("gaussian", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed, .true.)
-   call closes("exponential", law_exponential, 1.0_wp, coupling_equal, initial_steady, .true.)
-   call closes("prescribed", law_exponential, 1.0_wp, coupling_scaled, initial_steady, .false.)
+   call closes("gaussian", "rigid", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed)
+   call closes("exponential", "rigid", law_exponential, 1.0_wp, coupling_equal, initial_steady)
+   call closes("prescribed", "prescribed", law_exponential, 1.0_wp, coupling_scaled, initial_steady)
    call elastic("series", solver_series, 1.0e-11_wp)
    call elastic("Adams", solver_adams, 1.0e-4_wp)
    call elastic("BDF", solver_bdf, 1.0e-3_wp)
-   call goes_on()
+   call goes_on("ensemble", "rigid", solver_series)
+   call goes_on("ensemble", "prescribed", solver_series)
+   call goes_on("ensemble", "layered", solver_series)
+   call goes_on("ensemble", "layered", solver_adams)
+   call goes_on("ensemble", "layered", solver_bdf)
+   call goes_on("ensemble", "quasistatic", solver_series)
+   call goes_on("lattice", "rigid", solver_series)
+   call goes_on("lattice", "quasistatic", solver_series)
+   call goes_on("populations", "rigid", solver_series)
+   call goes_on("populations", "layered", solver_series)
+   call refuses()
+   call holds()
    call finish()
 
 contains
 
    !> Energy is balanced and contacts are conserved, forward, in a hold, and back.
-   subroutine closes(name, law, width, coupling, initial, rigid)
-      character(len=*), intent(in) :: name
+   subroutine closes(name, slider, law, width, coupling, initial)
+      character(len=*), intent(in) :: name, slider
       integer, intent(in) :: law, coupling, initial
       real(wp), intent(in) :: width
-      logical, intent(in) :: rigid
 
       type(simulation_type) :: simulation
       type(error_type), allocatable :: error
-      real(wp) :: energy(energy_length)
+      real(wp) :: energy(energy_length), record(contact_record_length, count)
 
-      call build(simulation, law, width, coupling, rigid)
+      call build(simulation, "ensemble", slider, law, width, coupling, solver_series)
       call simulation%start(initial)
-      call simulation%run(forever, error)
+      call simulation%run(forever, any_work, error)
       energy = simulation%energy_balance()
       call check(.not. allocated(error) .and. simulation%ending == ending_drive, &
          & "a run ends: " // name)
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, 1.0e-11_wp, &
          & "energy balance: " // name)
       call check(simulation%contacts%breaks > count, "contacts break: " // name)
-      call check(size(pack(record(row_stiffness, :), record(row_stiffness, :) > 0.0_wp)) &
+      call simulation%contacts%records(record)
+      call check(size(pack(record(2, :), record(2, :) > 0.0_wp)) &
          & + nint(simulation%contacts%detached_count) == count, "contacts are conserved: " // name)
       call check(simulation%slider%origin + simulation%slider%displacement < 0.0_wp, &
          & "the slider comes back beyond its start: " // name)
@@ -74,115 +77,200 @@ contains
       integer, intent(in) :: solver
       real(wp), intent(in) :: tolerance
 
-      integer, parameter :: number = 6
       type(simulation_type) :: simulation
-      type(slider_layered_type), allocatable :: slider
       type(error_type), allocatable :: error
-      real(wp), target :: state(number + 1, 2), layer_trace(number, rows)
       real(wp) :: energy(energy_length)
 
-      call build(simulation, law_gaussian, 0.1_wp, coupling_scaled, .true.)
-      call simulation%recorder%attach(trace, slip_trace, slips, layer_trace)
-      allocate (slider)
-      slider%parameters = layered_parameters_type(layers=number, mass=1.47e-3_wp, &
-         & stiffness=97.0_wp, damping=20.0_wp, base_mass=5.0e-3_wp, base_stiffness=1.0e4_wp, &
-         & base_damping=10.0_wp, solver=solver, relative=1.0e-8_wp, absolute=1.0e-21_wp)
-      call slider%attach(state)
-      deallocate (simulation%slider)
-      call move_alloc(slider, simulation%slider)
+      call build(simulation, "ensemble", "layered", law_gaussian, 0.1_wp, coupling_scaled, solver)
       call simulation%start(initial_relaxed)
-      call simulation%run(forever, error)
+      call simulation%run(forever, any_work, error)
       call check(.not. allocated(error) .and. simulation%ending == ending_drive, &
          & "layers come to the end: " // name)
       energy = simulation%energy_balance()
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, tolerance, &
          & "energy balance of layers: " // name)
       call check(simulation%contacts%breaks > count, "contacts break under layers: " // name)
-      call check(all(simulation%slider%integrator_counts() > 0) .neqv. solver == solver_series, &
+      call check(all(simulation%slider%integrator_counts > 0) .neqv. solver == solver_series, &
          & "CVODE counts its steps: " // name)
-      call check(abs(layer_trace(1, simulation%recorder%trace_count) &
-         & - trace(9, simulation%recorder%trace_count) &
-         & - trace(3, simulation%recorder%trace_count)) < 1.0e-15_wp, &
-         & "displacement is that of layer 1 relative to the base: " // name)
-      call simulation%slider%close()
+      associate (recorder => simulation%recorder)
+         call check(recorder%layers%count == recorder%trace%count &
+            & .and. abs(recorder%layers%row(1, recorder%layers%count) &
+            & - recorder%trace%row(9, recorder%trace%count) &
+            & - recorder%trace%row(3, recorder%trace%count)) < 1.0e-15_wp, &
+            & "displacement is that of layer 1 relative to the base: " // name)
+      end associate
    end subroutine elastic
 
-   !> A state that is put away after a few advances and taken up again goes on to the same numbers.
-   subroutine goes_on()
-      type(simulation_type) :: simulation, next
-      type(archive_type) :: archive
+   !> A run that is put away again and again, and taken up by another simulation, is the same to the
+   !> bit: its energy, all that it recorded, and what its integrator did.
+   subroutine goes_on(contacts, slider, solver)
+      character(len=*), intent(in) :: contacts, slider
+      integer, intent(in) :: solver
+
+      type(simulation_type) :: whole
+      type(simulation_type), allocatable :: now, next
       type(error_type), allocatable :: error
-      real(wp) :: whole(energy_length), pieces(energy_length)
-      integer :: segment
+      integer(i8), allocatable :: words(:)
+      integer(i8) :: length
+      integer :: segment, table
+      character(len=:), allocatable :: name
+      character(len=10), parameter :: tables(6) = [character(len=10) :: &
+         & "trace", "slip_trace", "slips", "layers", "avalanches", "snapshots"]
 
-      call build(simulation, law_gaussian, 0.1_wp, coupling_scaled, .true.)
-      call simulation%start(initial_relaxed)
-      call simulation%run(forever, error)
-      whole = simulation%energy_balance()
+      name = contacts // ", " // slider // ", solver " // achar(iachar("0") + solver)
+      call build(whole, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+      call whole%start(initial_relaxed)
+      call whole%run(forever, any_work, error)
 
-      call build(simulation, law_gaussian, 0.1_wp, coupling_scaled, .true.)
-      call simulation%start(initial_relaxed)
+      allocate (now)
+      call build(now, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+      call now%start(initial_relaxed)
       do segment = 1, 100000
-         call simulation%run(37_i8, error)
-         archive%reals = spread(0.0_wp, 1, reals)
-         archive%integers = spread(0_i8, 1, integers)
-         archive = archive_type(reals=archive%reals, integers=archive%integers, saving=.true.)
-         call simulation%exchange(archive)
-         archive = archive_type(reals=archive%reals, integers=archive%integers)
-         call build(next, law_gaussian, 0.1_wp, coupling_scaled, .true.)
-         call next%exchange(archive)
-         simulation = next
-         if (simulation%ending == ending_drive) exit
+         ! Longer and longer, so that all phases of a run are cut, and the test ends.
+         call now%run(int(1 + segment**3 / 8, i8), any_work, error)
+         if (allocated(error) .or. now%ending == ending_drive) exit
+         call now%save(length, error)
+         allocate (words(length))
+         if (.not. allocated(error)) call now%fetch(words, error)
+         allocate (next)
+         call build(next, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+         if (.not. allocated(error)) call next%restore(words, error)
+         deallocate (words)
+         deallocate (now)
+         call move_alloc(next, now)
+         if (allocated(error)) exit
       end do
-      pieces = simulation%energy_balance()
-      call check(simulation%ending == ending_drive .and. segment > 10, &
-         & "the segments come to the end")
-      call check(all(abs(pieces - whole) <= 0.0_wp), "a run in segments is the same to the bit")
+      call check(.not. allocated(error), "a state can be put away and taken up: " // name)
+      call check(now%ending == ending_drive .and. segment > 10, "it comes to its end: " // name)
+      call check(all(abs(now%energy_balance() - whole%energy_balance()) <= 0.0_wp) &
+         & .and. now%advances == whole%advances, "a run in segments is the same: " // name)
+      call check(all(now%slider%integrator_counts == whole%slider%integrator_counts), &
+         & "the integrator does the same: " // name)
+      do table = 1, size(tables)
+         call check(same(now%table(trim(tables(table))), whole%table(trim(tables(table)))), &
+            & "what is recorded is the same: " // name // ", " // trim(tables(table)))
+      end do
    end subroutine goes_on
 
-   !> Klein's case with few contacts and a fast drive that comes back.
-   subroutine build(simulation, law, width, coupling, rigid)
-      type(simulation_type), intent(out) :: simulation
-      integer, intent(in) :: law, coupling
-      real(wp), intent(in) :: width
-      logical, intent(in) :: rigid
+   !> Whether two tables are the same to the bit.
+   function same(one, other)
+      type(buffer_type), intent(in) :: one, other
+      logical :: same
 
-      type(contact_arrays_type) :: arrays
-      type(contact_ensemble_type), allocatable :: contacts
-      type(contact_parameters_type) :: parameters
-      type(recorder_parameters_type) :: recorder
+      same = one%count == other%count
+      if (same) same = all(abs(one%row(:, :one%count) - other%row(:, :other%count)) <= 0.0_wp)
+   end function same
+
+   !> A state of another kind, of another length, or for a run under way, is refused.
+   subroutine refuses()
+      type(simulation_type) :: rigid, other, shorter
       type(error_type), allocatable :: error
+      integer(i8), allocatable :: words(:)
+      integer(i8) :: length
 
-      call new_threshold_law(parameters%law, law, width, 0.1_wp, error)
-      parameters%count = count
-      parameters%static_force = 18.0e-6_wp / count
-      parameters%stiffness = 2000.0_wp / count
-      parameters%drag = 6.7e-5_wp / count
-      parameters%delay = 5.0e-4_wp
-      parameters%back_force_ratio = 0.1_wp
-      parameters%coupling = coupling
-      parameters%seed = 1_i8
-      arrays%record => record
-      arrays%detached => detached
-      arrays%detached_contact => detached_contact
-      allocate (contacts)
-      call new_contact_ensemble(contacts, parameters, arrays, error)
-      call move_alloc(contacts, simulation%contacts)
-      simulation%stage_end = [0.03_wp, 0.05_wp, 0.15_wp]
-      simulation%stage_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
+      call build(rigid, "ensemble", "rigid", law_gaussian, 0.1_wp, coupling_scaled, solver_series)
+      call rigid%start(initial_relaxed)
+      call rigid%run(100_i8, any_work, error)
+      call rigid%save(length, error)
+      allocate (words(length))
+      call rigid%fetch(words, error)
+      call check(.not. allocated(error), "a state is fetched")
+      call rigid%fetch(words, error)
+      call check(allocated(error), "a state is fetched once")
+      call build(other, "ensemble", "prescribed", law_gaussian, 0.1_wp, coupling_scaled, &
+         & solver_series)
+      call other%restore(words, error)
+      call check(allocated(error), "a state of another slider is refused")
+      call build(shorter, "ensemble", "rigid", law_gaussian, 0.1_wp, coupling_scaled, &
+         & solver_series)
+      call shorter%restore(words(:length - 1), error)
+      call check(allocated(error), "a state that is not whole is refused")
+      call rigid%restore(words, error)
+      call check(allocated(error), "a run under way is not set to another state")
+   end subroutine refuses
+
+   !> Handles: what was closed is an error.
+   subroutine holds()
+      type(simulation_type), pointer :: simulation
+      type(error_type), allocatable :: error
+      integer(i8) :: handle(2), stale(2)
+
+      call open_handle(handle)
+      call find_simulation(handle, .false., simulation, error)
+      call check(.not. allocated(error) .and. associated(simulation), "a handle is found")
+      call find_simulation(handle, .true., simulation, error)
+      call check(allocated(error), "a simulation without parts is told")
+      stale = handle + [16_i8, 0_i8]
+      call find_simulation(stale, .false., simulation, error)
+      call check(allocated(error), "a handle of nothing is an error")
+      call close_handle(handle)
+      call find_simulation(handle, .false., simulation, error)
+      call check(allocated(error), "a handle that was closed is an error")
+      call close_handle(handle)
+   end subroutine holds
+
+   !> Klein's case with few contacts and a fast drive that comes back.
+   subroutine build(simulation, contacts, slider, law, width, coupling, solver)
+      type(simulation_type), intent(out) :: simulation
+      character(len=*), intent(in) :: contacts, slider
+      integer, intent(in) :: law, coupling, solver
+      real(wp), intent(in) :: width
+
+      character(len=name_length), parameter :: common(10) = [character(len=name_length) :: &
+         & "count", "static_force", "stiffness", "drag", "delay", "back_force_ratio", "coupling", &
+         & "reattach", "law", "relative_width"]
+      type(parameters_type) :: parameters
+      type(error_type), allocatable :: error
+      type(recorder_parameters_type) :: recorder
+      real(wp) :: values(10), delay
+
+      delay = 5.0e-4_wp
+      if (slider == "quasistatic") delay = 0.0_wp
+      values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
+         & 0.1_wp, real(coupling, wp), 1.0_wp, real(law, wp), width]
+      select case (contacts)
+      case ("lattice")
+         call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &
+            & "bond", "lattice"], [values, real(columns, wp), real(count / columns, wp), &
+            & 100.0_wp / count, 1.0_wp])
+      case ("populations")
+         call new_parameters(parameters, [character(len=name_length) :: common, "resolution"], &
+            & [values, 0.5_wp])
+      case default
+         call new_parameters(parameters, [character(len=name_length) :: common, "columns", &
+            & "rows"], [values, 0.0_wp, 0.0_wp])
+      end select
+      call make_contacts(simulation%contacts, contacts, parameters, 1_i8, 0_i8, error)
+      call check(.not. allocated(error), "contacts: " // contacts)
+
       recorder = recorder_parameters_type(interval=1.0e-4_wp, slip_interval=1.0e-4_wp, &
          & duration=0.15_wp, contacts=count)
-      if (rigid) then
+      select case (slider)
+      case ("rigid")
+         call new_parameters(parameters, [character(len=name_length) :: "mass", "stiffness", &
+            & "damping"], [1.47e-3_wp, 97.0_wp, 51.4_wp])
+      case ("layered")
+         recorder%layers = layers
+         call new_parameters(parameters, [character(len=name_length) :: "layers", "mass", &
+            & "stiffness", "damping", "base_mass", "base_stiffness", "base_damping", "solver", &
+            & "relative_tolerance", "absolute_tolerance"], [real(layers, wp), 1.47e-3_wp, 97.0_wp, &
+            & 20.0_wp, 5.0e-3_wp, 1.0e4_wp, 10.0_wp, real(solver, wp), 1.0e-8_wp, 1.0e-21_wp])
+      case ("quasistatic")
+         call new_parameters(parameters, [character(len=name_length) :: "stiffness"], [97.0_wp])
+      case default
+         call new_parameters(parameters, [character(len=name_length) ::], [real(wp) ::])
+      end select
+      if (slider == "rigid" .or. slider == "layered") then
          recorder%slip_velocity = 1.0e-6_wp
          recorder%quiet_time = 0.012_wp
-         simulation%slider = slider_rigid_type(mass=1.47e-3_wp, stiffness=97.0_wp, &
-            & damping=51.4_wp)
-      else
-         simulation%slider = slider_prescribed_type()
       end if
-      simulation%recorder%parameters = recorder
-      call simulation%recorder%attach(trace, slip_trace, slips, layers)
-      call simulation%avalanches%attach(avalanches, place, snapshot, [real(wp) ::])
+      call make_slider(simulation%slider, slider, parameters, error)
+      call check(.not. allocated(error), "slider: " // slider)
+      simulation%stage_end = [0.03_wp, 0.05_wp, 0.15_wp]
+      simulation%stage_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
+      call simulation%recorder%open(recorder)
+      call simulation%avalanches%open(avalanche_parameters_type(least_size=1.0_wp, &
+         & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%followed())
    end subroutine build
 
 end program test_simulation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip.simulation.engine import Realization
+from mesoslip.simulation.realization import Realization
 from oracles import exact_events, fixed_step
 
 # Fast loading, so that a slip comes within some ten milliseconds.

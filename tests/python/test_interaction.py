@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 from mesoslip import Config
-from mesoslip.simulation.engine import AVALANCHE_COLUMNS, Realization
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.tables import AVALANCHE_COLUMNS
 from oracles import exact_events, quasistatic
 
 # Few contacts under a fast drive; the area makes the bonds a few times as stiff as the contacts.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sksundae
 from mesoslip.output import store
-from mesoslip.simulation.engine import Realization
+from mesoslip.simulation.realization import Realization
 from mesoslip.theory.derived import derived_quantities
 from scipy import linalg
 

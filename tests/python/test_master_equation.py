@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip import ForceCurve
-from mesoslip.simulation.engine import Realization
+from mesoslip.simulation.realization import Realization
 from oracles import frozen_law, stationary_force
 
 FORCE = 18e-6
@@ -198,16 +198,6 @@ def test_segments_do_not_matter(klein):
     assert np.array_equal(whole.trace, pieces.trace)
     assert np.array_equal(whole.slip_trace, pieces.slip_trace)
     assert np.array_equal(whole.energy, pieces.energy)
-
-
-def test_arrays_grow(klein, monkeypatch):
-    from mesoslip.simulation import engine
-
-    config = klein(run__engine="me", run__duration=2.2)
-    whole = finish(config)
-    monkeypatch.setattr(engine, "POPULATIONS", 16)
-    small = finish(config)
-    assert np.array_equal(whole.trace, small.trace)
 
 
 def test_backward_mirrors_forward(klein):

@@ -89,7 +89,7 @@ def run(
     """Simulate, and write an output file."""
     from mesoslip import api
     from mesoslip.output import store
-    from mesoslip.simulation.engine import ENDINGS
+    from mesoslip.simulation.realization import ENDINGS
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"

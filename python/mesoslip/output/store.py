@@ -17,10 +17,11 @@ from mesoslip import _build, _core
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Interaction
 from mesoslip.errors import FileError
-from mesoslip.simulation import engine
+from mesoslip.simulation import tables as engine
 
 if TYPE_CHECKING:
-    from mesoslip.simulation.engine import Array, Realization
+    from mesoslip.simulation.realization import Realization
+    from mesoslip.simulation.tables import Array
 
 # Name: units, long name.
 VARIABLES = {

@@ -1,0 +1,46 @@
+!> The kinds of contacts by name: the only place that knows them all.
+module mesoslip_contacts
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
+   use mesoslip_contacts_ensemble, only: make_contact_ensemble
+   use mesoslip_contacts_lattice, only: make_contact_lattice
+   use mesoslip_contacts_populations, only: make_contact_populations
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_kinds, only: i8
+   use mesoslip_numerics_parameters, only: parameters_type
+   implicit none
+   private
+
+   public :: make_contacts
+
+contains
+
+   !> Set up contacts of a kind.
+   subroutine make_contacts(contacts, kind, parameters, seed, realization, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> Their kind
+      character(len=*), intent(in) :: kind
+      !> What they are made of, each number by its name
+      type(parameters_type), intent(inout) :: parameters
+      !> Key of the random numbers
+      integer(i8), intent(in) :: seed, realization
+      !> Set if there is no such kind, or a number is missing, superfluous or wrong
+      type(error_type), allocatable, intent(out) :: error
+
+      type(contact_parameters_type) :: common
+
+      call take_contact_parameters(common, parameters, seed, realization, error)
+      if (allocated(error)) return
+      select case (kind)
+      case ("ensemble")
+         call make_contact_ensemble(contacts, common, parameters, error)
+      case ("lattice")
+         call make_contact_lattice(contacts, common, parameters, error)
+      case ("populations")
+         call make_contact_populations(contacts, common, parameters, error)
+      case default
+         call raise(error, status_invalid, "unknown kind of contacts '" // kind // "'")
+      end select
+   end subroutine make_contacts
+
+end module mesoslip_contacts

@@ -1,0 +1,113 @@
+!> Handles of simulations: how Python holds what lives in Fortran.
+!>
+!> A handle is the address of a simulation and a stamp that the simulation bears as well. Closing it
+!> makes both zero, so whoever uses it afterwards gets an error.
+module mesoslip_handles
+   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_ok
+   use mesoslip_numerics_kinds, only: i8
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   private
+
+   !> Characters of a message at the boundary
+   integer, parameter :: message_length = 200
+
+   public :: open_handle, close_handle, find_simulation, report
+
+   !> What every simulation is stamped with, besides its address
+   integer(i8), parameter :: stamp = int(z'6D65736F736C6970', i8)
+
+   !> A simulation with its stamp.
+   type :: stamped_type
+      integer(i8) :: stamp = 0_i8
+      type(simulation_type) :: simulation
+   end type stamped_type
+
+contains
+
+   !> Set up a simulation without parts; the handle is zero if there is not enough memory.
+   subroutine open_handle(handle)
+      !> The handle
+      integer(i8), intent(out) :: handle(2)
+
+      type(stamped_type), pointer :: stamped
+      integer :: stat
+
+      handle = 0_i8
+      allocate (stamped, stat=stat)
+      if (stat /= 0) return
+      handle(1) = int(transfer(c_loc(stamped), 0_c_intptr_t), i8)
+      handle(2) = ieor(stamp, handle(1))
+      stamped%stamp = handle(2)
+   end subroutine open_handle
+
+   !> Free a simulation.
+   subroutine close_handle(handle)
+      !> The handle; zero afterwards
+      integer(i8), intent(inout) :: handle(2)
+
+      type(stamped_type), pointer :: stamped
+
+      call find(handle, stamped)
+      handle = 0_i8
+      if (.not. associated(stamped)) return
+      stamped%stamp = 0_i8
+      deallocate (stamped)
+   end subroutine close_handle
+
+   !> The simulation of a handle.
+   subroutine find_simulation(handle, whole, simulation, error)
+      !> The handle
+      integer(i8), intent(in) :: handle(2)
+      !> Whether it must have all its parts
+      logical, intent(in) :: whole
+      !> The simulation
+      type(simulation_type), pointer, intent(out) :: simulation
+      !> Set if there is none, or a part is missing
+      type(error_type), allocatable, intent(out) :: error
+
+      type(stamped_type), pointer :: stamped
+
+      simulation => null()
+      call find(handle, stamped)
+      if (.not. associated(stamped)) then
+         call raise(error, status_invalid, "the simulation was closed")
+         return
+      end if
+      simulation => stamped%simulation
+      if (.not. whole) return
+      if (.not. simulation%is_whole()) call raise(error, status_invalid, &
+         & "the simulation lacks contacts, a slider, a drive, or what is to be recorded")
+   end subroutine find_simulation
+
+   !> What a handle points to; null if that is no simulation.
+   subroutine find(handle, stamped)
+      integer(i8), intent(in) :: handle(2)
+      type(stamped_type), pointer, intent(out) :: stamped
+
+      type(c_ptr) :: address
+
+      stamped => null()
+      if (handle(1) == 0_i8 .or. handle(2) /= ieor(stamp, handle(1))) return
+      address = transfer(int(handle(1), c_intptr_t), c_null_ptr)
+      call c_f_pointer(address, stamped)
+      if (stamped%stamp /= handle(2)) stamped => null()
+   end subroutine find
+
+   !> Tell an error to the caller.
+   subroutine report(error, status, message)
+      !> The error, unallocated if there is none
+      type(error_type), allocatable, intent(in) :: error
+      !> Its status, and its message
+      integer, intent(out) :: status
+      character(len=message_length), intent(out) :: message
+
+      status = status_ok
+      message = ""
+      if (.not. allocated(error)) return
+      status = error%status
+      message = error%message
+   end subroutine report
+
+end module mesoslip_handles

@@ -1,0 +1,106 @@
+!> Rows that were recorded and wait to be taken away.
+module mesoslip_recording_buffer
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: buffer_type
+
+   !> A table that grows.
+   type :: buffer_type
+      !> Rows are columns here, in the order of memory, shape (numbers in a row, room)
+      real(wp), allocatable :: row(:, :)
+      !> Rows that wait
+      integer :: count = 0
+   contains
+      !> Set up an empty table
+      procedure :: open
+      !> Make room for one more row
+      procedure :: reserve
+      !> Add a row
+      procedure :: add
+      !> Take the first rows away
+      procedure :: drain
+      !> Put what waits into an archive or take it out
+      procedure :: exchange
+   end type buffer_type
+
+contains
+
+   !> Set up an empty table.
+   subroutine open(self, length, room)
+      !> The table
+      class(buffer_type), intent(inout) :: self
+      !> Numbers in a row, and rows for which there is room at first
+      integer, intent(in) :: length, room
+
+      if (allocated(self%row)) deallocate (self%row)
+      allocate (self%row(length, room))
+      self%count = 0
+   end subroutine open
+
+   !> Make room for one more row.
+   subroutine reserve(self)
+      !> The table
+      class(buffer_type), intent(inout) :: self
+
+      real(wp), allocatable :: longer(:, :)
+
+      if (self%count < size(self%row, 2)) return
+      allocate (longer(size(self%row, 1), 2 * self%count + 1))
+      longer(:, :self%count) = self%row
+      call move_alloc(longer, self%row)
+   end subroutine reserve
+
+   !> Add a row.
+   subroutine add(self, values)
+      !> The table
+      class(buffer_type), intent(inout) :: self
+      !> The row
+      real(wp), intent(in) :: values(:)
+
+      call self%reserve()
+      self%count = self%count + 1
+      self%row(:, self%count) = values
+   end subroutine add
+
+   !> Take the first rows away.
+   subroutine drain(self, values)
+      !> The table
+      class(buffer_type), intent(inout) :: self
+      !> As many rows as are to be taken, shape (numbers in a row, rows)
+      real(wp), intent(out) :: values(:, :)
+
+      integer :: row, left
+
+      left = self%count - size(values, 2)
+      values = self%row(:, :size(values, 2))
+      do row = 1, left
+         self%row(:, row) = self%row(:, size(values, 2) + row)
+      end do
+      self%count = left
+   end subroutine drain
+
+   !> Put what waits into an archive or take it out.
+   subroutine exchange(self, name, archive)
+      !> The table
+      class(buffer_type), intent(inout) :: self
+      !> Its name
+      character(len=*), intent(in) :: name
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      real(wp), allocatable :: waiting(:, :)
+      integer :: room
+
+      if (archive%saving) waiting = self%row(:, :self%count)
+      call archive%exchange(name, waiting)
+      if (archive%saving .or. allocated(archive%failure)) return
+      room = max(size(self%row, 2), size(waiting, 2))
+      call self%open(size(waiting, 1), room)
+      self%count = size(waiting, 2)
+      self%row(:, :self%count) = waiting
+   end subroutine exchange
+
+end module mesoslip_recording_buffer

@@ -1,0 +1,200 @@
+"""The handle of a simulation that lives in the Fortran kernels."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Mapping
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip import _core
+from mesoslip.errors import RunError
+
+Array = NDArray[np.float64]
+Words = NDArray[np.int64]
+
+# Characters of the name of a parameter, see fortran/numerics/parameters.f90.
+NAME_LENGTH = 32
+
+
+class Progress(NamedTuple):
+    """How far a simulation has come."""
+
+    ending: int
+    """Why it is over; 0 if it is not."""
+    time: float
+    """Time [s]."""
+    displacement: float
+    """Displacement of the slider [m]."""
+    breaks: float
+    detached: float
+    """Contacts that are detached."""
+    avalanche_slip: float
+    """Displacement of the slider in avalanches [m]."""
+    advances: int
+    """Advances of the slider, each to an event or less far."""
+    avalanches: int
+    integrator_counts: NDArray[np.int64]
+    """Steps, evaluations and failed steps of the slider's integrator, if it has one."""
+
+
+def checked(results: Any) -> tuple[Any, ...]:
+    """Results of a kernel without its status and message.
+
+    Raises
+    ------
+    RunError
+        If the kernel failed.
+    """
+    *values, status, message = results
+    if status != 0:
+        raise RunError(message.decode().strip())
+    return tuple(values)
+
+
+class Kernel:
+    """A simulation in Fortran: its parts are set, then it is started or restored, then it advances.
+
+    It is freed with this object, or by `close`. Different simulations are independent of each
+    other, on whatever threads; one simulation is at work on one thread at a time.
+
+    Raises
+    ------
+    RunError
+        By every method, if the simulation was closed, is at work on another thread, lacks a part,
+        or fails.
+    """
+
+    def __init__(self) -> None:
+        self._handle: Words = np.zeros(2, dtype=np.int64)
+        self._lock = threading.Lock()
+        _core.open_simulation(self._handle)
+        # The finalizer holds the handle, not this object.
+        self._free = weakref.finalize(self, _core.close_simulation, self._handle)
+
+    def _call(self, procedure: Any, *arguments: Any) -> tuple[Any, ...]:
+        if not self._lock.acquire(blocking=False):
+            raise RunError("the simulation is at work on another thread")
+        try:
+            return checked(procedure(self._handle, *arguments))
+        finally:
+            self._lock.release()
+
+    def close(self) -> None:
+        """Free the simulation; waits until it is not at work."""
+        with self._lock:
+            self._free()
+
+    @property
+    def is_open(self) -> bool:
+        return self._free.alive
+
+    def __copy__(self) -> NoReturn:
+        raise TypeError("a simulation cannot be copied; save it, and restore another from that")
+
+    def __deepcopy__(self, _: Any) -> NoReturn:
+        self.__copy__()
+
+    def __reduce__(self) -> NoReturn:
+        self.__copy__()
+
+    def set_contacts(
+        self, kind: str, parameters: Mapping[str, float], seed: int, realization: int
+    ) -> None:
+        """Make the contacts of a kind from named numbers."""
+        self._call(_core.set_contacts, kind, *_named(parameters), seed, realization)
+
+    def set_slider(self, kind: str, parameters: Mapping[str, float]) -> None:
+        """Make the slider of a kind from named numbers."""
+        self._call(_core.set_slider, kind, *_named(parameters))
+
+    def set_drive(self, stage_end: Array, stage_velocity: Array) -> None:
+        """Stages of the drive: when each ends [s], and its velocity [m/s], shape (stages)."""
+        self._call(_core.set_drive, stage_end, stage_velocity)
+
+    def set_recorder(
+        self,
+        *,
+        interval: float,
+        slip_interval: float,
+        slip_velocity: float,
+        quiet_time: float,
+        duration: float,
+        layers: int,
+    ) -> None:
+        """What to record of the motion; intervals and times in s, 0 for what is not recorded."""
+        self._call(
+            _core.set_recorder,
+            interval,
+            slip_interval,
+            slip_velocity,
+            quiet_time,
+            duration,
+            layers,
+        )
+
+    def set_avalanches(
+        self,
+        *,
+        least_size: float,
+        snapshot_size: float,
+        most_avalanches: int,
+        snapshot_times: Array,
+    ) -> None:
+        """What to record of avalanches; 0 for what is not recorded, and for no most number."""
+        self._call(_core.set_avalanches, least_size, snapshot_size, most_avalanches, snapshot_times)
+
+    def start(self, initial: int) -> None:
+        """Draw the contacts in an initial state, and put the slider in balance with them."""
+        self._call(_core.start_simulation, initial)
+
+    def advance(self, most_advances: int, most_work: float) -> None:
+        """Go on for some advances or some work, until much waits to be drained, or to the end.
+
+        Work is in units of an advance of a rigid slider or a contact that breaks.
+        """
+        self._call(_core.advance_simulation, most_advances, most_work)
+
+    def ask(self) -> Progress:
+        """How far it has come."""
+        return Progress(*self._call(_core.ask_simulation))
+
+    def energy(self) -> Array:
+        """Terms of the energy balance [J]."""
+        (values,) = self._call(_core.ask_energy)
+        return np.asarray(values)
+
+    def contacts(self, count: int) -> Array:
+        """Of each contact origin, stiffness, breaking stretch and renewals, shape (4, count)."""
+        (values,) = self._call(_core.ask_contacts, count)
+        return np.asarray(values)
+
+    def drain(self, table: str) -> Array:
+        """Take what was recorded of a table away, shape (rows, numbers in a row)."""
+        columns, rows = self._call(_core.count_rows, table)
+        values = np.empty((rows, columns))
+        if rows:
+            self._call(_core.drain_rows, table, values.T)
+        return values
+
+    def save(self) -> Words:
+        """The whole state, to go on from it in another simulation with the same parts."""
+        (length,) = self._call(_core.save_simulation)
+        words = np.empty(length, dtype=np.int64)
+        self._call(_core.fetch_state, words)
+        return words
+
+    def restore(self, words: Words) -> None:
+        """Go on from a state, instead of starting."""
+        self._call(_core.restore_simulation, words)
+
+
+def _named(parameters: Mapping[str, float]) -> tuple[Any, Array]:
+    names = [name.ljust(NAME_LENGTH).encode() for name in parameters]
+    # Of two arrays of one length f2py refuses the second if that is 0.
+    values = np.zeros(max(1, len(names)))
+    values[: len(names)] = list(parameters.values())
+    return np.array(names, dtype=f"S{NAME_LENGTH}"), values

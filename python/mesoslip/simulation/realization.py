@@ -1,0 +1,352 @@
+"""One run of a configuration with its own random numbers, advanced in segments.
+
+Its numbers do not depend on where segments end, on what runs beside it, or on whether it was put
+away and taken up again.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mesoslip.errors import RunError
+from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.tables import (
+    COLUMNS,
+    ENERGY_COLUMNS,
+    SNAPSHOT_NUMBERS,
+    TABLES,
+    FirstRows,
+    Rows,
+)
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+ENDINGS = {
+    1: "the drive came to its end",
+    2: "as many avalanches as wanted",
+    3: "no contact is left to break",
+    4: "contacts break under the force without end",
+}
+
+# Work of the drive over the energy of all contacts about to break, below which it does not count.
+LEAST_ENERGY = 1e-9
+
+# The end of a drive that does not end: the greatest double.
+NEVER = float(np.finfo(np.float64).max)
+
+# Wall time of a segment, between two looks at progress and signals [s]; work of the first one.
+SEGMENT_SECONDS = 0.25
+SEGMENT_WORK = 100_000.0
+# No bound on the advances or the work of a segment.
+ANY_NUMBER = 2**62
+# What no stretch can be: that of a detached contact.
+DETACHED = 1e300
+
+
+class SnapshotRows:
+    """Snapshots of the contacts, shape (snapshots, contacts, 3), see `SNAPSHOT_NUMBERS`."""
+
+    def __init__(self, rows: Rows | FirstRows) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def _shaped(self, values: Array) -> Array:
+        shaped = values.reshape(len(values), -1, len(SNAPSHOT_NUMBERS))
+        return np.where(shaped > DETACHED, np.nan, shaped)
+
+    def blocks(self, most: int) -> Iterator[Array]:
+        """The snapshots in their order, at most so many at a time; NaN is a detached contact."""
+        for values in self._rows.blocks(most):
+            yield self._shaped(values)
+
+    def read(self) -> Array:
+        """All snapshots."""
+        return self._shaped(self._rows.read())
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A realization as a checkpoint keeps it."""
+
+    scalars: dict[str, Any]
+    counts: dict[str, int]
+    """Rows of each table up to here."""
+    words: Words | None
+    """State of the kernel; None if the run is over."""
+
+
+class Realization:
+    """One run of a configuration.
+
+    Attributes
+    ----------
+    config, number
+        What is run, and the number of the realization, from 0.
+    time
+        Time it has come to [s].
+    ending
+        Why it is over; empty if it is not.
+    breaks, detached, advances
+        Breaks so far, contacts that are detached, advances of the slider so far.
+    kernel_seconds
+        Computing time.
+    avalanche_count, avalanche_slip
+        Avalanches so far, and the displacement of the slider in them [m].
+    displacement
+        Displacement of the slider [m].
+    integrator_counts
+        Steps, evaluations and failed steps of the slider's integrator, if it has one.
+    """
+
+    def __init__(self, config: Config, number: int) -> None:
+        self.config = config
+        self.number = number
+        self.time = 0.0
+        self.ending = ""
+        self.breaks: float = 0.0
+        self.detached = 0.0
+        self.advances = 0
+        self.kernel_seconds = 0.0
+        self.avalanche_count = 0
+        self.avalanche_slip = 0.0
+        self.displacement = 0.0
+        self.integrator_counts = np.zeros(3, dtype=np.int64)
+        self._energy: Array | None = None
+        self._kernel: Kernel | None = None
+        self._words: Words | None = None
+        self._work = SEGMENT_WORK
+        self._tables: dict[str, Rows] = {}
+        self._lock = threading.Lock()
+
+    def _open(self) -> Kernel:
+        """The kernel with its parts, started or restored."""
+        if self._kernel is not None:
+            return self._kernel
+        config = self.config
+        slider, contacts, output = config.slider, config.contact_kind, config.output
+        kernel = Kernel()
+        kernel.set_contacts(
+            contacts.kernel_kind,
+            contacts.kernel_parameters(config),
+            config.run.seed,
+            self.number,
+        )
+        kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
+        stages = config.drive_stages
+        ends = np.minimum(np.cumsum([stage.duration for stage in stages]), NEVER)
+        kernel.set_drive(ends, np.array([stage.velocity for stage in stages]))
+        kernel.set_recorder(
+            interval=config.output_interval,
+            slip_interval=output.slip_interval or 0.0,
+            slip_velocity=slider.slip_velocity(config),
+            quiet_time=slider.quiet_time,
+            duration=float(ends[-1]),
+            layers=slider.layers_recorded(config),
+        )
+        kernel.set_avalanches(
+            least_size=float(output.avalanche_size or 1) * config.has_avalanches,
+            snapshot_size=float(output.snapshot_size or 0),
+            most_avalanches=config.run.avalanches or 0,
+            snapshot_times=np.array(output.snapshots, dtype=float),
+        )
+        if self._words is not None:
+            kernel.restore(self._words)
+            self._words = None
+        else:
+            kernel.start(config.initial_code)
+        self._kernel = kernel
+        return kernel
+
+    def advance(self, advances: int | None = None) -> None:
+        """Go on for one segment: about a quarter of a second, or a number of advances.
+
+        Raises
+        ------
+        RunError
+            If the kernel cannot go on.
+        """
+        if self.finished:
+            return
+        start = time.perf_counter()
+        try:
+            kernel = self._open()
+            if advances is None:
+                kernel.advance(ANY_NUMBER, self._work)
+            else:
+                kernel.advance(advances, float(ANY_NUMBER))
+            self._take(kernel)
+        except RunError as error:
+            raise RunError(f"realization {self.number}: {error}") from None
+        seconds = time.perf_counter() - start
+        self.kernel_seconds += seconds
+        if advances is None:
+            self._work *= min(2.0, max(0.1, SEGMENT_SECONDS / max(seconds, 1e-9)))
+
+    def _take(self, kernel: Kernel) -> None:
+        """Take what was recorded, and how far the kernel has come."""
+        progress = kernel.ask()
+        with self._lock:
+            for table in TABLES:
+                values = kernel.drain(table)
+                if table not in self._tables:
+                    self._tables[table] = Rows(values.shape[1])
+                self._tables[table].add(values)
+            self.time = progress.time
+            self.breaks = progress.breaks
+            if self.config.contact_kind.is_discrete:
+                self.breaks = int(progress.breaks)
+            self.detached = progress.detached
+            self.advances = progress.advances
+            self.avalanche_count = progress.avalanches
+            self.avalanche_slip = progress.avalanche_slip
+            self.displacement = progress.displacement
+            self.integrator_counts = progress.integrator_counts.copy()
+            self.ending = ENDINGS.get(progress.ending, "")
+            self._energy = kernel.energy() if self.ending else None
+
+    def close(self) -> None:
+        """Give back the memory of the kernel, when it will not go on."""
+        if self._kernel is not None:
+            self._kernel.close()
+            self._kernel = None
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over."""
+        return bool(self.ending)
+
+    @property
+    def part_done(self) -> float:
+        """Part of the run that is done, 0 to 1."""
+        if self.finished:
+            return 1.0
+        wanted = self.config.run.avalanches
+        by_avalanches = self.avalanche_count / wanted if wanted else 0.0
+        return min(1.0, max(by_avalanches, self.time / self.config.duration))
+
+    @property
+    def energy(self) -> Array:
+        """Terms of the energy balance up to now, in the order of `ENERGY_COLUMNS` [J]."""
+        if self._energy is not None:
+            return self._energy
+        if self._kernel is None:
+            return np.full(len(ENERGY_COLUMNS), np.nan)
+        return self._kernel.energy()
+
+    @property
+    def energy_residual(self) -> float:
+        """What the energy balance lacks, relative to the work of the drive or its largest term."""
+        contacts, energy = self.config.contacts, self.energy
+        # A run in which hardly anything happens is measured by what may happen.
+        unit = contacts.static_force**2 / contacts.stiffness
+        scale = abs(energy[0]) or float(np.max(np.abs(energy)))
+        return float(energy[-1] / max(scale, LEAST_ENERGY * unit))
+
+    @property
+    def contacts(self) -> dict[str, Array]:
+        """Of each of N contacts: origin [m], stiffness [N/m], 0 if it is detached, breaking stretch
+        [m], number of renewals."""
+        names = ("origin", "stiffness", "break_stretch", "renewals")
+        return dict(zip(names, self._open().contacts(self.config.contacts.count), strict=True))
+
+    def rows(self, table: str) -> Rows | FirstRows | SnapshotRows:
+        """What was recorded of a table, see `TABLES`: without samples of what came to no slip."""
+        rows = self._tables.get(table) or Rows(COLUMNS[table])
+        if table == "slip_trace":
+            return FirstRows(rows, self._slip_samples(rows))
+        if table == "snapshots":
+            return SnapshotRows(rows)
+        return rows
+
+    @property
+    def trace(self) -> Array:
+        """The samples of the trace, columns `TRACE_COLUMNS`."""
+        return self.rows("trace").read()
+
+    @property
+    def slips(self) -> Array:
+        """The catalogue of slips, columns `SLIP_COLUMNS`."""
+        return self.rows("slips").read()
+
+    @property
+    def slip_trace(self) -> Array:
+        """The finer samples: those of a trace and the number of the slip."""
+        return self.rows("slip_trace").read()
+
+    @property
+    def layer_trace(self) -> Array:
+        """Displacements of the layers at the samples of the trace."""
+        return self.rows("layers").read()
+
+    @property
+    def avalanches(self) -> Array:
+        """The catalogue of avalanches, columns `AVALANCHE_COLUMNS`."""
+        return self.rows("avalanches").read()
+
+    @property
+    def snapshot_places(self) -> Array:
+        """When and where snapshots were taken, columns `SNAPSHOT_COLUMNS`."""
+        return self.rows("snapshot_places").read()
+
+    @property
+    def snapshots(self) -> Array:
+        """The snapshots, shape (snapshots, contacts, 3), numbers `SNAPSHOT_NUMBERS`."""
+        return self.rows("snapshots").read()
+
+    def _slip_samples(self, rows: Rows) -> int:
+        """Samples of slips in the catalogue: those of a slip that has no end yet come last."""
+        slips = len(self._tables["slips"]) if "slips" in self._tables else 0
+        count = len(rows)
+        for piece in reversed(rows.pieces):
+            number = (piece if isinstance(piece, np.ndarray) else piece.load())[:, -1]
+            if number[0] < slips:
+                return count - int(np.count_nonzero(number >= slips))
+            count -= len(piece)
+        return count
+
+    @property
+    def waiting(self) -> Iterator[tuple[str, Rows]]:
+        """Tables, which may hold rows that are in no file."""
+        yield from list(self._tables.items())
+
+    def save(self) -> Saved:
+        """What a checkpoint keeps of it; to be called between two segments."""
+        words = None
+        if not self.finished and (self._kernel is not None or self._words is not None):
+            words = self._words if self._kernel is None else self._kernel.save()
+        scalars = {
+            "time": self.time,
+            "ending": self.ending,
+            "breaks": self.breaks,
+            "detached": self.detached,
+            "advances": self.advances,
+            "kernel_seconds": self.kernel_seconds,
+            "avalanche_count": self.avalanche_count,
+            "avalanche_slip": self.avalanche_slip,
+            "displacement": self.displacement,
+            "integrator_counts": [int(count) for count in self.integrator_counts],
+            "energy": None if self._energy is None else [float(term) for term in self._energy],
+            "columns": {table: rows.columns for table, rows in self._tables.items()},
+        }
+        counts = {table: len(rows) for table, rows in self._tables.items()}
+        return Saved(scalars, counts, words)
+
+    def restore(self, saved: Saved, tables: dict[str, Rows]) -> None:
+        """Go on from what a checkpoint has kept, with the rows that were recorded until then."""
+        for name, value in saved.scalars.items():
+            if name not in {"columns", "energy", "integrator_counts"}:
+                setattr(self, name, value)
+        energy = saved.scalars["energy"]
+        self._energy = None if energy is None else np.array(energy)
+        self.integrator_counts = np.array(saved.scalars["integrator_counts"], dtype=np.int64)
+        self._words = saved.words
+        self._tables = tables

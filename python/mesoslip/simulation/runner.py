@@ -1,0 +1,108 @@
+"""All realizations of a run, side by side on threads, with checkpoints on the way."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mesoslip.errors import RunError
+from mesoslip.simulation.realization import Realization
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+    from mesoslip.simulation.checkpoint import Checkpoint
+
+TOO_MUCH = (
+    "not enough memory for what is recorded: a larger output.avalanche_size or "
+    "output.snapshot_size, or a longer output.interval, takes less"
+)
+
+# How often the main thread looks at what the others do [s].
+LOOK_SECONDS = 0.1
+
+
+@dataclass
+class Results:
+    """What came out of a run."""
+
+    config: Config
+    realizations: list[Realization]
+    complete: bool
+    """Whether every realization came to its end; not so when it was stopped."""
+    wall_seconds: float
+
+
+def run_realizations(
+    config: Config,
+    *,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    stop: threading.Event | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> Results:
+    """Run all realizations of a configuration on threads.
+
+    Parameters
+    ----------
+    config
+        What to run.
+    workers
+        Realizations that run at the same time; as many as there are processors by default.
+    progress
+        Called now and then, from this thread, with the part of the work that is done.
+    stop
+        Set by who wants the run to stop soon, between two segments; Ctrl-C does the same.
+    checkpoint
+        Where to keep checkpoints, and what a run before has kept there; none by default.
+
+    Raises
+    ------
+    RunError
+        If a realization fails; the checkpoint stays.
+    """
+    start = time.perf_counter()
+    stop = stop or threading.Event()
+    realizations = [Realization(config, number) for number in range(config.run.realizations)]
+    before = checkpoint.restore(realizations) if checkpoint is not None else 0.0
+    workers = min(workers or os.cpu_count() or 1, len(realizations))
+
+    def finish(realization: Realization) -> None:
+        while not (realization.finished or stop.is_set()):
+            realization.advance()
+            if checkpoint is not None:
+                checkpoint.visit(realization)
+        if realization.finished:
+            realization.close()
+
+    def look(done: set[Future[None]]) -> None:
+        for future in done:
+            try:
+                future.result()
+            except MemoryError:
+                raise RunError(TOO_MUCH) from None
+        if progress is not None:
+            progress(sum(one.part_done for one in realizations) / len(realizations))
+        if checkpoint is not None:
+            checkpoint.look(realizations)
+
+    with ThreadPoolExecutor(workers) as pool:
+        pending = {pool.submit(finish, one) for one in realizations if not one.finished}
+        try:
+            while pending:
+                done, pending = wait(pending, LOOK_SECONDS, return_when="FIRST_EXCEPTION")
+                look(done)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            stop.set()
+            for future in pending:
+                future.cancel()
+    complete = all(one.finished for one in realizations)
+    if checkpoint is not None and not complete:
+        checkpoint.write(realizations)
+    return Results(config, realizations, complete, before + time.perf_counter() - start)

@@ -1,0 +1,190 @@
+"""What a run records: tables of numbers, row by row, in memory or in the files of a checkpoint."""
+
+from __future__ import annotations
+
+import threading
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import RunError
+
+Array = NDArray[np.float64]
+
+TRACE_COLUMNS = (
+    "time",
+    "drive_displacement",
+    "displacement",
+    "velocity",
+    "spring_force",
+    "contact_force",
+    "detached_contacts",
+    "elastic_force",
+    "base_displacement",
+)
+SLIP_COLUMNS = (
+    "slip",
+    "start_time",
+    "end_time",
+    "force_before",
+    "force_after",
+    "peak_velocity",
+    "contacts_broken",
+)
+AVALANCHE_COLUMNS = (
+    "time",
+    "displacement",
+    "size",
+    "force_before",
+    "force_drop",
+    "slip",
+    "area",
+    "width",
+    "height",
+    "generations",
+)
+SNAPSHOT_COLUMNS = ("time", "displacement", "size")
+# Of each contact of a snapshot.
+SNAPSHOT_NUMBERS = ("stretch", "load", "generation")
+ENERGY_COLUMNS = (
+    "drive_work",
+    "slider_energy",
+    "contact_energy",
+    "damping_loss",
+    "drag_loss",
+    "break_loss",
+    "birth_gain",
+    "residual",
+)
+
+# The tables of the kernel with the numbers in a row, but for those that depend on the run. A sample
+# of a slip trace has the number of its slip behind the columns of the trace; the displacements of
+# layers go with the samples of the trace.
+COLUMNS = {
+    "trace": len(TRACE_COLUMNS),
+    "slip_trace": len(TRACE_COLUMNS) + 1,
+    "slips": len(SLIP_COLUMNS),
+    "layers": 0,
+    "avalanches": len(AVALANCHE_COLUMNS),
+    "snapshot_places": len(SNAPSHOT_COLUMNS),
+    "snapshots": 0,
+}
+TABLES = tuple(COLUMNS)
+
+
+@dataclass
+class Stored:
+    """Rows in a file."""
+
+    path: Path
+    place: int
+    """Where they start [bytes]."""
+    shape: tuple[int, int]
+    checksum: int
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def load(self) -> Array:
+        """Read them.
+
+        Raises
+        ------
+        RunError
+            If they are not what was written.
+        """
+        count = self.shape[0] * self.shape[1]
+        try:
+            values = np.fromfile(self.path, dtype=np.float64, count=count, offset=self.place)
+        except OSError as error:
+            raise RunError(f"{self.path}: cannot be read: {error.strerror}") from error
+        if values.size != count or zlib.crc32(values.data) != self.checksum:
+            raise RunError(f"{self.path}: damaged: it is not what the run has written")
+        return values.reshape(self.shape)
+
+
+class Rows:
+    """The rows of a table of one realization, in pieces.
+
+    Pieces are added by the thread of the realization, and put into files by another.
+    """
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self.pieces: list[Array | Stored] = []
+        self._lock = threading.Lock()
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def waiting_bytes(self) -> int:
+        """Memory of the pieces that are in no file."""
+        with self._lock:
+            return sum(one.nbytes for one in self.pieces if isinstance(one, np.ndarray))
+
+    def add(self, values: Array | Stored) -> None:
+        """Add rows, shape (rows, columns)."""
+        if len(values) == 0:
+            return
+        with self._lock:
+            self.pieces.append(values)
+            self._count += len(values)
+
+    def waiting(self) -> list[tuple[int, Array]]:
+        """Pieces that are in no file, with their numbers."""
+        with self._lock:
+            return [
+                (number, one)
+                for number, one in enumerate(self.pieces)
+                if isinstance(one, np.ndarray)
+            ]
+
+    def store(self, number: int, stored: Stored) -> None:
+        """A piece is in a file now."""
+        with self._lock:
+            self.pieces[number] = stored
+
+    def blocks(self, most: int) -> Iterator[Array]:
+        """The rows in their order, at most so many at a time."""
+        with self._lock:
+            pieces = list(self.pieces)
+        for piece in pieces:
+            values = piece.load() if isinstance(piece, Stored) else piece
+            for start in range(0, len(values), most):
+                yield values[start : start + most]
+
+    def read(self) -> Array:
+        """All rows, shape (rows, columns)."""
+        return np.concatenate(
+            [np.empty((0, self.columns)), *self.blocks(max(1, len(self)))], dtype=np.float64
+        )
+
+
+class FirstRows:
+    """The first rows of a table."""
+
+    def __init__(self, rows: Rows, count: int) -> None:
+        self._rows, self._count = rows, count
+        self.columns = rows.columns
+
+    def __len__(self) -> int:
+        return self._count
+
+    def blocks(self, most: int) -> Iterator[Array]:
+        """See `Rows.blocks`."""
+        left = self._count
+        for block in self._rows.blocks(most):
+            if left == 0:
+                return
+            yield block[:left]
+            left -= min(left, len(block))
+
+    def read(self) -> Array:
+        """See `Rows.read`."""
+        return np.concatenate([np.empty((0, self.columns)), *self.blocks(max(1, self._count))])

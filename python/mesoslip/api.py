@@ -222,7 +222,8 @@ def plot(
         written.
     """
     from mesoslip.plots import avalanches as avalanche_plots
-    from mesoslip.plots import run as plots
+    from mesoslip.plots.draw import draw
+    from mesoslip.plots.style import save
 
     tree = output if isinstance(output, xr.DataTree) else read(output)
     if Path(figure).suffix == ".gif":
@@ -230,7 +231,7 @@ def plot(
             raise FileError(f"{figure}: only the lattice can be shown in motion, not {view!r}")
         avalanche_plots.animate(tree, Path(figure), snapshot)
     else:
-        plots.save(plots.draw(tree, view, snapshot), Path(figure))
+        save(draw(tree, view, snapshot), Path(figure))
 
 
 def figures(

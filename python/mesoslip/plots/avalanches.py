@@ -25,7 +25,7 @@ from mesoslip.analysis.avalanche_statistics import (
 from mesoslip.analysis.avalanches import failures
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
-from mesoslip.plots.run import STYLE, written_whole
+from mesoslip.plots.style import STYLE, written_whole
 
 Array = NDArray[np.float64]
 

@@ -21,6 +21,8 @@ from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output import store
 from mesoslip.plots import avalanches as avalanche_plots
 from mesoslip.plots import run as plots
+from mesoslip.plots.style import CONTACT, SPRING, STYLE, save
+from mesoslip.plots.theory import draw_onset
 
 
 def configuration(tree: xr.DataTree) -> Config:
@@ -69,7 +71,7 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
                 start = int(np.argmax(displacement >= onset.attrs["X_c"]))
                 tau = onset.attrs["omega_s"] * (times - times[start])
                 axes.plot(tau, (force - force[start]) / static, **style)
-            plots.draw_onset(axes, onset, linestyle="--")
+            draw_onset(axes, onset, linestyle="--")
             axes.set_xlabel(r"$\tau = \Omega_S (t - t_c)$")
             axes.set_ylabel(r"$\Delta F_d/F_s$")
         whole, start_of_slip = columns
@@ -156,12 +158,8 @@ def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
         window = plots.slip_window(slip, before=0.1, after=0.8)
         for axes, name in ((velocity, "velocity"), (detached, "detached_contacts")):
             plots.draw_series(axes, tree, name, window=window, time_unit=1e-3, color="black")
-        plots.draw_series(
-            force, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT
-        )
-        plots.draw_series(
-            force, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING
-        )
+        plots.draw_series(force, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        plots.draw_series(force, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         detached.set_xlabel(f"time after {window[0]:.4f} s (ms)")
         force.legend()
     velocity.set_ylabel("slider velocity (µm/s)")
@@ -305,10 +303,8 @@ def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
     all_axes = figure.subplots(2, 2).flat
     for letter, axes, tree in zip("abcd", all_axes, trees, strict=True):
         window = _first_slip(tree)
-        plots.draw_series(
-            axes, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT
-        )
-        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING)
+        plots.draw_series(axes, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
         axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
         axes.set_ylabel("force (µN)")
@@ -435,9 +431,9 @@ def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
     paths = []
     for name in names:
         trees = [store.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
-        with mpl.rc_context(plots.STYLE):
+        with mpl.rc_context(STYLE):
             figure = FIGURES[name].draw(trees)
         path = folder / f"{name}.png"
-        plots.save(figure, path)
+        save(figure, path)
         paths.append(path)
     return paths

@@ -13,7 +13,8 @@ import xarray as xr
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
-from mesoslip.output import store
+from mesoslip.output import files, layout
+from mesoslip.output.realizations import EngineResults, RealizationTables
 from mesoslip.simulation import engine
 from mesoslip.theory.derived import Derived, derived_quantities
 
@@ -38,7 +39,7 @@ def as_config(
         return Config.from_dict(config)
     path = Path(config)
     if path.suffix == ".nc":
-        return store.configuration(path, overrides)
+        return files.configuration(path, overrides)
     return Config.load(path, overrides)
 
 
@@ -73,12 +74,20 @@ def run(
     RunError
         If the run fails.
     """
-    config = as_config(config)
+    return layout.build_tree(simulate(as_config(config), workers=workers, progress=progress))
+
+
+def simulate(
+    config: Config,
+    *,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> layout.RunResults:
+    """Simulate; what came out as tables, to build a tree of or to write to a file. See `run`."""
     start = time.perf_counter()
     realizations, complete = engine.run_realizations(config, workers=workers, progress=progress)
-    return store.build(
-        config, realizations, complete=complete, wall_seconds=time.perf_counter() - start
-    )
+    tables = tuple(RealizationTables(one) for one in realizations)
+    return EngineResults(config, tables, complete, time.perf_counter() - start)
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
@@ -127,11 +136,29 @@ def read(path: PathLike) -> xr.DataTree:
     FileError
         If there is no such file, or it is no output of mesoslip, or it is damaged.
     """
-    return store.read(Path(path))
+    return files.read(Path(path))
 
 
 def _as_tree(output: PathLike | xr.DataTree) -> xr.DataTree:
-    return output if isinstance(output, xr.DataTree) else store.read_run(Path(output))
+    return output if isinstance(output, xr.DataTree) else files.read_run(Path(output))
+
+
+def group(output: PathLike | xr.DataTree, name: str) -> xr.Dataset:
+    """A group of an output alone, such as "slip_traces".
+
+    Without the coordinates of the root that it does not use, so that its ``to_dataframe`` has a row
+    for each of its rows, not for each pair of them and a time of the trace.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or has no such group.
+    """
+    tree = output if isinstance(output, xr.DataTree) else files.read(output)
+    if name not in tree.children:
+        there = ", ".join(tree.children) or "none"
+        raise FileError(f"the output has no group {name!r}; it has {there}")
+    return layout.group_of(tree, name)
 
 
 def slips(output: PathLike | xr.DataTree) -> xr.Dataset:

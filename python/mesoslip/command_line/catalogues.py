@@ -20,9 +20,9 @@ def slips(
 ) -> None:
     """Show the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogue
-    from mesoslip.output import store
+    from mesoslip.output import files
 
-    tree = store.read_run(output)
+    tree = files.read_run(output)
     if table is not None:
         catalogue.write_csv(tree, table)
     rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
@@ -35,7 +35,7 @@ def slips(
     )
     for row in rows:
         typer.echo(
-            f"{row['realization']:13d} {row['start_time']:10.4f} "
+            f"{row['realization_index']:13d} {row['start_time']:10.4f} "
             f"{1e3 * (row['end_time'] - row['start_time']):13.3f} "
             f"{1e6 * row['force_before']:11.4f} "
             f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
@@ -77,9 +77,9 @@ def avalanches(
     """Show sizes of avalanches: their distribution, and the law that fits it."""
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_statistics import ccdf, logarithmic_bins
-    from mesoslip.output import store
+    from mesoslip.output import files
 
-    tree = store.read_run(output)
+    tree = files.read_run(output)
     start = _time(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)
     if table is not None:

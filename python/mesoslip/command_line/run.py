@@ -30,29 +30,31 @@ def run(
 ) -> None:
     """Simulate, and write an output file."""
     from mesoslip import api
-    from mesoslip.output import store
+    from mesoslip.output import files, layout
     from mesoslip.simulation.engine import ENDINGS
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
-    store.check_writable(path)
+    files.check_writable(path)
     with progress_shown(quiet) as progress:
-        tree = api.run(checked, workers=workers, progress=progress)
-    if tree.attrs["complete"] == "false":
+        results = api.simulate(checked, workers=workers, progress=progress)
+    told = layout.attributes(results)
+    if not results.complete:
         partial = path.with_name(f"{path.stem}.partial{path.suffix}")
-        store.write(tree, partial)
-        typer.echo(f"{tree.attrs['comment']}; what there is, is in {partial}", err=True)
+        files.write_results(results, partial)
+        typer.echo(f"{told['comment']}; what there is, is in {partial}", err=True)
         raise typer.Exit(INTERRUPTED)
-    store.write(tree, path)
+    files.write_results(results, path)
     if not quiet:
-        found = f"{tree['slips'].sizes['slip']} slips"
-        if "avalanche_count" in tree.data_vars:
-            found = f"{int(tree.to_dataset()['avalanche_count'].sum())} avalanches, {found}"
+        found = f"{sum(len(one.rows('slips')) for one in results.realizations)} slips"
+        if checked.has_avalanches:
+            count = sum(one.avalanche_count for one in results.realizations)
+            found = f"{count} avalanches, {found}"
         typer.echo(
-            f"{path}: {tree.attrs['break_count']:.0f} breaks, {found}, "
-            f"energy balance to {abs(tree.attrs['energy_residual']):.0e}, "
-            f"{tree.attrs['wall_seconds']:.2f} s",
+            f"{path}: {told['break_count']:.0f} breaks, {found}, "
+            f"energy balance to {abs(told['energy_residual']):.0e}, "
+            f"{told['wall_seconds']:.2f} s",
             err=True,
         )
-        if tree.attrs["ending"] != ENDINGS[1]:
-            typer.echo(f"{path}: the run ended as follows: {tree.attrs['ending']}", err=True)
+        if told["ending"] != ENDINGS[1]:
+            typer.echo(f"{path}: the run ended as follows: {told['ending']}", err=True)

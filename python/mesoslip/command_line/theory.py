@@ -20,9 +20,9 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
     from mesoslip.theory.derived import derived_quantities
 
     if Path(config).suffix == ".nc":
-        from mesoslip.output import store
+        from mesoslip.output import files
 
-        checked = store.configuration(Path(config), changes or ())
+        checked = files.configuration(Path(config), changes or ())
     else:
         checked = Config.load(config, changes or ())
     quantities = derived_quantities(checked)
@@ -44,16 +44,16 @@ def curve(
 ) -> None:
     """Force curve of the master equation, and its elastic instability."""
     from mesoslip import api
-    from mesoslip.output import store
+    from mesoslip.output import files
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
 
     checked = api.as_config(config, changes or ())
     if output is not None:
-        store.check_writable(output)
+        files.check_writable(output)
     _tell_without_interaction(checked)
     force_curve = ForceCurve(checked)
     if output is not None:
-        store.write(force_curve.to_tree(), output)
+        files.write(force_curve.to_tree(), output)
     summary = force_curve.summary()
     if as_json:
         typer.echo(json.dumps(summary, indent=2))
@@ -79,16 +79,16 @@ def onset(
 ) -> None:
     """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
     from mesoslip import api
-    from mesoslip.output import store
+    from mesoslip.output import files
     from mesoslip.theory.slip_onset import SUMMARY
 
     checked = api.as_config(config, changes or ())
     if output is not None:
-        store.check_writable(output)
+        files.check_writable(output)
     _tell_without_interaction(checked)
     tree = api.onset(checked)
     if output is not None:
-        store.write(tree, output)
+        files.write(tree, output)
     summary = {name: tree.attrs[name] for name in SUMMARY if name in tree.attrs}
     summary["stable"] = tree.attrs["stable"] == "true"
     if as_json:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mesoslip.analysis.slips import slips
+from mesoslip.output.layout import group_of
 from mesoslip.plots.style import CONTACT, SPRING, STYLE
 
 Array = NDArray[np.float64]
@@ -31,9 +32,9 @@ def series(tree: xr.DataTree, name: str, realization: int = 0) -> tuple[Array, A
     root = tree.to_dataset().isel(realization=realization)
     times, values = root["time"].values, root[name].values.astype(float)
     if "slip_traces" in tree.children:
-        fine = tree.children["slip_traces"].to_dataset(inherit=False)
-        mine = fine["realization"].values == root["realization"].item()
-        times = np.concatenate([times, fine["time"].values[mine]])
+        fine = group_of(tree, "slip_traces")
+        mine = fine["realization_index"].values == realization
+        times = np.concatenate([times, fine["sample_time"].values[mine]])
         values = np.concatenate([values, fine[name].values[mine].astype(float)])
         order = np.argsort(times, kind="stable")
         times, values = times[order], values[order]
@@ -74,9 +75,7 @@ def draw_series(
 def largest_slip(tree: xr.DataTree) -> xr.Dataset | None:
     """The slip with the greatest drop of the spring force; None if there is no slip."""
     all_slips = slips(tree)
-    mine = np.flatnonzero(
-        all_slips["realization"].values == tree.to_dataset()["realization"].values[0]
-    )
+    mine = np.flatnonzero(all_slips["realization_index"].values == 0)
     if mine.size == 0:
         return None
     drops = all_slips["force_drop"].values[mine]

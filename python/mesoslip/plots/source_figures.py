@@ -18,7 +18,8 @@ from mesoslip.analysis import avalanche_statistics
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output import store
+from mesoslip.output import files
+from mesoslip.output.layout import group_of
 from mesoslip.plots import avalanches as avalanche_plots
 from mesoslip.plots import run as plots
 from mesoslip.plots.style import CONTACT, SPRING, STYLE, save
@@ -229,7 +230,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
             count = getattr(configuration(tree).slider, "layers", 1)
             color = "tab:red" if style == "--" else "black"
             line: dict[str, Any] = {"color": color, "linestyle": style}
-            slips = tree.children["slips"].to_dataset(inherit=False)
+            slips = group_of(tree, "slips")
             if slips.sizes["slip"]:
                 start = slips["start_time"].values[0] - 3e-3
                 plots.draw_series(
@@ -290,7 +291,7 @@ def detaching(trees: Sequence[xr.DataTree]) -> Figure:
         plots.draw_series(
             axes, tree, "detached_contacts", window=_first_slip(tree), time_unit=1e-3, color="black"
         )
-        sizes = tree.children["avalanches"].to_dataset(inherit=False)["size"].values
+        sizes = group_of(tree, "avalanches")["size"].values
         axes.set_title(f"({letter}) {_strength(tree)}; largest: {sizes.max()}", loc="left")
         axes.set_ylabel("$N_d$")
         axes.set_xlabel("time in the first slip (ms)")
@@ -320,7 +321,7 @@ def _strength(tree: xr.DataTree) -> str:
 
 def _first_slip(tree: xr.DataTree) -> tuple[float, float]:
     """Window from 2 ms before to 30 ms after the start of the first slip [s]."""
-    start = tree.children["slips"].to_dataset(inherit=False)["start_time"].values[0]
+    start = group_of(tree, "slips")["start_time"].values[0]
     return start - 2e-3, start + 3e-2
 
 
@@ -430,7 +431,7 @@ def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
         raise FileError(f"outputs are missing; make them first: make {targets}")
     paths = []
     for name in names:
-        trees = [store.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
+        trees = [files.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
         with mpl.rc_context(STYLE):
             figure = FIGURES[name].draw(trees)
         path = folder / f"{name}.png"

@@ -12,8 +12,8 @@ import xarray as xr
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
-from mesoslip.output import store
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.output import files, layout
+from mesoslip.simulation.runner import Results, run_realizations
 from mesoslip.theory.derived import Derived, derived_quantities
 
 PathLike = str | os.PathLike[str]
@@ -37,7 +37,7 @@ def as_config(
         return Config.from_dict(config)
     path = Path(config)
     if path.suffix == ".nc":
-        return store.configuration(path, overrides)
+        return files.configuration(path, overrides)
     return Config.load(path, overrides)
 
 
@@ -72,11 +72,17 @@ def run(
     RunError
         If the run fails.
     """
-    config = as_config(config)
-    results = run_realizations(config, workers=workers, progress=progress)
-    return store.build(
-        config, results.realizations, complete=results.complete, wall_seconds=results.wall_seconds
-    )
+    return layout.build_tree(simulate(as_config(config), workers=workers, progress=progress))
+
+
+def simulate(
+    config: Config,
+    *,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Results:
+    """Simulate; what came out as tables, to build a tree of or to write to a file. See `run`."""
+    return run_realizations(config, workers=workers, progress=progress)
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
@@ -125,11 +131,29 @@ def read(path: PathLike) -> xr.DataTree:
     FileError
         If there is no such file, or it is no output of mesoslip, or it is damaged.
     """
-    return store.read(Path(path))
+    return files.read(Path(path))
 
 
 def _as_tree(output: PathLike | xr.DataTree) -> xr.DataTree:
-    return output if isinstance(output, xr.DataTree) else store.read_run(Path(output))
+    return output if isinstance(output, xr.DataTree) else files.read_run(Path(output))
+
+
+def group(output: PathLike | xr.DataTree, name: str) -> xr.Dataset:
+    """A group of an output alone, such as "slip_traces".
+
+    Without the coordinates of the root that it does not use, so that its ``to_dataframe`` has a row
+    for each of its rows, not for each pair of them and a time of the trace.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or has no such group.
+    """
+    tree = output if isinstance(output, xr.DataTree) else read(output)
+    if name not in tree.children:
+        there = ", ".join(tree.children) or "none"
+        raise FileError(f"the output has no group {name!r}; it has {there}")
+    return layout.group_of(tree, name)
 
 
 def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
@@ -220,7 +244,8 @@ def plot(
         written.
     """
     from mesoslip.plots import avalanches as avalanche_plots
-    from mesoslip.plots import run as plots
+    from mesoslip.plots.draw import draw
+    from mesoslip.plots.style import save
 
     tree = output if isinstance(output, xr.DataTree) else read(output)
     if Path(figure).suffix == ".gif":
@@ -228,7 +253,7 @@ def plot(
             raise FileError(f"{figure}: only the lattice can be shown in motion, not {view!r}")
         avalanche_plots.animate(tree, Path(figure), snapshot)
     else:
-        plots.save(plots.draw(tree, view, snapshot), Path(figure))
+        save(draw(tree, view, snapshot), Path(figure))
 
 
 def figures(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import mesoslip
 from conftest import klein_tables
-from mesoslip.output import store
+from mesoslip.output import files
 
 FOLDER = Path(__file__).parents[1] / "reference"
 
@@ -32,5 +32,5 @@ CASES = {
 if __name__ == "__main__":
     for name, tables in CASES.items():
         FOLDER.mkdir(exist_ok=True)
-        store.write(mesoslip.run(tables), FOLDER / f"{name}.nc")
+        files.write(mesoslip.run(tables), FOLDER / f"{name}.nc")
         print(FOLDER / f"{name}.nc")

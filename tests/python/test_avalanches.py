@@ -145,7 +145,7 @@ def test_strength_of_a_bundle(bundles):
     few = mesoslip.run(bundle(1000, 400))
     for tree, count in ((bundles, 200_000), (few, 1000)):
         data = mesoslip.avalanches(tree)
-        owner = data["realization"].values
+        owner = data["realization_index"].values
         force = data["force_before"].values
         strengths = np.array([force[owner == one].max() for one in np.unique(owner)]) / 9e-6
         error = strengths.std() / math.sqrt(len(strengths))
@@ -182,7 +182,7 @@ def test_runs_end_by_avalanches_or_by_the_drive():
     # The same run as far as both go.
     shared = min(500, by_way["avalanches"].sizes["avalanche"])
     assert shared > 50
-    for name in ("time", "size", "slip"):
+    for name in ("start_time", "size", "slip"):
         np.testing.assert_array_equal(
             by_count["avalanches"][name].values[:shared], by_way["avalanches"][name].values[:shared]
         )
@@ -219,12 +219,12 @@ def test_stick_slip_by_interaction(klein):
     assert drops[0] < 0.1 < drops[3]
     first = data.isel(avalanche=int(np.argmax(data["size"].values)))
     slip = mesoslip.slips(tree).isel(slip=0)
-    assert abs(slip["start_time"].item() - first["time"].item()) < 1e-3
+    assert abs(slip["start_time"].item() - first["start_time"].item()) < 1e-3
     assert first["size"].item() > 0.85 * 4080
     assert first["spans"].item() == 1
-    after = tree["slip_traces"].to_dataset(inherit=False)
-    inside = (after["time"].values > first["time"].item()) & (
-        after["time"].values < first["time"].item() + 3e-4
+    after = tree["slip_traces"].to_dataset()
+    inside = (after["sample_time"].values > first["start_time"].item()) & (
+        after["sample_time"].values < first["start_time"].item() + 3e-4
     )
     assert inside.sum() > 20
     assert np.max(np.abs(after["contact_force"].values[inside])) < 0.01 * 18e-6
@@ -258,9 +258,9 @@ def test_commands(tmp_path, capsys, monkeypatch):
     assert "exponent" in shown
     assert "P(s)" in shown
     header = (tmp_path / "small.csv").read_text().splitlines()[0]
-    assert header.startswith("realization [1],time [s],displacement [m],size [1]")
+    assert header.startswith("realization_index [1],start_time [s],displacement [m],size [1]")
     answer = json.loads(command("avalanches", output, "--json", "--after", "2 s"))
-    times = mesoslip.avalanches(output, after=2.0)["time"].values
+    times = mesoslip.avalanches(output, after=2.0)["start_time"].values
     assert answer["statistics"]["count"] == len(times) > 0
     assert sum(one["count"] for one in answer["distribution"]) == len(times)
     assert times.min() >= 2

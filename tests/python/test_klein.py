@@ -27,10 +27,10 @@ def test_the_first_spike_is_the_largest(tree):
 
 def test_details_of_the_first_slip(tree):
     """S21: F falls to about zero and swings, all contacts let go, V is of order Omega_S F_s/K."""
-    fine = tree["slip_traces"].to_dataset(inherit=False)
+    fine = tree["slip_traces"].to_dataset()
     first = fine["slip"].values == 0
     start, end = tree["slips/start_time"].values[0], tree["slips/end_time"].values[0]
-    inside = first & (fine["time"].values < end)
+    inside = first & (fine["sample_time"].values < end)
     detached = fine["detached_contacts"].values[inside]
     force = fine["contact_force"].values[inside]
     assert detached.max() == 4080
@@ -46,17 +46,17 @@ def test_details_of_the_first_slip(tree):
 
 def test_the_catalogue_agrees_with_the_trace(tree):
     """Force before and after, peak velocity and times are those of the finer traces."""
-    fine = tree["slip_traces"].to_dataset(inherit=False)
-    slips = tree["slips"].to_dataset(inherit=False)
+    fine = tree["slip_traces"].to_dataset()
+    slips = tree["slips"].to_dataset()
     for number in range(slips.sizes["slip"]):
         trace = fine.isel(sample=fine["slip"].values == number)
         one = slips.isel(slip=number)
         force = trace["spring_force"].values
-        assert trace["time"].values[0] == one["start_time"]
+        assert trace["sample_time"].values[0] == one["start_time"]
         np.testing.assert_allclose(force.max(), one["force_before"], rtol=1e-6)
         np.testing.assert_allclose(force.min(), one["force_after"], atol=1e-6 * 18e-6)
         np.testing.assert_allclose(trace["velocity"].max(), one["peak_velocity"], rtol=1e-3)
-        least = trace["time"].values[force.argmin()]
+        least = trace["sample_time"].values[force.argmin()]
         assert abs(least - one["end_time"].item()) < 2e-5
 
 
@@ -64,8 +64,8 @@ def test_ringing_decays_at_half_the_damping_rate(klein):
     """Model section 7: the amplitude goes as exp(-eta_S t/2), near Omega_L."""
     config = klein(output__slip_interval=5e-5, run__duration=2.1, output__slip_velocity=1e-8)
     tree = mesoslip.run(config)
-    fine = tree["slip_traces"].to_dataset(inherit=False)
-    time, velocity = fine["time"].values, fine["velocity"].values
+    fine = tree["slip_traces"].to_dataset()
+    time, velocity = fine["sample_time"].values, fine["velocity"].values
     late = (time > 1.95) & (time < 2.02) & (fine["slip"].values == 0)
     time, velocity = time[late], velocity[late]
     velocity = velocity - velocity.mean()
@@ -77,7 +77,7 @@ def test_ringing_decays_at_half_the_damping_rate(klein):
 
 
 def last_drops(tree, span: float) -> np.ndarray:
-    slips = tree["slips"].to_dataset(inherit=False)
+    slips = tree["slips"].to_dataset()
     late = slips["start_time"].values > tree["time"].values[-1] - span
     return slips["force_drop"].values[late]
 

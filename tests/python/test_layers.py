@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sksundae
-from mesoslip.output import store
+from mesoslip.output import layout
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.derived import derived_quantities
 from scipy import linalg
@@ -328,7 +328,7 @@ def test_outputs_of_layers(klein):
     assert tree.attrs["solver"] == "series"
     first = data["layer_displacement"].values[0, :, 0] - data["base_displacement"].values[0]
     np.testing.assert_allclose(first, data["displacement"].values[0], atol=1e-20)
-    assert store.recorded(klein())[-1] == "detached_contacts"
+    assert layout.recorded(klein())[-1] == "detached_contacts"
 
 
 def test_the_cantilever(klein):

@@ -7,6 +7,7 @@ import pytest
 from mesoslip import ForceCurve
 from mesoslip.simulation.realization import Realization
 from oracles import frozen_law, stationary_force
+from states import entries, reals, saved
 
 FORCE = 18e-6
 REVERSALS = [
@@ -158,9 +159,13 @@ def test_contacts_are_conserved(klein, engine_slider):
     realization = Realization(klein(run__engine="me", **changes), 0)
     while realization.time < 3.9 and not realization.finished:
         realization.advance(20_000)
-        count = int(realization._state_integer[0])
-        pinned = realization._population[:count, 7].sum()
-        assert realization._population[:count, 7:].min() >= 0
+        if realization.finished:
+            break
+        state = saved(realization)
+        count = int(state.words[entries(state.words)["count"][0]][0])
+        moments = reals(state, "population")[7:, :count]
+        pinned = moments[0].sum()
+        assert moments.min() >= 0
         assert pinned + realization.detached == pytest.approx(4080, abs=4080 * 1e-12)
     assert realization.breaks > 4080
 

@@ -25,7 +25,7 @@ def test_outputs_are_those_of_the_reference(name):
             actual[variable].values, expected[variable].values, rtol=0, atol=1e-6 * scale
         )
     for group in ("slips", "energy"):
-        for variable, values in expected.children[group].to_dataset(inherit=False).items():
+        for variable, values in expected[group].data_vars.items():
             np.testing.assert_allclose(
                 actual.children[group][variable].values, values.values, rtol=1e-6, err_msg=variable
             )

@@ -14,6 +14,7 @@ from mesoslip.analysis.avalanche_statistics import fit_power_law
 from mesoslip.analysis.slips import write_table
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
+from mesoslip.output.layout import group_of
 
 NO_AVALANCHES = (
     "the output has no avalanches: they are recorded with [interaction] or "
@@ -69,11 +70,11 @@ def avalanches(
     """
     if "avalanches" not in tree.children:
         raise FileError(NO_AVALANCHES)
-    data = tree.children["avalanches"].to_dataset(inherit=False)
-    chosen = data["time"].values >= after
+    data = group_of(tree, "avalanches")
+    chosen = data["start_time"].values >= after
     if force_above is not None:
         force = np.abs(data["force_before"].values)
-        owner = data["realization"].values
+        owner = data["realization_index"].values
         for realization in np.unique(owner):
             mine = np.flatnonzero(owner == realization)
             peak = mine[np.argmax(force[mine])]
@@ -145,17 +146,14 @@ def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
     config = Config.from_toml(tree.attrs["configuration"])
     if config.contacts.reattach:
         return np.zeros(data.sizes["avalanche"], dtype=bool)
-    everything = tree.children["avalanches"].to_dataset(inherit=False)
-    owner, times = everything["realization"].values, everything["time"].values
-    last = {one: times[owner == one].max() for one in np.unique(owner)}
-    broken = tree["breaks"].to_series()
-    return np.array(
-        [
-            time == last[one] and broken[one] == config.contacts.count
-            for one, time in zip(data["realization"].values, data["time"].values, strict=True)
-        ],
-        dtype=bool,
-    )
+    everything = group_of(tree, "avalanches")
+    last = np.full(tree.sizes["realization"], np.inf)
+    # Rows are in the order of time: of those of a realization the last one stays.
+    last[everything["realization_index"].values] = everything["start_time"].values
+    is_last = data["start_time"].values == last[data["realization_index"].values]
+    is_broken = tree.to_dataset()["breaks"].values == config.contacts.count
+    failed: NDArray[np.bool_] = is_last & is_broken[data["realization_index"].values]
+    return failed
 
 
 def rows(data: xr.Dataset) -> list[dict[str, Any]]:
@@ -178,4 +176,4 @@ def write_csv(data: xr.Dataset, path: Path) -> None:
 
 
 def _columns(data: xr.Dataset) -> list[str]:
-    return ["realization", "time", *(str(name) for name in data.data_vars)]
+    return [str(name) for name in data.data_vars]

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from mesoslip.errors import FileError
+from mesoslip.output.files import written_whole
+from mesoslip.output.layout import group_of
 
 COLUMNS = (
-    "realization",
+    "realization_index",
     "start_time",
     "end_time",
     "force_before",
@@ -29,11 +30,11 @@ def slips(tree: xr.DataTree) -> xr.Dataset:
 
     The waiting time is that since the start of the slip before; NaN for the first of a realization.
     """
-    data = tree.children["slips"].to_dataset(inherit=False)
+    data = group_of(tree, "slips")
     slip_time = data["end_time"] - data["start_time"]
     waiting = np.diff(data["start_time"].values, prepend=np.nan)
     if data.sizes["slip"]:
-        waiting[np.diff(data["realization"].values, prepend=-1) != 0] = np.nan
+        waiting[np.diff(data["realization_index"].values, prepend=-1) != 0] = np.nan
     return data.assign(
         slip_time=slip_time.assign_attrs(units="s", long_name="duration of the drop"),
         waiting_time=xr.Variable(
@@ -100,11 +101,7 @@ def write_table(rows: Iterable[Mapping[str, Any]], units: Mapping[str, str], pat
     FileError
         If it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(units))
-            writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
-            writer.writerows(rows)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
+    with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(units))
+        writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
+        writer.writerows(rows)

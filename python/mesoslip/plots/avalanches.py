@@ -25,7 +25,9 @@ from mesoslip.analysis.avalanche_statistics import (
 from mesoslip.analysis.avalanches import failures
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
-from mesoslip.plots.run import STYLE, written_whole
+from mesoslip.output.files import written_whole
+from mesoslip.output.layout import group_of
+from mesoslip.plots.style import STYLE
 
 Array = NDArray[np.float64]
 
@@ -61,9 +63,8 @@ def overview(tree: xr.DataTree) -> Figure:
 
 def catalogue_of_first(tree: xr.DataTree) -> xr.Dataset:
     """Avalanches of the first realization of an output."""
-    data = tree.children["avalanches"].to_dataset(inherit=False)
-    first = tree.to_dataset()["realization"].values[0]
-    return data.isel(avalanche=np.flatnonzero(data["realization"].values == first))
+    data = group_of(tree, "avalanches")
+    return data.isel(avalanche=np.flatnonzero(data["realization_index"].values == 0))
 
 
 def draw_distribution(
@@ -85,7 +86,7 @@ def draw_distribution(
 
 def distribution(tree: xr.DataTree) -> Figure:
     """Density and complementary cumulative distribution of the sizes of avalanches."""
-    data = tree.children["avalanches"].to_dataset(inherit=False)
+    data = group_of(tree, "avalanches")
     sizes = data["size"].values[~failures(tree, data)]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(6.5, 3))
@@ -147,7 +148,7 @@ def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
             "the output has no snapshots of the lattice; ask for them by output.snapshots (times) "
             "or output.snapshot_size (after avalanches at least that large)"
         )
-    data = tree.children["snapshots"].to_dataset(inherit=False)
+    data = group_of(tree, "snapshots")
     count = data.sizes["snapshot"]
     if count == 0:
         raise FileError(
@@ -174,7 +175,7 @@ def lattice(tree: xr.DataTree, number: int | None = None) -> Figure:
             panels[0], snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
         )
         figure.colorbar(drawn, ax=panels[0], shrink=0.8, label="force over threshold")
-        panels[0].set_title(f"{snapshot['time'].item():.6g} s; grey: detached", loc="left")
+        panels[0].set_title(f"{snapshot['snapshot_time'].item():.6g} s; grey: detached", loc="left")
         if size:
             draw_generations(figure, panels[1], snapshot)
             panels[1].set_title(f"an avalanche of {size} breaks", loc="left")
@@ -200,8 +201,8 @@ def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
         If there is no snapshot, or the file cannot be written.
     """
     snapshot = chosen_snapshot(tree, number)
-    everything = tree.children["snapshots"].to_dataset(inherit=False)
-    mine = everything["realization"].values == snapshot["realization"].item()
+    everything = group_of(tree, "snapshots")
+    mine = everything["realization_index"].values == snapshot["realization_index"].item()
     everything = everything.isel(snapshot=np.flatnonzero(mine))
     spreads = bool(snapshot["avalanche_size"].item())
     with mpl.rc_context(STYLE):
@@ -220,7 +221,7 @@ def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
                 np.linspace(0, everything.sizes["snapshot"] - 1, MOST_FRAMES).astype(int)
             )
             frames = [everything["load"].values[one] for one in chosen]
-            titles = [f"{everything['time'].values[one]:.6g} s" for one in chosen]
+            titles = [f"{everything['snapshot_time'].values[one]:.6g} s" for one in chosen]
             style = {"cmap": "viridis", "norm": Normalize(-1, 1)}
         drawn = draw_contacts(axes, snapshot, frames[0], **style)
         label = "generation" if spreads else "force over threshold"

@@ -18,9 +18,12 @@ from mesoslip.analysis import avalanche_statistics
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output import store
+from mesoslip.output import files
+from mesoslip.output.layout import group_of
 from mesoslip.plots import avalanches as avalanche_plots
 from mesoslip.plots import run as plots
+from mesoslip.plots.style import CONTACT, SPRING, STYLE, save
+from mesoslip.plots.theory import draw_onset
 
 
 def configuration(tree: xr.DataTree) -> Config:
@@ -69,7 +72,7 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
                 start = int(np.argmax(displacement >= onset.attrs["X_c"]))
                 tau = onset.attrs["omega_s"] * (times - times[start])
                 axes.plot(tau, (force - force[start]) / static, **style)
-            plots.draw_onset(axes, onset, linestyle="--")
+            draw_onset(axes, onset, linestyle="--")
             axes.set_xlabel(r"$\tau = \Omega_S (t - t_c)$")
             axes.set_ylabel(r"$\Delta F_d/F_s$")
         whole, start_of_slip = columns
@@ -156,12 +159,8 @@ def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
         window = plots.slip_window(slip, before=0.1, after=0.8)
         for axes, name in ((velocity, "velocity"), (detached, "detached_contacts")):
             plots.draw_series(axes, tree, name, window=window, time_unit=1e-3, color="black")
-        plots.draw_series(
-            force, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT
-        )
-        plots.draw_series(
-            force, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING
-        )
+        plots.draw_series(force, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        plots.draw_series(force, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         detached.set_xlabel(f"time after {window[0]:.4f} s (ms)")
         force.legend()
     velocity.set_ylabel("slider velocity (µm/s)")
@@ -231,7 +230,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
             count = getattr(configuration(tree).slider, "layers", 1)
             color = "tab:red" if style == "--" else "black"
             line: dict[str, Any] = {"color": color, "linestyle": style}
-            slips = tree.children["slips"].to_dataset(inherit=False)
+            slips = group_of(tree, "slips")
             if slips.sizes["slip"]:
                 start = slips["start_time"].values[0] - 3e-3
                 plots.draw_series(
@@ -292,7 +291,7 @@ def detaching(trees: Sequence[xr.DataTree]) -> Figure:
         plots.draw_series(
             axes, tree, "detached_contacts", window=_first_slip(tree), time_unit=1e-3, color="black"
         )
-        sizes = tree.children["avalanches"].to_dataset(inherit=False)["size"].values
+        sizes = group_of(tree, "avalanches")["size"].values
         axes.set_title(f"({letter}) {_strength(tree)}; largest: {sizes.max()}", loc="left")
         axes.set_ylabel("$N_d$")
         axes.set_xlabel("time in the first slip (ms)")
@@ -305,10 +304,8 @@ def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
     all_axes = figure.subplots(2, 2).flat
     for letter, axes, tree in zip("abcd", all_axes, trees, strict=True):
         window = _first_slip(tree)
-        plots.draw_series(
-            axes, tree, "contact_force", window=window, time_unit=1e-3, **plots.CONTACT
-        )
-        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **plots.SPRING)
+        plots.draw_series(axes, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
         axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
         axes.set_ylabel("force (µN)")
@@ -324,7 +321,7 @@ def _strength(tree: xr.DataTree) -> str:
 
 def _first_slip(tree: xr.DataTree) -> tuple[float, float]:
     """Window from 2 ms before to 30 ms after the start of the first slip [s]."""
-    start = tree.children["slips"].to_dataset(inherit=False)["start_time"].values[0]
+    start = group_of(tree, "slips")["start_time"].values[0]
     return start - 2e-3, start + 3e-2
 
 
@@ -434,10 +431,10 @@ def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
         raise FileError(f"outputs are missing; make them first: make {targets}")
     paths = []
     for name in names:
-        trees = [store.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
-        with mpl.rc_context(plots.STYLE):
+        trees = [files.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
+        with mpl.rc_context(STYLE):
             figure = FIGURES[name].draw(trees)
         path = folder / f"{name}.png"
-        plots.save(figure, path)
+        save(figure, path)
         paths.append(path)
     return paths

@@ -166,8 +166,10 @@ class Realization:
         self._kernel = kernel
         return kernel
 
-    def advance(self, advances: int | None = None) -> None:
-        """Go on for one segment: about a quarter of a second, or a number of advances.
+    def advance(self, advances: int | None = None, *, work: float | None = None) -> None:
+        """Go on for one segment: a number of advances, an amount of work, or a quarter of a second.
+
+        Work is in units of an advance of a rigid slider or a contact that breaks.
 
         Raises
         ------
@@ -179,16 +181,16 @@ class Realization:
         start = time.perf_counter()
         try:
             kernel = self._open()
-            if advances is None:
+            if advances is None and work is None:
                 kernel.advance(ANY_NUMBER, self._work)
             else:
-                kernel.advance(advances, float(ANY_NUMBER))
+                kernel.advance(advances or ANY_NUMBER, work or float(ANY_NUMBER))
             self._take(kernel)
         except RunError as error:
             raise RunError(f"realization {self.number}: {error}") from None
         seconds = time.perf_counter() - start
         self.kernel_seconds += seconds
-        if advances is None:
+        if advances is None and work is None:
             self._work *= min(2.0, max(0.1, SEGMENT_SECONDS / max(seconds, 1e-9)))
 
     def _take(self, kernel: Kernel) -> None:

@@ -23,7 +23,8 @@ from scipy.interpolate import BPoly
 from mesoslip import _core
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.output.store import program_attributes, variable
+from mesoslip.output.provenance import program_attributes
+from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.theory.lives import checked, law_arguments, scales
 
 if TYPE_CHECKING:
@@ -468,8 +469,8 @@ class ForceCurve:
             curves["potential"] = self.potential(x, self.config.curve.drive_displacement)
         dimension = ("displacement",)
         root = xr.Dataset(
-            {name: variable(name, dimension, values) for name, values in curves.items()},
-            coords={"displacement": variable("displacement", dimension, x)},
+            {name: CURVE.variable(name, dimension, values) for name, values in curves.items()},
+            coords={"displacement": CURVE.variable("displacement", dimension, x)},
             attrs=program_attributes(self.config, "curve")
             | {name: value for name, value in self.summary().items() if value is not None}
             | {
@@ -479,11 +480,10 @@ class ForceCurve:
         )
         root.attrs["stable"] = str(self.stable).lower()
         points = np.array(self.critical_points).reshape(-1, len(CriticalPoint._fields))
-        names = ("displacement", "contact_force", "curvature", "third_derivative", "D0", "D2", "D3")
         critical = xr.Dataset(
             {
-                name: variable(name, ("point",), column)
-                for name, column in zip(names, points.T, strict=True)
+                name: CRITICAL.variable(name, ("point",), column)
+                for name, column in zip(CRITICAL, points.T, strict=True)
             }
         )
         children = {"critical": xr.DataTree(critical)}
@@ -502,12 +502,15 @@ class ForceCurve:
         dimensions = ("density_displacement", "stretch")
         return xr.Dataset(
             {
-                "stretch_density": variable("stretch_density", dimensions, np.array(densities)),
-                "unbroken_part": variable("unbroken_part", dimensions[:1], np.array(atoms)),
+                name: STRETCHES.variable(name, where, values)
+                for name, where, values in (
+                    ("stretch_density", dimensions, np.array(densities)),
+                    ("unbroken_part", dimensions[:1], np.array(atoms)),
+                )
             },
             coords={
-                "density_displacement": variable("density_displacement", dimensions[:1], at),
-                "stretch": variable("stretch", dimensions[1:], x),
+                name: STRETCHES.variable(name, (name,), values)
+                for name, values in zip(dimensions, (at, x), strict=True)
             },
         )
 

@@ -18,7 +18,8 @@ from scipy import optimize
 from mesoslip import _core
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError, Problem, RunError
-from mesoslip.output.store import program_attributes, variable
+from mesoslip.output.provenance import program_attributes
+from mesoslip.output.variables import ONSET
 from mesoslip.theory.force_curve import ForceCurve
 
 if TYPE_CHECKING:
@@ -259,7 +260,7 @@ def _dataset(solution: Onset, short_times: Array) -> xr.Dataset:
         "asymptote": short_times,
     }
     return xr.Dataset(
-        {name: variable(name, ("onset_time",), values) for name, values in columns.items()},
-        coords={"onset_time": variable("onset_time", ("onset_time",), solution.time)},
+        {name: ONSET.variable(name, ("onset_time",), values) for name, values in columns.items()},
+        coords={"onset_time": ONSET.variable("onset_time", ("onset_time",), solution.time)},
         attrs={"ended": str(solution.ended).lower()},
     )

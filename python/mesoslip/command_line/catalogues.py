@@ -1,0 +1,122 @@
+"""``mesoslip slips`` and ``mesoslip avalanches``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mesoslip.command_line.options import JsonOption, OutputArgument, show
+
+
+def slips(
+    output: OutputArgument,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the catalogue of slips, with statistics."""
+    from mesoslip.analysis import slips as catalogue
+    from mesoslip.output import files
+
+    tree = files.read_run(output)
+    if table is not None:
+        catalogue.write_csv(tree, table)
+    rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
+    if as_json:
+        typer.echo(json.dumps({"slips": rows, "statistics": statistics}, indent=2))
+        return
+    typer.echo(
+        "  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s"
+        "   breaks"
+    )
+    for row in rows:
+        typer.echo(
+            f"{row['realization_index']:13d} {row['start_time']:10.4f} "
+            f"{1e3 * (row['end_time'] - row['start_time']):13.3f} "
+            f"{1e6 * row['force_before']:11.4f} "
+            f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
+            f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8.0f}"
+        )
+    typer.echo(f"{len(rows)} slips")
+    for name, values in statistics.items():
+        if name != "slips":
+            typer.echo(
+                f"{name:16} mean {values['mean']:.5g}, standard deviation "
+                f"{values['standard_deviation']:.2g}, from {values['minimum']:.5g} "
+                f"to {values['maximum']:.5g}  (SI)"
+            )
+
+
+def avalanches(
+    output: OutputArgument,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
+    ] = None,
+    as_json: JsonOption = False,
+    smallest: Annotated[
+        int | None,
+        typer.Option(min=1, help="Least size for the fit; chosen by default", metavar="SIZE"),
+    ] = None,
+    after: Annotated[
+        str, typer.Option(help="Only those after a time, such as '2 s'", metavar="TIME")
+    ] = "0 s",
+    force_above: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            max=1,
+            help="Only those before the greatest contact force, at more than this part of it",
+            metavar="PART",
+        ),
+    ] = None,
+) -> None:
+    """Show sizes of avalanches: their distribution, and the law that fits it."""
+    from mesoslip.analysis import avalanches as avalanche_catalogue
+    from mesoslip.analysis.avalanche_statistics import ccdf, logarithmic_bins
+    from mesoslip.output import files
+
+    tree = files.read_run(output)
+    start = _time(after, "--after")
+    data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)
+    if table is not None:
+        avalanche_catalogue.write_csv(data, table)
+    statistics = avalanche_catalogue.statistics(
+        tree, after=start, force_above=force_above, smallest=smallest
+    )
+    bins = logarithmic_bins(data["size"].values)
+    columns = (bins.edges[:, 0] + 0.5, bins.edges[:, 1] - 0.5, bins.count)
+    distribution = [
+        {"from": int(low), "to": int(high), "count": int(count), "density": density, "error": error}
+        for low, high, count, density, error in zip(
+            *columns, bins.density.tolist(), bins.density_error.tolist(), strict=True
+        )
+    ]
+    if as_json:
+        sizes, part = ccdf(data["size"].values)
+        cumulative = {"size": sizes.tolist(), "part_at_least": part.tolist()}
+        answer = {"statistics": statistics, "distribution": distribution, "ccdf": cumulative}
+        typer.echo(json.dumps(answer, indent=2))
+        return
+    typer.echo("       from         to      count        P(s)       error")
+    for one in distribution:
+        typer.echo(
+            f"{one['from']:11d}{one['to']:11d}{one['count']:11d}{one['density']:12.4g}"
+            f"{one['error']:12.2g}"
+        )
+    for name, value in statistics.items():
+        show(name, value, *avalanche_catalogue.SUMMARY[name])
+
+
+def _time(text: str, option: str) -> float:
+    """A time given to an option [s]."""
+    from mesoslip.configuration.units import to_si
+    from mesoslip.errors import ConfigError, Problem
+
+    try:
+        return to_si(text, "s", "2 s")
+    except ValueError as error:
+        raise ConfigError([Problem("", option, str(error), text)]) from None

@@ -1,0 +1,31 @@
+"""Arguments and options that commands share, and lines that they print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ConfigArgument = Annotated[
+    str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
+]
+OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metavar="OUT.nc")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Change one key, as in contacts.delay=1ms; may be repeated",
+        metavar="KEY=VALUE",
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
+
+
+def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None:
+    """A line for a quantity."""
+    if isinstance(value, bool) or value is None:
+        shown = {True: "yes", False: "no", None: "none"}[value]
+    else:
+        shown = f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
+    typer.echo(f"{name:22} {shown:20} {meaning}")

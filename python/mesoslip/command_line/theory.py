@@ -1,0 +1,105 @@
+"""``mesoslip info``, ``curve`` and ``onset``: what the theory says before anything is run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mesoslip.command_line.options import ConfigArgument, JsonOption, SetOption, show
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+
+def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
+    """Show derived quantities."""
+    from mesoslip.configuration.config import Config
+    from mesoslip.theory.derived import derived_quantities
+
+    if Path(config).suffix == ".nc":
+        from mesoslip.output import files
+
+        checked = files.configuration(Path(config), changes or ())
+    else:
+        checked = Config.load(config, changes or ())
+    quantities = derived_quantities(checked)
+    if as_json:
+        typer.echo(json.dumps({name: one.value for name, one in quantities.items()}, indent=2))
+        return
+    for name, one in quantities.items():
+        show(name, one.value, one.unit, one.meaning)
+
+
+def curve(
+    config: ConfigArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the curve to a file", metavar="OUT.nc"),
+    ] = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Force curve of the master equation, and its elastic instability."""
+    from mesoslip import api
+    from mesoslip.output import files
+    from mesoslip.theory.force_curve import SUMMARY, ForceCurve
+
+    checked = api.as_config(config, changes or ())
+    if output is not None:
+        files.check_writable(output)
+    _tell_without_interaction(checked)
+    force_curve = ForceCurve(checked)
+    if output is not None:
+        files.write(force_curve.to_tree(), output)
+    summary = force_curve.summary()
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+    else:
+        for name, value in summary.items():
+            show(name, value, *SUMMARY[name])
+    if force_curve.error > checked.curve.tolerance:
+        typer.echo(
+            f"the force has {force_curve.digits} digits; more would take too much work, as its "
+            "law is not smooth, or too narrow for this length (curve.length, curve.tolerance)",
+            err=True,
+        )
+
+
+def onset(
+    config: ConfigArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the solutions to a file", metavar="OUT.nc"),
+    ] = None,
+    changes: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
+    from mesoslip import api
+    from mesoslip.output import files
+    from mesoslip.theory.slip_onset import SUMMARY
+
+    checked = api.as_config(config, changes or ())
+    if output is not None:
+        files.check_writable(output)
+    _tell_without_interaction(checked)
+    tree = api.onset(checked)
+    if output is not None:
+        files.write(tree, output)
+    summary = {name: tree.attrs[name] for name in SUMMARY if name in tree.attrs}
+    summary["stable"] = tree.attrs["stable"] == "true"
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+        return
+    for name, value in summary.items():
+        show(name, value, *SUMMARY[name])
+    typer.echo(tree.attrs["comment"])
+
+
+def _tell_without_interaction(config: Config) -> None:
+    """The master equation has no neighbours: say so to who asks for some."""
+    if config.interaction is not None and config.interaction.strength > 0:
+        typer.echo("this is without [interaction], which the master equation cannot have", err=True)

@@ -1,0 +1,270 @@
+"""Output files: netCDF-4 with the layout that `mesoslip.run` returns in memory."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import xarray as xr
+
+from mesoslip.configuration.config import Config
+from mesoslip.errors import FileError
+from mesoslip.output import layout, variables
+from mesoslip.output.layout import Entry, GroupLayout, RunResults
+
+# Variables with fewer values are not worth compressing.
+LEAST_COMPRESSED = 1000
+COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+
+# What rows of groups were called in files of earlier versions, and what they are called now.
+OLD_NAMES = {
+    "slips": {"realization": "realization_index"},
+    "slip_traces": {"realization": "realization_index", "time": "sample_time"},
+    "avalanches": {"realization": "realization_index", "time": "start_time"},
+    "snapshots": {"realization": "realization_index", "time": "snapshot_time"},
+    "critical": {"displacement": "critical_displacement"},
+}
+GROUPS = {
+    "slips": variables.SLIPS,
+    "slip_traces": variables.SLIP_TRACES,
+    "avalanches": variables.AVALANCHES,
+    "snapshots": variables.SNAPSHOTS,
+    "critical": variables.CRITICAL,
+}
+
+
+def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
+    """Make sure, before a run, that its output can be written.
+
+    Parameters
+    ----------
+    path
+        The output.
+    reads
+        What the command reads, which it must not overwrite.
+
+    Raises
+    ------
+    FileError
+        If the path is no place for a file, is one that is read, or its folder cannot be made or
+        written to.
+    """
+    target = _target(path)
+    for one in map(Path, reads):
+        if target.exists() and one.exists() and target.samefile(one):
+            raise FileError(f"{path}: is what the command reads; give another name for its output")
+    part = _temporary(target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part.touch()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _target(path: Path) -> Path:
+    """Where a file is to be written: links are followed, what is no regular file is refused.
+
+    Raises
+    ------
+    FileError
+        If it is refused.
+    """
+    if path.is_dir():
+        raise FileError(f"{path}: cannot be written: is a directory; give the name of a file in it")
+    try:
+        target = path.resolve()
+        is_refused = target.exists() and not target.is_file()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise FileError(f"{path}: cannot be written: {error}") from error
+    if is_refused:
+        raise FileError(f"{path}: cannot be written: is a device or the like, not a file")
+    return target
+
+
+def _temporary(path: Path) -> Path:
+    """A name beside a file, with its ending, that no other process or thread has."""
+    return path.with_name(f".{os.getpid()}-{threading.get_ident()}.{path.name}")
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """A file to write in the place of another, whose name appears only when it is whole.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    target = _target(path)
+    part = _temporary(target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        part.replace(target)
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{path}: cannot be written: {reason}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def write(tree: xr.DataTree, path: Path) -> None:
+    """Write a tree as an output; its name appears only when it is whole.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    encoding = {
+        group.path: {
+            str(name): COMPRESSION
+            for name, data in group.data_vars.items()
+            if data.size > LEAST_COMPRESSED
+        }
+        for group in tree.subtree
+    }
+    with written_whole(path) as part:
+        tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
+
+
+def write_results(results: RunResults, path: Path) -> None:
+    """Write the results of a run, of which only blocks are held in memory.
+
+    The file is that of `write` and `mesoslip.output.layout.build_tree`.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    groups = layout.describe(results)
+    with written_whole(path) as part, netCDF4.Dataset(part, "w", format="NETCDF4") as file:
+        taken = {
+            name: _create_group(file.createGroup(name) if name else file, form, groups[""])
+            for name, form in groups.items()
+        }
+        layout.fill(results, groups, taken)
+
+
+def _create_group(
+    place: netCDF4.Dataset, form: GroupLayout, root: GroupLayout
+) -> dict[str, layout.Values]:
+    """Make the dimensions, variables and attributes of a group of a file."""
+    place.setncatts(form.attributes)
+    for name, size in form.sizes.items():
+        place.createDimension(name, size)
+    sizes = {**root.sizes, **form.sizes}
+    made: dict[str, layout.Values] = {}
+    for name, entry in form.entries.items():
+        variable = place.createVariable(
+            name,
+            entry.dtype,
+            entry.dimensions,
+            fill_value=entry.fill_value,
+            **_storage(entry, [sizes[one] for one in entry.dimensions]),
+        )
+        variable.set_auto_maskandscale(False)
+        variable.setncatts(entry.meaning.attributes)
+        auxiliary = form.auxiliary_coordinates(name)
+        if auxiliary:
+            variable.coordinates = " ".join(auxiliary)
+        made[name] = variable
+    return made
+
+
+def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
+    """Compression of a variable, and chunks that hold a block of rows."""
+    size = 1
+    for length in shape:
+        size *= length
+    if size <= LEAST_COMPRESSED or entry.is_coordinate:
+        return {}
+    # One realization at a time; of long dimensions after the first no more than a block's worth.
+    chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
+    along = 1 if entry.is_padded else 0
+    width = 1
+    for length in shape[along + 1 :]:
+        width *= length
+    chunks[along] = max(1, min(shape[along], layout.BLOCK_ROWS, layout.BLOCK_NUMBERS // width))
+    return {**COMPRESSION, "chunksizes": chunks}
+
+
+@contextmanager
+def opened(path: str | Path) -> Iterator[xr.DataTree]:
+    """An output of any command, of which only what is used is read.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it is not an output of mesoslip, or it is damaged.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileError(f"{path}: is a directory, not an output file")
+    if not path.exists():
+        raise FileError(f"{path}: no such file")
+    try:
+        groups = xr.open_groups(path, engine="netcdf4")
+    except (OSError, ValueError, RuntimeError) as error:
+        raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
+    try:
+        tree = xr.DataTree.from_dict(
+            {name: _renamed(name.strip("/"), data) for name, data in groups.items()}
+        )
+        if "configuration" not in tree.attrs:
+            raise FileError(f"{path}: not an output of mesoslip")
+        yield tree
+    finally:
+        for data in groups.values():
+            data.close()
+
+
+def _renamed(name: str, data: xr.Dataset) -> xr.Dataset:
+    """A group of a file with the names of today."""
+    old = {
+        before: now
+        for before, now in OLD_NAMES.get(name, {}).items()
+        if before in data.variables and before not in data.dims
+    }
+    if not old:
+        return data
+    data = data.rename(old).reset_coords(
+        [now for now in old.values() if now in {"realization_index", "start_time"}]
+    )
+    for now in old.values():
+        data[now].attrs = GROUPS[name][now].attributes
+    return data
+
+
+def read(path: str | Path) -> xr.DataTree:
+    """Read an output of any command into memory; see `opened`."""
+    with opened(path) as tree:
+        try:
+            return tree.load()
+        except (OSError, ValueError, RuntimeError) as error:
+            raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
+
+
+def read_run(path: str | Path) -> xr.DataTree:
+    """Read an output of ``mesoslip run`` into memory; see `read`."""
+    tree = read(path)
+    if "spring_force" not in tree.data_vars:
+        raise FileError(f"{path}: not an output of mesoslip run")
+    return tree
+
+
+def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:
+    """The configuration of an output, to run it again, with changes laid over it."""
+    with opened(path) as tree:
+        text = tree.attrs["configuration"]
+    return Config.from_toml(text, str(path), overrides)

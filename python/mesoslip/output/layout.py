@@ -1,0 +1,495 @@
+"""The layout of the output of a run: its groups, and how rows of the kernel become variables.
+
+`describe` says once what an output holds; `build_tree` puts it together in memory, and
+`mesoslip.output.files.write_results` writes it to a file piece by piece.
+
+Rows of catalogues tell their realization by a ``realization_index``, as CF's indexed ragged arrays
+do, and no variable of a group has the name of a coordinate of the root.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.output import variables
+from mesoslip.output.provenance import program_attributes
+from mesoslip.output.variables import Group, Meaning
+from mesoslip.simulation import tables
+
+Array = NDArray[Any]
+# What a variable takes from rows of a table, given the places of their realizations.
+Pick = Callable[[Array, Array], Array]
+
+# Numbers in a block of rows, which is what is held at a time of what is written.
+BLOCK_NUMBERS = 2**19
+BLOCK_ROWS = 2**16
+
+
+class Rows(Protocol):
+    """A table of rows that need not be in memory as a whole."""
+
+    def __len__(self) -> int: ...
+
+    def blocks(self, most: int) -> Iterator[Array]:
+        """The rows one after another, at most so many at a time, shape (rows, ...)."""
+        ...
+
+
+class RealizationResults(Protocol):
+    """What came out of a realization.
+
+    Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
+    of the slip as its last column), "slips", "layers", "avalanches", "snapshot_places", and
+    "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
+    """
+
+    @property
+    def number(self) -> int: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def ending(self) -> str: ...
+    @property
+    def breaks(self) -> float: ...
+    @property
+    def advances(self) -> int: ...
+    @property
+    def kernel_seconds(self) -> float: ...
+    @property
+    def avalanche_count(self) -> int: ...
+    @property
+    def avalanche_slip(self) -> float: ...
+    @property
+    def displacement(self) -> float: ...
+    @property
+    def energy(self) -> Array: ...
+    @property
+    def energy_residual(self) -> float: ...
+    @property
+    def integrator_counts(self) -> Array: ...
+
+    def rows(self, table: str) -> Rows:
+        """A table."""
+        ...
+
+
+class RunResults(Protocol):
+    """What came out of a run."""
+
+    @property
+    def config(self) -> Config: ...
+    @property
+    def complete(self) -> bool: ...
+    @property
+    def wall_seconds(self) -> float: ...
+    @property
+    def realizations(self) -> Sequence[RealizationResults]: ...
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A variable of an output: its form, and the values or the rows that fill it.
+
+    Those with dimensions (realization, time, ...) are filled realization by realization, and NaN
+    where one ended earlier; others take the rows of all realizations one after another.
+    """
+
+    dimensions: tuple[str, ...]
+    meaning: Meaning
+    dtype: np.dtype[Any]
+    is_coordinate: bool = False
+    values: Any = None
+    table: str = ""
+    pick: Pick | None = None
+
+    @property
+    def is_padded(self) -> bool:
+        return self.dimensions[:2] == ("realization", "time")
+
+    @property
+    def fill_value(self) -> float | None:
+        """What stands for a missing value; CF has none for coordinates."""
+        return np.nan if self.dtype.kind == "f" and not self.is_coordinate else None
+
+
+@dataclass(frozen=True)
+class GroupLayout:
+    """A group of an output: the sizes of its own dimensions, its variables, its attributes."""
+
+    sizes: Mapping[str, int]
+    entries: Mapping[str, Entry]
+    attributes: Mapping[str, Any]
+
+    def auxiliary_coordinates(self, name: str) -> list[str]:
+        """Coordinates of a variable that are not those of its dimensions."""
+        return [
+            other
+            for other, entry in self.entries.items()
+            if entry.is_coordinate
+            and not self.entries[name].is_coordinate
+            and entry.dimensions != (other,)
+            and set(entry.dimensions) <= set(self.entries[name].dimensions)
+        ]
+
+
+def column(number: int) -> Pick:
+    """A column of a table."""
+    return lambda rows, _: rows[:, number]
+
+
+@dataclass
+class _Form:
+    """Entries of a group, under construction."""
+
+    group: Group
+    is_exact: bool
+    entries: dict[str, Entry]
+
+    def add(
+        self, name: str, dimensions: tuple[str, ...], *, can_lack: bool = False, **how: Any
+    ) -> None:
+        meaning = self.group[name]
+        is_real = can_lack or (meaning.is_fractional and not self.is_exact)
+        dtype = np.dtype(np.float64 if is_real else meaning.dtype)
+        self.entries[name] = Entry(dimensions, meaning, dtype, **how)
+
+
+def describe(results: RunResults) -> dict[str, GroupLayout]:
+    """The layout of the output of a run, by group; the root is ""."""
+    config = results.config
+    layout = {"": _root(results), "slips": _slips(results), "energy": _energy(results)}
+    if config.output.slip_interval is not None and config.slider.slip_velocity(config) > 0:
+        layout["slip_traces"] = _slip_traces(results)
+    if config.has_avalanches:
+        layout["avalanches"] = _avalanches(results)
+    if config.output.snapshots or config.output.snapshot_size:
+        layout["snapshots"] = _snapshots(results)
+    return layout
+
+
+def recorded(config: Config) -> tuple[str, ...]:
+    """Names of the traces that an output of a configuration has, without the time."""
+    return tables.TRACE_COLUMNS[1:7] + config.slider.extra_traces
+
+
+def _count(results: RunResults, table: str) -> int:
+    return sum(len(one.rows(table)) for one in results.realizations)
+
+
+def longest(results: RunResults) -> int:
+    """Place of the realization with the longest trace, which has the times of all."""
+    return int(np.argmax([len(one.rows("trace")) for one in results.realizations]))
+
+
+def _root(results: RunResults) -> GroupLayout:
+    config, realizations = results.config, results.realizations
+    writer = _Form(variables.ROOT, config.contact_kind.is_discrete, {})
+    lengths = [len(one.rows("trace")) for one in realizations]
+    sizes = {"realization": len(realizations), "time": max(lengths)}
+    each, at_times = ("realization",), ("realization", "time")
+    writer.add("realization", each, is_coordinate=True, values=[one.number for one in realizations])
+    writer.add("time", ("time",), is_coordinate=True, table="trace", pick=column(0))
+    can_lack = min(lengths) < max(lengths)
+    for name in recorded(config):
+        place = tables.TRACE_COLUMNS.index(name)
+        writer.add(name, at_times, can_lack=can_lack, table="trace", pick=column(place))
+    layers = config.slider.layers_recorded(config)
+    if layers:
+        sizes["layer"] = layers
+        numbers = np.arange(1, sizes["layer"] + 1)
+        writer.add("layer", ("layer",), is_coordinate=True, values=numbers)
+        where = (*at_times, "layer")
+        writer.add("layer_displacement", where, table="layers", pick=lambda rows, _: rows)
+    totals = ["breaks", "energy_residual", "kernel_seconds"]
+    if config.has_avalanches:
+        totals += ["avalanche_count", "avalanche_slip"]
+    for name in totals:
+        writer.add(name, each, values=[getattr(one, name) for one in realizations])
+    if config.has_avalanches:
+        writer.add("end_displacement", each, values=[one.displacement for one in realizations])
+    return GroupLayout(sizes, writer.entries, attributes(results))
+
+
+def _catalogue(results: RunResults, group: Group, table: str) -> _Form:
+    """The start of a group of rows of all realizations."""
+    dimension = DIMENSIONS[table]
+    writer = _Form(group, results.config.contact_kind.is_discrete, {})
+    writer.add("realization_index", (dimension,), table=table, pick=lambda _, owners: owners)
+    return writer
+
+
+# Dimension of the rows of a table in the group of its catalogue.
+DIMENSIONS = {
+    "slips": "slip",
+    "slip_trace": "sample",
+    "avalanches": "avalanche",
+    "snapshot_places": "snapshot",
+    "snapshots": "snapshot",
+}
+
+
+def _slips(results: RunResults) -> GroupLayout:
+    writer = _catalogue(results, variables.SLIPS, "slips")
+    place = {name: number for number, name in enumerate(tables.SLIP_COLUMNS)}
+    before, after = place["force_before"], place["force_after"]
+    picks = {name: column(number) for name, number in place.items()}
+    picks["force_drop"] = lambda rows, _: rows[:, before] - rows[:, after]
+    for name in variables.SLIPS:
+        if name in picks:
+            writer.add(name, ("slip",), table="slips", pick=picks[name])
+    return GroupLayout({"slip": _count(results, "slips")}, writer.entries, {})
+
+
+def _slip_traces(results: RunResults) -> GroupLayout:
+    writer = _catalogue(results, variables.SLIP_TRACES, "slip_trace")
+    how: dict[str, Any] = {"table": "slip_trace"}
+    writer.add("slip", ("sample",), pick=column(-1), **how)
+    writer.add("sample_time", ("sample",), is_coordinate=True, pick=column(0), **how)
+    for name in recorded(results.config):
+        place = tables.TRACE_COLUMNS.index(name)
+        writer.add(name, ("sample",), pick=column(place), **how)
+    return GroupLayout({"sample": _count(results, "slip_trace")}, writer.entries, {})
+
+
+def _avalanches(results: RunResults) -> GroupLayout:
+    config = results.config
+    writer = _catalogue(results, variables.AVALANCHES, "avalanches")
+    place = {name: number for number, name in enumerate(tables.AVALANCHE_COLUMNS)}
+    names = ["start_time", "displacement", "size", "force_before", "force_drop"]
+    place["start_time"] = place["time"]
+    if config.slider.jumps:
+        names.append("slip")
+    if config.interaction is not None:
+        names += ["area", "width", "height", "generations"]
+    for name in names:
+        writer.add(name, ("avalanche",), table="avalanches", pick=column(place[name]))
+    if config.interaction is not None:
+        sides = {
+            place["width"]: config.interaction.columns,
+            place["height"]: config.interaction.rows,
+        }
+
+        def spans(rows: Array, _: Array) -> Array:
+            reached: Array = np.any([rows[:, side] == most for side, most in sides.items()], axis=0)
+            return reached
+
+        writer.add("spans", ("avalanche",), table="avalanches", pick=spans)
+    return GroupLayout({"avalanche": _count(results, "avalanches")}, writer.entries, {})
+
+
+def _snapshots(results: RunResults) -> GroupLayout:
+    """The contacts on their lattice, dimensions ``snapshot``, ``row``, ``column``."""
+    config, lattice = results.config, results.config.interaction
+    assert lattice is not None
+    assert config.contacts.area is not None
+    writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_places")
+    how: dict[str, Any] = {"table": "snapshot_places"}
+    writer.add("snapshot_time", ("snapshot",), is_coordinate=True, pick=column(0), **how)
+    writer.add("displacement", ("snapshot",), pick=column(1), **how)
+    writer.add("avalanche_size", ("snapshot",), pick=column(2), **how)
+    spacing = np.sqrt(config.contacts.area / config.contacts.count)
+    for name, places in zip("xy", lattice_places(lattice), strict=True):
+        writer.add(name, ("row", "column"), is_coordinate=True, values=spacing * places)
+    shape = (-1, lattice.rows, lattice.columns)
+    picks: dict[str, Pick] = {
+        "stretch": lambda rows, _: rows[..., 0],
+        "load": lambda rows, _: np.where(np.isfinite(rows[..., 0]), rows[..., 1], np.nan),
+        "pinned": lambda rows, _: np.isfinite(rows[..., 0]),
+        "generation": lambda rows, _: rows[..., 2],
+    }
+
+    def on_lattice(pick: Pick) -> Pick:
+        return lambda rows, owners: pick(rows, owners).reshape(shape)
+
+    for name, pick in picks.items():
+        where = ("snapshot", "row", "column")
+        writer.add(name, where, table="snapshots", pick=on_lattice(pick))
+    sizes = {
+        "snapshot": _count(results, "snapshots"),
+        "row": lattice.rows,
+        "column": lattice.columns,
+    }
+    return GroupLayout(sizes, writer.entries, {})
+
+
+def lattice_places(interaction: Interaction) -> tuple[Array, Array]:
+    """Places of the contacts in units of their distance, each of shape (rows, columns)."""
+    row, column_ = np.indices((interaction.rows, interaction.columns), dtype=float)
+    if interaction.lattice == "square":
+        return column_, row
+    return column_ + 0.5 * (row % 2), row * np.sqrt(0.75)
+
+
+def _energy(results: RunResults) -> GroupLayout:
+    """The terms of the energy balance of each realization, from the start of the run [J]."""
+    terms = np.array([one.energy for one in results.realizations]).T
+    writer = _Form(variables.ENERGY, results.config.contact_kind.is_discrete, {})
+    for name, values in zip(tables.ENERGY_COLUMNS, terms, strict=True):
+        if name in variables.ENERGY:
+            writer.add(name, ("realization",), values=values)
+    return GroupLayout({}, writer.entries, {})
+
+
+def attributes(results: RunResults) -> dict[str, Any]:
+    """Attributes of an output: what was run, by what, and how it went."""
+    config, realizations = results.config, results.realizations
+    reached = min(one.time for one in realizations)
+    residual: float = max((one.energy_residual for one in realizations), key=abs)
+    solver = {}
+    solver_name = config.slider.solver_name(config)
+    if solver_name is not None:
+        counts = np.sum([one.integrator_counts for one in realizations], axis=0)
+        solver = {
+            "solver": solver_name,
+            "solver_steps": int(counts[0]),
+            "solver_evaluations": int(counts[1]),
+            "solver_failed_steps": int(counts[2]),
+        }
+    return (
+        program_attributes(config, "run")
+        | solver
+        | {
+            "seed": config.run.seed,
+            "complete": "true" if results.complete else "false",
+            "comment": ""
+            if results.complete
+            else f"interrupted; every realization came to {reached:.6g} s",
+            "break_count": sum(one.breaks for one in realizations),
+            "ending": "; ".join(sorted({one.ending for one in realizations})),
+            "advance_count": sum(one.advances for one in realizations),
+            "energy_residual": residual,
+            "wall_seconds": results.wall_seconds,
+        }
+    )
+
+
+class Values(Protocol):
+    """What takes the values of a variable: an array, or a variable of a file."""
+
+    def __setitem__(self, where: Any, values: Any) -> None: ...
+
+
+def fill(
+    results: RunResults,
+    layout: Mapping[str, GroupLayout],
+    taken: Mapping[str, Mapping[str, Values]],
+) -> None:
+    """Hand the values of an output, block by block, to what takes them, by group and name."""
+    timekeeper = longest(results)
+    for group, form in layout.items():
+        for name, entry in form.entries.items():
+            if not entry.table and np.size(entry.values):
+                taken[group][name][...] = np.asarray(entry.values, dtype=entry.dtype)
+        for table in dict.fromkeys(entry.table for entry in form.entries.values() if entry.table):
+            wanted = {name: one for name, one in form.entries.items() if one.table == table}
+            pieces = _ragged(results, table) if table in DIMENSIONS else _padded(results, table)
+            for where, rows, owners in pieces:
+                for name, entry in wanted.items():
+                    assert entry.pick is not None
+                    place = where if entry.is_padded else where[-1:]
+                    # The times are those of the longest trace.
+                    if entry.is_padded or len(where) == 1 or where[0] == timekeeper:
+                        values = entry.pick(rows, owners)
+                        taken[group][name][place] = values.astype(entry.dtype, copy=False)
+
+
+def _block_rows(results: RunResults, table: str) -> int:
+    """Most rows of a table that are held at a time."""
+    width = 1
+    if table == "snapshots":
+        width = 3 * results.config.contacts.count
+    elif table == "layers":
+        width = getattr(results.config.slider, "layers", 1)
+    return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
+
+
+def _padded(results: RunResults, table: str) -> Iterator[tuple[tuple[Any, ...], Array, Array]]:
+    """Blocks of a table realization by realization: where they belong, rows, their realizations."""
+    for place, one in enumerate(results.realizations):
+        start = 0
+        for rows in one.rows(table).blocks(_block_rows(results, table)):
+            yield (place, slice(start, start + len(rows))), rows, np.full(len(rows), place)
+            start += len(rows)
+
+
+def _ragged(results: RunResults, table: str) -> Iterator[tuple[tuple[Any, ...], Array, Array]]:
+    """Blocks of a table one after another, those of short realizations put together."""
+    most, start = _block_rows(results, table), 0
+    held: list[Array] = []
+    owners: list[Array] = []
+    count = 0
+
+    def piece() -> tuple[tuple[Any, ...], Array, Array]:
+        where = (slice(start, start + count),)
+        return where, np.concatenate(held), np.concatenate(owners)
+
+    for place, one in enumerate(results.realizations):
+        for block in one.rows(table).blocks(most):
+            left = block
+            while len(left):
+                part, left = left[: most - count], left[most - count :]
+                held.append(part)
+                owners.append(np.full(len(part), place))
+                count += len(part)
+                if count == most:
+                    yield piece()
+                    start, count = start + count, 0
+                    held.clear()
+                    owners.clear()
+    if count:
+        yield piece()
+
+
+def build_tree(results: RunResults) -> xr.DataTree:
+    """Put the results of a run together in memory, as an output file holds them.
+
+    Returns
+    -------
+    xarray.DataTree
+        Root: the trace, dimensions (realization, time), and figures for each realization. Groups:
+        ``slips`` (slip), ``slip_traces`` (sample), ``avalanches`` (avalanche), ``snapshots``
+        (snapshot, row, column), ``energy`` (realization). What an interrupted run did not come to
+        is NaN in the trace.
+    """
+    layout = describe(results)
+    sizes = layout[""].sizes
+    arrays: dict[str, dict[str, Array]] = {}
+    for group, form in layout.items():
+        all_sizes = {**sizes, **form.sizes}
+        arrays[group] = {
+            name: np.full([all_sizes[one] for one in entry.dimensions], np.nan, dtype=entry.dtype)
+            if entry.dtype.kind == "f"
+            else np.zeros([all_sizes[one] for one in entry.dimensions], dtype=entry.dtype)
+            for name, entry in form.entries.items()
+        }
+    fill(results, layout, arrays)
+    datasets = {}
+    for group, form in layout.items():
+        made = {
+            name: xr.Variable(entry.dimensions, arrays[group][name], entry.meaning.attributes)
+            for name, entry in form.entries.items()
+        }
+        for name, entry in form.entries.items():
+            made[name].encoding = {"_FillValue": entry.fill_value}
+        coordinates = {name: made[name] for name in made if form.entries[name].is_coordinate}
+        others = {name: made[name] for name in made if name not in coordinates}
+        datasets["/" + group] = xr.Dataset(others, coordinates, form.attributes)
+    return xr.DataTree.from_dict(datasets)
+
+
+def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
+    """A group of an output alone, without the coordinates of the root that it does not use.
+
+    So that `xarray.Dataset.to_dataframe` has a row for each row of the group, not for each pair of
+    it and a time of the trace.
+    """
+    data = tree.children[name].to_dataset()
+    return data[list(data.data_vars)]

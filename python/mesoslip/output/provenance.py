@@ -1,0 +1,51 @@
+"""Where an output comes from: attributes after CF and ACDD."""
+
+from __future__ import annotations
+
+import platform
+from contextvars import ContextVar
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from mesoslip import _build, _core
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+# The line that was typed, if the command line is what asks for an output.
+COMMAND_LINE: ContextVar[str | None] = ContextVar("COMMAND_LINE", default=None)
+
+# What the output of each command holds.
+SUMMARIES = {
+    "run": "A slider pulled over contacts with random breaking thresholds, simulated with the "
+    "earthquake-like model of multicontact friction or its master equation",
+    "curve": "Force of infinitely many contacts with random breaking thresholds under a slider "
+    "that moves forward slowly, from the master equation of multicontact friction",
+    "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
+    "contacts that break one after another and for a film that melts at once",
+}
+
+
+def program_attributes(config: Config, command: str) -> dict[str, Any]:
+    """Attributes of every output: what was computed, by what."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    program = f"mesoslip {version('mesoslip')}"
+    asked = COMMAND_LINE.get() or f"mesoslip.{command} in Python"
+    return {
+        "Conventions": "CF-1.11, ACDD-1.3",
+        "title": config.title or "Stick-slip of a multicontact interface",
+        "summary": SUMMARIES[command],
+        "keywords": "friction, stick-slip, multicontact interface, earthquake-like model",
+        "source": program,
+        "history": f"{now} {program}: {asked}",
+        "date_created": now,
+        "configuration": config.to_toml(),
+        "program_version": version("mesoslip"),
+        "commit": _build.COMMIT,
+        "compiler": _build.COMPILER,
+        "library_versions": ", ".join(
+            [f"python {platform.python_version()}", f"SUNDIALS {_core.sundials().decode()}"]
+            + [f"{name} {version(name)}" for name in ("numpy", "xarray", "netCDF4", "pydantic")]
+        ),
+    }

@@ -1,0 +1,188 @@
+"""What the variables of an output mean: units, long name, type, group by group."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import DTypeLike
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a variable means.
+
+    Parameters
+    ----------
+    units, long_name
+        As CF has them.
+    dtype
+        Type of its values.
+    is_fractional
+        Whether the master equation makes it a real number, as it may have a part of a contact.
+    further
+        More attributes.
+    """
+
+    units: str
+    long_name: str
+    dtype: DTypeLike = np.float64
+    is_fractional: bool = False
+    further: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of the variable."""
+        return {"units": self.units, "long_name": self.long_name, **self.further}
+
+
+class Group(dict[str, Meaning]):
+    """The variables that a group of an output may have."""
+
+    def variable(self, name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
+        """A variable of the group with its units and long name."""
+        return xr.Variable(dimensions, values, self[name].attributes)
+
+
+# Rows of a catalogue tell their realization as CF's indexed ragged arrays do.
+REALIZATION_INDEX = Meaning(
+    "1",
+    "place of the row's realization along the dimension realization, from 0",
+    np.int64,
+    further={"instance_dimension": "realization"},
+)
+
+TRACE = Group(
+    drive_displacement=Meaning("m", "displacement of the drive"),
+    displacement=Meaning("m", "displacement of the slider"),
+    velocity=Meaning("m s-1", "velocity of the slider"),
+    spring_force=Meaning("N", "force of the drive on the slider"),
+    contact_force=Meaning("N", "force of the slider on the contacts"),
+    detached_contacts=Meaning("1", "number of detached contacts", np.int32, is_fractional=True),
+    elastic_force=Meaning("N", "mean elastic force in the slider, K (X_d - X_1)"),
+    base_displacement=Meaning("m", "displacement of the base"),
+)
+
+ROOT = Group(
+    TRACE,
+    realization=Meaning("1", "number of the realization", np.int64),
+    time=Meaning("s", "time"),
+    layer=Meaning("1", "number of the layer, 1 at the contacts", np.int64),
+    layer_displacement=Meaning("m", "displacement of a layer"),
+    breaks=Meaning("1", "breaks of contacts in the run", np.int64, is_fractional=True),
+    energy_residual=Meaning(
+        "1", "what the energy balance lacks, relative to the work of the drive"
+    ),
+    kernel_seconds=Meaning("s", "computing time of the kernel"),
+    avalanche_count=Meaning("1", "number of avalanches in the run", np.int64),
+    avalanche_slip=Meaning(
+        "m", "displacement of the slider in avalanches, the drive standing still"
+    ),
+    end_displacement=Meaning("m", "displacement of the slider at the end of the run"),
+)
+
+SLIPS = Group(
+    realization_index=REALIZATION_INDEX,
+    start_time=Meaning("s", "time of the greatest spring force before the slip"),
+    end_time=Meaning("s", "time of the least spring force after the slip"),
+    force_before=Meaning("N", "spring force at the start of the slip"),
+    force_after=Meaning("N", "spring force at the end of the slip"),
+    force_drop=Meaning("N", "drop of the spring force in the slip"),
+    peak_velocity=Meaning("m s-1", "greatest velocity of the slider in the slip"),
+    contacts_broken=Meaning("1", "breaks of contacts in the slip", np.int64, is_fractional=True),
+)
+
+SLIP_TRACES = Group(
+    TRACE,
+    realization_index=REALIZATION_INDEX,
+    slip=Meaning("1", "number of the slip within its realization, from 0", np.int32),
+    sample_time=Meaning("s", "time of the sample"),
+)
+
+AVALANCHES = Group(
+    realization_index=REALIZATION_INDEX,
+    start_time=Meaning("s", "time at which the first contact broke"),
+    displacement=Meaning("m", "displacement of the slider at which the first contact broke"),
+    size=Meaning("1", "breaks of contacts in the avalanche", np.int64),
+    force_before=Meaning("N", "force of the pinned contacts before the avalanche, without drag"),
+    force_drop=Meaning("N", "drop of the force of the pinned contacts in the avalanche"),
+    slip=Meaning("m", "displacement of the slider in the avalanche"),
+    area=Meaning("1", "contacts that broke in the avalanche, each counted once", np.int64),
+    width=Meaning("1", "columns of the smallest rectangle around the avalanche", np.int64),
+    height=Meaning("1", "rows of the smallest rectangle around the avalanche", np.int64),
+    generations=Meaning(
+        "1", "steps in which the contacts of the avalanche pushed over each other", np.int64
+    ),
+    spans=Meaning("1", "whether the avalanche leaves no column, or no row, untouched", np.int8),
+)
+
+SNAPSHOTS = Group(
+    realization_index=REALIZATION_INDEX,
+    snapshot_time=Meaning("s", "time of the snapshot"),
+    displacement=Meaning("m", "displacement of the slider"),
+    avalanche_size=Meaning(
+        "1", "breaks in the avalanche before the snapshot, 0 at a chosen time", np.int64
+    ),
+    stretch=Meaning("m", "stretch of the contact, missing if it is detached"),
+    load=Meaning("1", "force that breaks the contact over its threshold"),
+    pinned=Meaning("1", "whether the contact is pinned", np.int8),
+    generation=Meaning(
+        "1", "step of the avalanche in which the contact broke, 0 if it did not", np.int32
+    ),
+    x=Meaning("m", "place of the contact along a row"),
+    y=Meaning("m", "place of the contact across the rows"),
+)
+
+ENERGY = Group(
+    drive_work=Meaning("J", "work done by the drive"),
+    slider_energy=Meaning("J", "energy of the slider and its spring at the end"),
+    contact_energy=Meaning("J", "elastic energy of the contacts at the end"),
+    damping_loss=Meaning("J", "energy lost to the damping of the setup"),
+    drag_loss=Meaning("J", "energy lost to the drag of detached contacts"),
+    break_loss=Meaning("J", "elastic energy lost by breaking contacts"),
+    birth_gain=Meaning("J", "elastic energy of contacts at their attaching"),
+)
+
+CURVE = Group(
+    displacement=Meaning("m", "displacement of the slider"),
+    contact_force=Meaning("N", "force of the slider on the contacts"),
+    slope=Meaning("N m-1", "derivative of the contact force by the displacement"),
+    contact_stiffness=Meaning("N m-1", "stiffness of the pinned contacts"),
+    break_rate=Meaning("m-1", "breaks of a contact over displacement"),
+    potential=Meaning("J", "effective potential of the slider"),
+)
+
+CRITICAL = Group(
+    critical_displacement=Meaning("m", "displacement of the slider where F' = -K"),
+    contact_force=Meaning("N", "force of the slider on the contacts"),
+    curvature=Meaning("N m-2", "second derivative of the contact force by the displacement"),
+    third_derivative=Meaning("N m-3", "third derivative of the contact force by the displacement"),
+    D0=Meaning("1", "contact force at the onset of slip over the static force"),
+    D2=Meaning("1", "second-order coefficient of the onset of slip, Eq. S46"),
+    D3=Meaning("1", "third-order coefficient of the onset of slip, Eq. S46"),
+)
+
+STRETCHES = Group(
+    density_displacement=Meaning("m", "displacement of the slider"),
+    stretch=Meaning("m", "stretch of a contact"),
+    stretch_density=Meaning(
+        "m-1", "density of stretches, without contacts that have not broken yet"
+    ),
+    unbroken_part=Meaning("1", "part of the contacts that bear the stretch of a relaxed start"),
+)
+
+ONSET = Group(
+    onset_time=Meaning("1", "time since the onset of slip times the setup frequency"),
+    onset_displacement=Meaning(
+        "1", "displacement since the onset times the spring over static force"
+    ),
+    onset_velocity=Meaning("1", "derivative of the displacement since the onset by the time"),
+    onset_mean_velocity=Meaning("1", "running mean of that velocity"),
+    relative_force_drop=Meaning(
+        "1", "change of the spring force since the onset over static force"
+    ),
+    asymptote=Meaning("1", "change of the spring force at short times over static force"),
+)

@@ -1,0 +1,216 @@
+"""Outputs: one layout in memory and in files, which every method of xarray can handle."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import mesoslip
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import ROOT, klein_tables
+from mesoslip import api
+from mesoslip.output import files, layout
+from mesoslip.simulation.tables import FirstRows
+
+QUICK = {
+    "contacts__count": 48,
+    "run__duration": 2.2,
+    "output__interval": 1e-2,
+    "output__slip_interval": 1e-3,
+    "run__realizations": 2,
+}
+LATTICE = {
+    "contacts__stiffness": 200.0,
+    "contacts__threshold__relative_width": 0.3,
+    "interaction": {"strength": 0.3, "columns": 8, "rows": 6},
+    "output__snapshots": (0.5, 1.5),
+    "output__snapshot_size": 20,
+}
+LAYERED = {
+    "slider": {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 4},
+    "output__layers": True,
+    "run__duration": 0.5,
+}
+BUNDLE = {
+    "slider": {"kind": "quasistatic"},
+    "drive": {"force_rate": 1e-6},
+    "run": {"realizations": 3},
+    "contacts__reattach": False,
+    "output__interval": 1e-2,
+    "output__slip_interval": None,
+}
+KINDS = {
+    "rigid": QUICK,
+    "infinite": QUICK | {"run__engine": "me", "run__realizations": 1},
+    "layered": QUICK | LAYERED,
+    "base": QUICK
+    | LAYERED
+    | {
+        "slider__base": {"mass": 5e-3, "stiffness": 1e4},
+        "run__engine": "me",
+        "run__realizations": 1,
+    },
+    "prescribed": QUICK | {"slider": {"kind": "prescribed"}},
+    "lattice": QUICK | LATTICE,
+    "quasistatic": QUICK | LATTICE | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
+    "bundle": QUICK | BUNDLE,
+    "nothing happens": QUICK | {"run__duration": 0.1},
+}
+# What differs between two runs of one thing, and between two moments of writing it.
+PASSING = {"history", "date_created"}
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def results(request):
+    """Results of a run of each kind."""
+    changes = dict(KINDS[request.param])
+    changes = {name: value for name, value in changes.items() if value is not None}
+    return api.simulate(mesoslip.Config.from_dict(klein_tables(**changes)))
+
+
+def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
+    assert one.groups == other.groups
+    for here in one.subtree:
+        there = other[here.path]
+        assert isinstance(there, xr.DataTree)
+        assert set(here.coords) == set(there.coords)
+        assert set(here.variables) == set(there.variables)
+        assert {**here.attrs, **dict.fromkeys(PASSING)} == {
+            **there.attrs,
+            **dict.fromkeys(PASSING),
+        }
+        for name in here.variables:
+            variable, twin = here.variables[name], there.variables[name]
+            assert variable.dims == twin.dims, name
+            assert variable.dtype == twin.dtype, name
+            assert variable.attrs == twin.attrs, name
+            assert variable.values.tobytes() == twin.values.tobytes(), name
+
+
+def test_both_ways_to_write_give_the_same(results, tmp_path):
+    """Block by block or as a tree: the same values to the bit, attributes, types and encodings."""
+    tree = layout.build_tree(results)
+    files.write_results(results, tmp_path / "streamed.nc")
+    files.write(tree, tmp_path / "built.nc")
+    streamed, built = files.read(tmp_path / "streamed.nc"), files.read(tmp_path / "built.nc")
+    assert_same(tree, streamed)
+    assert_same(built, streamed)
+    for node in built.subtree:
+        for name, variable in node.variables.items():
+            for key in ("dtype", "_FillValue", "zlib", "coordinates"):
+                mine, others = (
+                    one.encoding.get(key) for one in (streamed[node.path].variables[name], variable)
+                )
+                if key == "coordinates":
+                    mine, others = (set((one or "").split()) for one in (mine, others))
+                np.testing.assert_equal(mine, others, err_msg=f"{node.path} {name} {key}")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["built.nc", "streamed.nc"]
+
+
+@pytest.mark.parametrize("rows", [1, 7])
+def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
+    """Blocks that end anywhere, within and between realizations."""
+    tree = layout.build_tree(results)
+    monkeypatch.setattr(layout, "BLOCK_ROWS", rows)
+    if max(len(one.rows("trace")) for one in results.realizations) < 1000:
+        files.write_results(results, tmp_path / "out.nc")
+        assert_same(tree, files.read(tmp_path / "out.nc"))
+
+
+def test_interrupted_realizations_of_different_length(klein, tmp_path):
+    """What a realization did not come to is missing; the times are those of the longest."""
+    results = api.simulate(klein(**QUICK | {"run__realizations": 3}))
+
+    class Cut:
+        def __init__(self, one, length):
+            self.one, self.length = one, length
+
+        def __getattr__(self, name):
+            return getattr(self.one, name)
+
+        def rows(self, table):
+            rows = self.one.rows(table)
+            return FirstRows(rows, self.length) if table == "trace" else rows
+
+    partial = SimpleNamespace(
+        config=results.config,
+        complete=False,
+        wall_seconds=1.0,
+        realizations=[
+            Cut(one, length) for one, length in zip(results.realizations, (3, 50, 20), strict=True)
+        ],
+    )
+    tree = layout.build_tree(partial)
+    files.write_results(partial, tmp_path / "out.nc")
+    assert_same(tree, files.read(tmp_path / "out.nc"))
+    force = tree["spring_force"].values
+    assert tree.attrs["complete"] == "false"
+    assert np.isfinite(force).sum(axis=1).tolist() == [3, 50, 20]
+    assert np.isfinite(tree["time"].values).all()
+    assert tree["detached_contacts"].dtype == np.float64
+
+
+def test_no_group_hides_a_coordinate_of_its_parent(results):
+    tree = layout.build_tree(results)
+    for child in tree.children.values():
+        own = child.to_dataset(inherit=False)
+        assert not set(own.variables) & set(tree.coords)
+        if "realization" not in own.dims:
+            assert own["realization_index"].attrs["instance_dimension"] == "realization"
+            assert set(own["realization_index"].values) <= set(range(tree.sizes["realization"]))
+        for name, variable in own.variables.items():
+            assert {"units", "long_name"} <= variable.attrs.keys(), name
+
+
+def test_methods_of_a_tree_work_on_the_whole(results, tmp_path):
+    """As a user reads a file, without our reader."""
+    path = tmp_path / "out.nc"
+    files.write_results(results, path)
+    with xr.open_datatree(path, engine="netcdf4") as tree:
+        assert "slips" in tree._repr_html_()
+        assert tree.isel(realization=0)["spring_force"].dims == ("time",)
+        middle = float(tree["time"].mean())
+        early = tree.sel(time=slice(0, middle))
+        assert 0 < early.sizes["time"] < tree.sizes["time"]
+        assert early["slips"].sizes["slip"] == tree["slips"].sizes["slip"]
+        doubled = tree.map_over_datasets(lambda data: 2 * data)
+        np.testing.assert_array_equal(
+            doubled["slips/force_drop"].values, 2 * tree["slips/force_drop"].values
+        )
+        for name, node in tree.children.items():
+            assert set(node.to_dataset().data_vars) == set(node.data_vars)
+            alone = mesoslip.group(tree, name)
+            expected = int(np.prod([alone.sizes[one] for one in alone.dims]))
+            assert len(alone.to_dataframe()) == expected
+            # The same without us, from the file.
+            with xr.open_dataset(path, group=name) as data:
+                assert len(data.to_dataframe()) == expected
+            for variable in node.data_vars.values():
+                assert len(variable.to_dataframe(name="values")) == variable.size
+        assert len(mesoslip.slips(tree).to_dataframe()) == tree["slips"].sizes["slip"]
+        assert len(tree.to_dataset().to_dataframe()) == np.prod(
+            list(tree.to_dataset().sizes.values())
+        )
+
+
+def test_files_of_earlier_versions_are_read():
+    """Their catalogues hid the coordinates of the root."""
+    path = ROOT / "tests" / "reference" / "old.nc"
+    with netCDF4.Dataset(path) as file:
+        assert "realization" in file["slips"].variables
+        times = file["slip_traces"]["time"][:]
+        numbers = file["slips"]["realization"][:]
+        starts = file["avalanches"]["time"][:]
+        moments = file["snapshots"]["time"][:]
+    tree = mesoslip.read(path)
+    np.testing.assert_array_equal(tree["slip_traces"]["sample_time"].values, times)
+    np.testing.assert_array_equal(tree["slips"]["realization_index"].values, numbers)
+    np.testing.assert_array_equal(tree["avalanches"]["start_time"].values, starts)
+    np.testing.assert_array_equal(tree["snapshots"]["snapshot_time"].values, moments)
+    assert tree["slips"]["realization_index"].attrs["instance_dimension"] == "realization"
+    assert "realization_index" in tree["slips"].data_vars
+    assert "slips" in tree._repr_html_()
+    assert tree.isel(realization=0).sel(time=slice(0, 1)).sizes["time"] > 0
+    assert len(mesoslip.slips(tree)["waiting_time"]) == len(numbers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output import files, layout
+from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import Results, run_realizations
 from mesoslip.theory.derived import Derived, derived_quantities
 
@@ -80,9 +82,16 @@ def simulate(
     *,
     workers: int | None = None,
     progress: Callable[[float], None] | None = None,
+    stop: threading.Event | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Results:
-    """Simulate; what came out as tables, to build a tree of or to write to a file. See `run`."""
-    return run_realizations(config, workers=workers, progress=progress)
+    """Simulate; what came out as tables, to build a tree of or to write to a file.
+
+    See `run`, and `mesoslip.simulation.runner.run_realizations`.
+    """
+    return run_realizations(
+        config, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
+    )
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:

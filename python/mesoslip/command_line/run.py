@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mesoslip.command_line.options import ConfigArgument, SetOption
 from mesoslip.command_line.progress import progress_shown
+from mesoslip.command_line.signals import Stop, stopped_by_signals
+from mesoslip.errors import FileError, MesoslipError
 
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+    from mesoslip.simulation.checkpoint import Checkpoint
+    from mesoslip.simulation.runner import Results
+
+# Exit status after Ctrl-C.
 INTERRUPTED = 130
 
 
@@ -22,39 +30,103 @@ def run(
         ),
     ] = None,
     changes: SetOption = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume", help="Go on from the checkpoint of a run that was stopped, to the bit"
+        ),
+    ] = False,
+    checkpoint_interval: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            help="Wall time between two checkpoints; 0 for none but when the run is stopped",
+            metavar="SECONDS",
+        ),
+    ] = 60.0,
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
 ) -> None:
-    """Simulate, and write an output file."""
+    """Simulate, and write an output file.
+
+    A checkpoint beside the output, NAME.checkpoint, is kept every minute, and when the run is
+    stopped by Ctrl-C, SIGTERM or SIGHUP; the same command with --resume goes on from it.
+    """
     from mesoslip import api
-    from mesoslip.output import files, layout
-    from mesoslip.simulation.realization import ENDINGS
+    from mesoslip.output import files
+    from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
     files.check_writable(path)
-    with progress_shown(quiet) as progress:
-        results = api.simulate(checked, workers=workers, progress=progress)
-    told = layout.attributes(results)
-    if not results.complete:
-        partial = path.with_name(f"{path.stem}.partial{path.suffix}")
-        files.write_results(results, partial)
-        typer.echo(f"{told['comment']}; what there is, is in {partial}", err=True)
-        raise typer.Exit(INTERRUPTED)
-    files.write_results(results, path)
+
+    def tell(text: str) -> None:
+        typer.echo(f"{path}: {text}", err=True)
+
+    checkpoint = Checkpoint(
+        checkpoint_folder(path), checked, interval=checkpoint_interval, resume=resume, tell=tell
+    )
+    with stopped_by_signals(tell) as stop:
+        with progress_shown(quiet) as progress:
+            results = api.simulate(
+                checked, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
+            )
+        if not results.complete:
+            raise typer.Exit(_keep(results, path, stop, checkpoint))
+        try:
+            files.write_results(results, path)
+        except MesoslipError as error:
+            if checkpoint.write(results.realizations):
+                raise FileError(
+                    f"{error}; the results are kept in {checkpoint.folder}: the same command with "
+                    "--resume writes them"
+                ) from error
+            raise
+        _partial(path).unlink(missing_ok=True)
+        checkpoint.remove()
     if not quiet:
-        found = f"{sum(len(one.rows('slips')) for one in results.realizations)} slips"
-        if checked.has_avalanches:
-            count = sum(one.avalanche_count for one in results.realizations)
-            found = f"{count} avalanches, {found}"
-        typer.echo(
-            f"{path}: {told['break_count']:.0f} breaks, {found}, "
-            f"energy balance to {abs(told['energy_residual']):.0e}, "
-            f"{told['wall_seconds']:.2f} s",
-            err=True,
-        )
-        if told["ending"] != ENDINGS[1]:
-            typer.echo(f"{path}: the run ended as follows: {told['ending']}", err=True)
+        _tell_results(results, checked, path)
+
+
+def _partial(path: Path) -> Path:
+    return path.with_name(f"{path.stem}.partial{path.suffix}")
+
+
+def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> int:
+    """Tell what is kept of a run that was stopped; the exit status."""
+    import signal
+
+    from mesoslip.output import files, layout
+
+    told = str(layout.attributes(results)["comment"])
+    is_kept = checkpoint.saved_time is not None
+    if is_kept:
+        told += "; the same command with --resume goes on from there"
+    # Who is being shut down has no time for a file that the checkpoint makes superfluous.
+    if stop.signal in {None, signal.SIGINT} or not is_kept:
+        files.write_results(results, _partial(path))
+        told += f"; what there is, is in {_partial(path)}"
+    typer.echo(f"{path}: {told}", err=True)
+    return stop.exit_status
+
+
+def _tell_results(results: Results, config: Config, path: Path) -> None:
+    from mesoslip.output import layout
+    from mesoslip.simulation.realization import ENDINGS
+
+    told = layout.attributes(results)
+    found = f"{sum(len(one.rows('slips')) for one in results.realizations)} slips"
+    if config.has_avalanches:
+        count = sum(one.avalanche_count for one in results.realizations)
+        found = f"{count} avalanches, {found}"
+    typer.echo(
+        f"{path}: {told['break_count']:.0f} breaks, {found}, "
+        f"energy balance to {abs(told['energy_residual']):.0e}, "
+        f"{told['wall_seconds']:.2f} s",
+        err=True,
+    )
+    if told["ending"] != ENDINGS[1]:
+        typer.echo(f"{path}: the run ended as follows: {told['ending']}", err=True)

@@ -66,10 +66,12 @@ def run(
     def tell(text: str) -> None:
         typer.echo(f"{path}: {text}", err=True)
 
-    checkpoint = Checkpoint(
-        checkpoint_folder(path), checked, interval=checkpoint_interval, resume=resume, tell=tell
-    )
-    with stopped_by_signals(tell) as stop:
+    with (
+        Checkpoint(
+            checkpoint_folder(path), checked, interval=checkpoint_interval, resume=resume, tell=tell
+        ) as checkpoint,
+        stopped_by_signals(tell) as stop,
+    ):
         with progress_shown(quiet) as progress:
             results = api.simulate(
                 checked, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint

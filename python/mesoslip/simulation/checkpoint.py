@@ -21,7 +21,7 @@ import zlib
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -103,6 +103,12 @@ class Checkpoint:
         self._lock_file: io.TextIOBase | None = None
         self._is_failing = False
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     # What the threads of realizations call.
 
     def visit(self, realization: Realization) -> None:
@@ -170,9 +176,10 @@ class Checkpoint:
         if self.folder.exists():
             self._take_lock()
             shutil.rmtree(self.folder, ignore_errors=True)
-        self._release()
+        self.close()
 
-    def _release(self) -> None:
+    def close(self) -> None:
+        """Leave it to another run; it stays where it is."""
         if self._lock_file is not None:
             self._lock_file.close()
             self._lock_file = None
@@ -306,7 +313,7 @@ class Checkpoint:
             If it is of another configuration or program.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
                 arrays = {name: file[name] for name in file.files if name != "header"}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:

@@ -1,0 +1,62 @@
+"""Short runs of every kind, for what must hold of all of them: some ten thousand events each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from conftest import klein_tables
+from mesoslip import Config
+
+# Fast loading of few contacts, so that slips and reversals come within some ten milliseconds.
+FAST = {
+    "run__duration": None,
+    "drive": {
+        "stage": [
+            {"duration": 0.04, "velocity": 1e-5},
+            {"duration": 0.01, "velocity": 0.0},
+            {"duration": 0.05, "velocity": -1e-5},
+        ]
+    },
+    "contacts__count": 48,
+    "contacts__threshold__relative_width": 0.1,
+    "output__interval": 1e-3,
+    "output__slip_interval": 1e-4,
+}
+PLACES = {"strength": 0.3, "lattice": "triangular", "columns": 8, "rows": 6}
+RIGID = {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2}
+LAYERED = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 3}
+BASE = {"mass": 5e-3, "stiffness": 1e4, "damping": 10.0}
+SNAPSHOTS = {"interaction": PLACES, "output__snapshots": [0.01, 0.03], "output__snapshot_size": 20}
+
+KINDS: dict[str, dict[str, Any]] = {
+    "rigid": {},
+    "rigid, three realizations": {"run__realizations": 3, "contacts__coupling": "equal"},
+    "rigid, steady": {"contacts__initial": "steady"},
+    "rigid, bundle": {"contacts__reattach": False},
+    "rigid, lattice": SNAPSHOTS,
+    "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
+    "rigid, me": {"run__engine": "me"},
+    "prescribed": {"slider": {"kind": "prescribed"}},
+    "prescribed, lattice": {"slider": {"kind": "prescribed"}} | SNAPSHOTS,
+    "prescribed, me": {"slider": {"kind": "prescribed"}, "run__engine": "me"},
+    "layered": {"slider": LAYERED | {"base": BASE}, "output__layers": True},
+    "layered, lattice": {"slider": LAYERED} | SNAPSHOTS,
+    "layered, me": {"slider": LAYERED, "run__engine": "me"},
+    "layered, adams": {"slider": LAYERED | {"solver": {"method": "adams"}}},
+    "layered, bdf": {"slider": LAYERED | {"solver": {"method": "bdf"}}},
+    "quasistatic": {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
+    "quasistatic, lattice": {"slider": {"kind": "quasistatic", "stiffness": 97.0}}
+    | SNAPSHOTS
+    | {"run__avalanches": 500},
+    "quasistatic, force": {
+        "slider": {"kind": "quasistatic"},
+        "drive": {"force_rate": 1e-6},
+        "contacts__reattach": False,
+        "contacts__count": 2000,
+    },
+}
+
+
+def configuration(kind: str, **changes: Any) -> Config:
+    """The short run of a kind, with changes."""
+    return Config.from_dict(klein_tables(**FAST | KINDS[kind] | changes))

@@ -1,0 +1,359 @@
+"""Runs that are stopped and taken up again are the same to the bit."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+import xarray as xr
+from conftest import klein_tables
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from kinds import KINDS, configuration
+from mesoslip import Config, FileError, RunError
+from mesoslip.output import layout
+from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
+from mesoslip.simulation.kernel import Kernel
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.runner import Results, run_realizations
+
+# What tells when, and how long.
+TIMES = {"kernel_seconds"}
+TIME_ATTRIBUTES = {"history", "date_created", "wall_seconds"}
+
+ONCE = {}
+
+
+def whole(kind: str) -> xr.DataTree:
+    """The output of a run that was never stopped."""
+    if kind not in ONCE:
+        ONCE[kind] = layout.build_tree(run_realizations(configuration(kind), workers=1))
+    return ONCE[kind]
+
+
+def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
+    """Every byte but that of wall times."""
+    assert {node.path for node in one.subtree} == {node.path for node in other.subtree}
+    for node in one.subtree:
+        mine, yours = node.to_dataset(inherit=False), other[node.path].to_dataset(inherit=False)
+        assert list(mine.variables) == list(yours.variables)
+        for name in set(mine.variables) - TIMES:
+            a, b = mine[name].values, yours[name].values
+            assert (a.dtype, a.shape) == (b.dtype, b.shape), f"{node.path}/{name}"
+            assert a.tobytes() == b.tobytes(), f"{node.path}/{name}"
+    for name in set(one.attrs) - TIME_ATTRIBUTES:
+        assert one.attrs[name] == other.attrs[name], name
+
+
+def advanced(config: Config, folder: Path, advances: int | None, told: list[str]) -> Results:
+    """Go on from the checkpoint in a folder for some advances and keep another, or to the end."""
+    realizations = [Realization(config, number) for number in range(config.run.realizations)]
+    with Checkpoint(folder, config, resume=True, tell=told.append) as checkpoint:
+        checkpoint.restore(realizations)
+        for one in realizations:
+            while not one.finished:
+                one.advance(advances)
+                if advances is not None:
+                    break
+        if advances is not None:
+            assert checkpoint.write(realizations)
+    return Results(config, realizations, advances is None, 0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(
+    max_examples=4,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(data=st.data())
+def test_a_run_cut_anywhere_is_the_same(kind, data, tmp_path_factory):
+    """Several cuts, each at any event, also within a slip, a cascade, or a cut of a cut."""
+    cuts = data.draw(st.lists(st.integers(1, 400), min_size=1, max_size=4), label="advances")
+    folder = tmp_path_factory.mktemp("cut")
+    config, told = configuration(kind), []
+    for advances in cuts:
+        advanced(config, folder, advances, told)
+    results = advanced(config, folder, None, told)
+    assert len(told) == 1
+    assert "no checkpoint" in told[0]
+    assert_same(whole(kind), layout.build_tree(results))
+
+
+@pytest.mark.parametrize("kind", ["rigid, lattice", "layered, bdf", "rigid, three realizations"])
+def test_a_chain_of_ten_resumes(kind, tmp_path):
+    config, told = configuration(kind), []
+    for advances in range(10, 110, 10):
+        advanced(config, tmp_path, advances, told)
+    assert_same(whole(kind), layout.build_tree(advanced(config, tmp_path, None, told)))
+
+
+def test_workers_and_stops_do_not_matter(tmp_path):
+    """Stopped again and again by another thread, on two threads and on one."""
+    config, expected = configuration("rigid, three realizations"), None
+    config = Config.from_dict(config.to_dict() | {"output": {"interval": 1e-5}})
+    expected = layout.build_tree(run_realizations(config, workers=1))
+    for attempt in range(100):
+        stop = threading.Event()
+        timer = threading.Timer(0.02, stop.set)
+        timer.start()
+        with Checkpoint(tmp_path / "c", config, interval=0.005, resume=True) as checkpoint:
+            results = run_realizations(
+                config, workers=1 + attempt % 2, stop=stop, checkpoint=checkpoint
+            )
+        timer.cancel()
+        if results.complete:
+            break
+    assert results.complete
+    assert_same(expected, layout.build_tree(results))
+    checkpoint.remove()
+    assert not (tmp_path / "c").exists()
+
+
+def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
+    """Rows do not stay in memory, and come back in their order."""
+    from mesoslip.simulation import checkpoint as module
+
+    monkeypatch.setattr(module, "MOST_WAITING", 1000.0)
+    config = configuration("rigid, lattice")
+    one = Realization(config, 0)
+    with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
+        while not one.finished:
+            one.advance(100)
+            checkpoint.look([one])
+            assert sum(rows.waiting_bytes for _, rows in one.waiting) <= 1000
+    assert_same(whole("rigid, lattice"), layout.build_tree(Results(config, [one], True, 0.0)))
+
+
+def test_a_full_disk_does_not_stop_a_run(tmp_path):
+    """It says so, once, goes on, and what cannot be put into files stays in memory."""
+    config, told = configuration("rigid"), []
+    (tmp_path / "trace.rows").symlink_to("/dev/full")
+    with Checkpoint(tmp_path, config, interval=1e-9, tell=told.append) as checkpoint:
+        results = run_realizations(config, checkpoint=checkpoint)
+        assert not checkpoint.write(results.realizations)
+        assert len(told) == 1
+        assert "No space left" in told[0]
+        assert_same(whole("rigid"), layout.build_tree(results))
+        # Once there is room again, there is a checkpoint.
+        (tmp_path / "trace.rows").unlink()
+        assert checkpoint.write(results.realizations)
+    assert (tmp_path / "state.npz").exists()
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "empty", "no rows"])
+def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
+    config, told = configuration("rigid"), []
+    advanced(config, tmp_path, 200, told)
+    advanced(config, tmp_path, 200, told)
+    told.clear()
+    state = tmp_path / "state.npz"
+    data = state.read_bytes()
+    if damage == "cut":
+        state.write_bytes(data[: len(data) // 2])
+    elif damage == "changed":
+        state.write_bytes(data[:2000] + bytes([data[2000] ^ 1]) + data[2001:])
+    elif damage == "empty":
+        state.write_bytes(b"")
+    else:
+        (tmp_path / "trace.rows").write_bytes(b"")
+    results = advanced(config, tmp_path, None, told)
+    assert "damaged" in told[0]
+    assert len(told) == (3 if damage == "no rows" else 1)
+    assert_same(whole("rigid"), layout.build_tree(results))
+
+
+def test_rows_that_were_changed_are_told(tmp_path):
+    config, told = configuration("rigid"), []
+    advanced(config, tmp_path, 2000, told)
+    path = tmp_path / "trace.rows"
+    data = path.read_bytes()
+    path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
+    with pytest.raises(RunError, match=r"trace\.rows: damaged"):
+        layout.build_tree(advanced(config, tmp_path, None, told))
+
+
+def test_another_configuration_or_program_is_refused(tmp_path, monkeypatch):
+    from mesoslip.simulation import checkpoint as module
+
+    config, told = configuration("rigid"), []
+    advanced(config, tmp_path, 100, told)
+    other = configuration("rigid", contacts__delay=1e-3)
+    with pytest.raises(FileError, match=r"contacts\.delay was 0\.0005, is 0\.001"):
+        advanced(other, tmp_path, 100, told)
+    monkeypatch.setattr(module, "FORMAT", 0)
+    with pytest.raises(FileError, match="format"):
+        advanced(config, tmp_path, 100, told)
+
+
+def test_two_runs_of_one_output_are_refused(tmp_path):
+    config = configuration("rigid")
+    realization = Realization(config, 0)
+    realization.advance(10)
+    with Checkpoint(tmp_path, config) as one, Checkpoint(tmp_path, config, resume=True) as other:
+        assert one.write([realization])
+        with pytest.raises(FileError, match="under way"):
+            other.restore([Realization(config, 0)])
+
+
+def test_states_are_whole_at_any_moment(tmp_path):
+    """Whatever file operation a run is cut off at, one of two states can be taken up."""
+    config, told = configuration("rigid"), []
+    advanced(config, tmp_path, 50, told)
+    advanced(config, tmp_path, 50, told)
+    # Between two renamings there is only the previous one; before them a part of the next.
+    (tmp_path / "state.npz").rename(tmp_path / "state.part")
+    told.clear()
+    results = advanced(config, tmp_path, None, told)
+    assert told == []
+    assert_same(whole("rigid"), layout.build_tree(results))
+
+
+def test_handles(klein):
+    """Closed, shared and copied handles are clear errors."""
+    import copy
+
+    kernel = Kernel()
+    with pytest.raises(RunError, match="lacks"):
+        kernel.advance(1, 1.0)
+    with pytest.raises(RunError, match="unknown kind of slider"):
+        kernel.set_slider("round", {})
+    with pytest.raises(RunError, match="'mass' is missing"):
+        kernel.set_slider("rigid", {"stiffness": 1.0})
+    with pytest.raises(RunError, match="unknown parameter 'colour'"):
+        kernel.set_slider("prescribed", {"colour": 1.0})
+    for duplicate in (copy.copy, copy.deepcopy):
+        with pytest.raises(TypeError, match="copied"):
+            duplicate(kernel)
+    kernel.close()
+    kernel.close()
+    with pytest.raises(RunError, match="closed"):
+        kernel.advance(1, 1.0)
+
+    busy = Realization(klein(run__duration=100.0), 0)
+    busy.advance(1)
+    thread = threading.Thread(target=busy.advance, kwargs={"work": 3e6})
+    thread.start()
+    wait_for(busy._kernel._lock.locked)
+    with pytest.raises(RunError, match="another thread"):
+        busy._kernel.ask()
+    thread.join()
+    assert busy._kernel.ask().time > 0
+
+
+def test_simulations_leave_no_memory_behind():
+    """Ten thousand made and destroyed, of all kinds, some in the midst of a run."""
+    configs = [configuration(kind) for kind in KINDS if "me" not in kind]
+
+    def resident() -> float:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+    def many(number: int) -> None:
+        for count in range(number):
+            one = Realization(configs[count % len(configs)], 0)
+            if count % 10 == 0:
+                one.advance(20)
+            else:
+                one._open()
+
+    many(1000)
+    before = resident()
+    many(10_000)
+    assert resident() - before < 8
+
+
+@pytest.fixture
+def long_run(tmp_path):
+    """A run that takes some seconds, with both a trace and finer traces."""
+    path = tmp_path / "long.toml"
+    tables = klein_tables(
+        run__duration=150.0,
+        contacts__count=1000,
+        run__realizations=2,
+        output__interval=1e-2,
+        output__slip_interval=1e-3,
+    )
+    path.write_text(tomli_w.dumps(tables))
+    return path
+
+
+def start(path: Path, output: Path, *more: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "mesoslip", "run", str(path), "-o", str(output), *more]
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+def wait_for(condition, seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def read_whole(path: Path) -> xr.DataTree:
+    with xr.open_datatree(path) as tree:
+        return tree.load()
+
+
+def test_killed_runs_go_on(long_run, tmp_path):
+    """SIGKILL and SIGTERM at moments of all kinds; tests/resume/kill.py does it for hours."""
+    expected, output = tmp_path / "whole.nc", tmp_path / "killed.nc"
+    process = start(long_run, expected)
+    process.communicate()
+    assert process.returncode == 0
+    folder = checkpoint_folder(output)
+    random = np.random.default_rng(1)
+    kills = 0
+    while not output.exists():
+        process = start(long_run, output, "--resume", "--checkpoint-interval", "0.05")
+        state = folder / "state.npz"
+        seen = state.stat().st_ino if state.exists() else 0
+        wait_for(
+            lambda process=process, state=state, seen=seen: (
+                process.poll() is not None or (state.exists() and state.stat().st_ino != seen)
+            )
+        )
+        time.sleep(float(random.uniform(0, 0.1)))
+        if process.poll() is None and kills < 5:
+            process.send_signal(signal.SIGTERM if kills == 2 else signal.SIGKILL)
+            kills += 1
+        process.communicate()
+        assert process.returncode in {0, -signal.SIGKILL, 128 + signal.SIGTERM}
+    assert kills >= 3
+    assert not folder.exists()
+    assert_same(read_whole(expected), read_whole(output))
+
+
+def test_ctrl_c_tells_how_to_go_on(long_run, tmp_path):
+    """A partial file to look at, a checkpoint to go on from, exit status 130; twice is no harm."""
+    output = tmp_path / "stopped.nc"
+    process = start(long_run, output, "--checkpoint-interval", "0.05")
+    wait_for(lambda: (checkpoint_folder(output) / "state.npz").exists())
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in told
+    assert "--resume" in told
+    assert not output.exists()
+    partial = read_whole(tmp_path / "stopped.partial.nc")
+    assert partial.attrs["complete"] == "false"
+    again = start(long_run, output)
+    assert again.stderr is not None
+    assert "--resume" in again.stderr.readline()
+    again.kill()
+    again.communicate()
+    process = start(long_run, output, "--resume")
+    process.communicate()
+    assert process.returncode == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["long.toml", "stopped.nc"]

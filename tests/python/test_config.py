@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
+import subprocess
+import sys
 
+import pint
 import pytest
 from conftest import ROOT, klein_tables
 from hypothesis import given
@@ -11,7 +16,7 @@ from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.configuration.units import to_si
+from mesoslip.configuration.units import PREFIXES, SI, to_si
 from mesoslip.theory.derived import derived_quantities
 from pydantic import ValidationError
 
@@ -266,6 +271,92 @@ def test_everything_wrong_is_told_at_once():
 def test_units_are_converted(value):
     assert to_si(f"{value!r} uN", "N", "18 uN") == pytest.approx(value * 1e-6, rel=1e-12)
     assert to_si(value, "N", "18 uN") == value
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("0,5 ms", "s"),
+        ("1,47 g", "kg"),
+        ("\u22125 s", "s"),
+        ("\u0661 s", "s"),
+        ("1 ± 0.1 s", "s"),
+        ("1.2.3 s", "s"),
+        ("5 5 ms", "s"),
+        ("18..5 uN", "N"),
+        ("[1,2] g", "kg"),
+        ("g", "kg"),
+        ("1_000 g", "kg"),
+        ("9**9**9 s", "s"),
+        ("1 s**9**9", "s"),
+        ("1 s^99", "s"),
+        ("51/s", "1/s"),
+        ("1 s*", "s"),
+        ("1 (s)", "s"),
+        ("3 dB", "1"),
+        ("1 " + "m " * 10_000, "m"),
+    ],
+)
+def test_a_quantity_is_one_number_and_one_unit(text, unit):
+    with pytest.raises(ValueError, match="expected a quantity such as"):
+        to_si(text, unit, "5 ms")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("18 uN", "N", 18e-6),
+        ("1ms", "s", 1e-3),
+        ("-.5e1 m", "m", -5.0),
+        ("51.4 1/s", "1/s", 51.4),
+        ("51.4 Hz", "1/s", 51.4),
+        ("51.4 s-1", "1/s", 51.4),
+        ("956 kg/m^3", "kg/m^3", 956.0),
+        ("956 kg m**-3", "kg/m^3", 956.0),
+        ("0.956 g·cm⁻³", "kg/m^3", 956.0),
+        ("2 J/m/m", "N/m", 2.0),
+        ("20 %", "1", 0.2),
+        ("2 minute", "s", 120.0),
+        ("1 lbf", "N", pytest.approx(4.4482216152605)),
+        ("1e-99999999999 s", "s", 0.0),
+    ],
+)
+def test_units_that_are_known(text, unit, value):
+    assert to_si(text, unit, "5 ms") == value
+
+
+def test_units_mean_what_they_mean_to_pint():
+    """All our prefixes before all our units."""
+    registry = pint.UnitRegistry(cache_folder=None)
+    for unit in SI:
+        for prefix in PREFIXES:
+            theirs = registry.Quantity(1.0, prefix + unit).to_base_units()
+            ours = to_si(f"1 {prefix}{unit}", f"{theirs.units:~C}", "1")
+            assert ours == pytest.approx(theirs.magnitude, rel=1e-14, abs=0)
+
+
+@given(st.text(st.sampled_from("abdehimnostuNPµ%_°"), min_size=1, max_size=6))
+def test_no_name_of_a_unit_breaks_the_library(name):
+    with contextlib.suppress(ValueError):
+        to_si(f"1 {name}", "s", "5 ms")
+
+
+def test_units_need_no_files(tmp_path):
+    """A home folder that cannot be written to, and units that only pint knows."""
+    environment = {**os.environ, "HOME": "/proc/none", "XDG_CACHE_HOME": "/proc/none"}
+    code = (
+        "import sys; from mesoslip.configuration.units import to_si; to_si('97 N/m', 'N/m', '');"
+        "assert 'pint' not in sys.modules; print(to_si('1 minute', 's', ''))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert answer.stdout == "60.0\n"
 
 
 @given(st.text(max_size=12))

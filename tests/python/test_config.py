@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import re
 import subprocess
 import sys
 
@@ -13,7 +14,7 @@ import pytest
 from conftest import ROOT, klein_tables
 from hypothesis import given
 from hypothesis import strategies as st
-from mesoslip import Config, ConfigError, FileError
+from mesoslip import Config, ConfigError, FileError, MesoslipError
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.units import PREFIXES, SI, to_si
@@ -435,6 +436,39 @@ def test_a_base_is_laid_under(tmp_path):
     assert Config.load(tmp_path / "block.toml").slider.kind == "prescribed"
 
 
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        (["kind=quasistatic"], {"kind": "quasistatic", "stiffness": 97.0}),
+        (["kind=prescribed"], {"kind": "prescribed"}),
+        (["layers=3", "kind=layered"], {"mass": 1.47e-3, "stiffness": 97.0, "layers": 3}),
+        (["kind=layered", "layers=3", "mass=2 g"], {"mass": 2e-3, "layers": 3}),
+    ],
+)
+def test_another_kind_keeps_what_it_has_too(changes, expected, tmp_path):
+    """Klein's damping is unknown to all other kinds of sliders."""
+    path = ROOT / "runs" / "klein.toml"
+    changed = Config.load(path, [f"slider.{change}" for change in changes])
+    assert changed.to_dict()["slider"].items() >= expected.items()
+    lines = "\n".join(re.sub("=([a-z]+|2 g)$", r'="\1"', change) for change in changes)
+    (tmp_path / "over.toml").write_text(f'base = "{path}"\n[slider]\n{lines}\n')
+    assert Config.load(tmp_path / "over.toml") == changed
+
+
+def test_another_kind_refuses_what_was_set_beside_it():
+    path = ROOT / "runs" / "klein.toml"
+    for changes in (["kind=quasistatic", "mass=1 g"], ["mass=1 g", "kind=quasistatic"]):
+        with pytest.raises(ConfigError, match=r'slider\.mass.*"rigid" or "layered" only'):
+            Config.load(path, [f"slider.{change}" for change in changes])
+
+
+def test_another_kind_hides_no_mistake_of_the_base(tmp_path):
+    text = (ROOT / "runs" / "klein.toml").read_text().replace("damping_ratio", "damping_ratios")
+    (tmp_path / "base.toml").write_text(text)
+    with pytest.raises(ConfigError, match=r"slider\.damping_ratios: unknown key"):
+        Config.load(tmp_path / "base.toml", ["slider.kind=quasistatic"])
+
+
 def test_a_base_need_not_name_the_default_kind(tmp_path):
     text = (ROOT / "runs" / "klein.toml").read_text().replace('kind = "rigid"', "")
     (tmp_path / "base.toml").write_text(text)
@@ -458,6 +492,78 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "b.toml").write_text('base = "a.toml"')
     with pytest.raises(ConfigError, match="based on each other"):
         Config.load(tmp_path / "a.toml")
+
+
+def links_in_a_loop(path):
+    path.symlink_to(path)
+
+
+def much_too_long(path):
+    path.touch()
+    os.truncate(path, 2**27)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (os.mkfifo, "not a regular file"),
+        (lambda path: path.symlink_to("/dev/zero"), "not a regular file"),
+        (links_in_a_loop, "Too many levels"),
+        (much_too_long, "128 MiB are too much"),
+        (lambda path: path.write_bytes(b"title = '\xff'"), "not a text in UTF-8"),
+        (lambda path: path.write_text('base = "a\\u0000b"'), "name of a file"),
+        (lambda path: path.write_text('base = ""'), "name of a file"),
+        (lambda path: path.write_text("base = 5"), "name of a file"),
+        (lambda path: path.write_text('base = "' + 300 * "a" + '"'), "name too long"),
+        (lambda path: path.write_text('base = "case.toml"'), "based on each other"),
+        (lambda path: path.write_text("a = " + 2000 * "["), "nested too deeply"),
+        (lambda path: path.write_text("a = " + 5000 * "9"), "not valid TOML"),
+    ],
+)
+@pytest.mark.parametrize("as_base", [False, True])
+def test_no_file_breaks_the_reader(make, words, as_base, tmp_path):
+    """Devices and pipes without end, loops, and what no parser can hold."""
+    path = tmp_path / "case.toml"
+    make(path)
+    if as_base:
+        path = tmp_path / "over.toml"
+        path.write_text('base = "case.toml"')
+    with pytest.raises(MesoslipError, match=words) as caught:
+        Config.load(path)
+    assert caught.value.exit_status == 2
+    assert "\n" not in str(caught.value)
+
+
+def test_names_that_are_no_text(tmp_path):
+    with pytest.raises(FileError, match=r"\\udcff\.toml: no such file") as caught:
+        Config.load(tmp_path / os.fsdecode(b"\xff.toml"))
+    str(caught.value).encode()
+    with pytest.raises(FileError, match="not the name of a file"):
+        Config.load(tmp_path / "a\0b.toml")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [10**400, 10**5000, "1" * 400 + " kg"],
+    ids=["more than doubles", "more than Python writes", "text"],
+)
+def test_numbers_of_many_digits(value):
+    (message,) = problems(klein_tables(slider__mass=value))
+    assert message.startswith("case.toml: slider.mass = ")
+    assert len(message) < 300
+    (message,) = problems(klein_tables(contacts__count=value))
+    assert message.startswith("case.toml: contacts.count = ")
+    assert len(message) < 300
+
+
+def test_tables_on_a_base(tmp_path, monkeypatch):
+    """Nested tables are laid over a file of the current folder, as a file over one of its own."""
+    (tmp_path / "klein.toml").write_text((ROOT / "runs" / "klein.toml").read_text())
+    monkeypatch.chdir(tmp_path)
+    config = Config.from_dict({"base": "klein.toml", "contacts": {"delay": "2 ms"}})
+    assert config == Config.load("klein.toml", ["contacts.delay=2 ms"])
+    with pytest.raises(FileError, match=r"klain\.toml: no such file"):
+        Config.from_dict({"base": "klain.toml"})
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from mesoslip.configuration import checks
 from mesoslip.configuration.contacts import contact_kind
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
-from mesoslip.configuration.files import override, parse_toml, read_toml
+from mesoslip.configuration.files import Change, on_base, override, parse_toml, read_toml
 from mesoslip.configuration.sliders import SLIDERS, Slider
 from mesoslip.configuration.table import Complaint, Table
 from mesoslip.configuration.tables import Curve, Drive, Output, Run
@@ -163,7 +163,7 @@ class Config(Table):
         return self.output.interval or self.expected_duration / 10000
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
+    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Config:
         """Read a TOML file and what it is based on, lay overrides over it, and check it.
 
         Parameters
@@ -181,28 +181,34 @@ class Config(Table):
             If anything in it is wrong.
         """
         path = Path(path)
-        return cls.from_dict(override(read_toml(path, ()), overrides), source=str(path))
+        return cls._checked(override(read_toml(path), overrides), str(path))
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
-        """Check a configuration given as nested tables.
+        """Check a configuration given as nested tables; their ``base`` may name a file under them.
 
         Raises
         ------
+        FileError
+            If the file cannot be read.
         ConfigError
             If anything in it is wrong.
         """
+        return cls._checked(on_base(tables, source, Path()), source)
+
+    @classmethod
+    def from_toml(
+        cls, text: str, source: str = "configuration", overrides: Iterable[Change] = ()
+    ) -> Config:
+        """Check a configuration given as the text of a TOML file, with changes laid over it."""
+        return cls._checked(override(parse_toml(text, source), overrides), source)
+
+    @classmethod
+    def _checked(cls, tables: Mapping[str, Any], source: str) -> Config:
         try:
             return cls.model_validate(tables)
         except ValidationError as error:
             raise ConfigError(_problems(error, source)) from None
-
-    @classmethod
-    def from_toml(
-        cls, text: str, source: str = "configuration", overrides: Iterable[str] = ()
-    ) -> Config:
-        """Check a configuration given as the text of a TOML file, with changes laid over it."""
-        return cls.from_dict(override(parse_toml(text, source), overrides), source)
 
     def to_dict(self) -> dict[str, Any]:
         """The configuration as nested tables with plain SI numbers."""

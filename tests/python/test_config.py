@@ -144,6 +144,9 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("output__interval", 1e-12, ["output.interval", "GiB"]),
         ("output__slip_interval", 0.1, ["output.slip_interval", "interval"]),
         ("outputs", {}, ["outputs", "unknown key", "'output'"]),
+        ("delay", "2 ms", ["delay: unknown key; did you mean 'contacts.delay'?"]),
+        ("run__delay", "2 ms", ["run.delay: unknown key; did you mean 'contacts.delay'?"]),
+        ("contacts__rigid", 1, ["contacts.rigid: unknown key"]),
     ],
 )
 def test_what_is_wrong_is_told(key, value, words):
@@ -236,6 +239,27 @@ def test_lengths_of_a_run():
     assert by_way.duration == pytest.approx(10)
     both = Config.from_toml(text, overrides=["run.avalanches=5"])
     assert (both.duration, both.run.avalanches) == (12, 5)
+
+
+@pytest.mark.parametrize(
+    ("way", "duration"), [(1e-6, 1.0), (3e-6, 4.0), (4.5e-6, 5.25), (8e-6, 7.0), (10e-6, 8.0)]
+)
+def test_a_way_of_stages(klein, way, duration):
+    """There, a hold, back, and on after the end of the last stage."""
+    stages = [(2.0, 1e-6), (1.0, 0.0), (2.0, -1e-6), (2.0, 2e-6)]
+    drive = {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
+    config = klein(run={"drive_displacement": way}, drive=drive)
+    assert config.duration == pytest.approx(duration)
+    travelled = [abs(stage.velocity) * stage.duration for stage in config.drive_stages]
+    assert math.fsum(travelled) == pytest.approx(way)
+
+
+def test_a_way_that_stages_do_not_go():
+    stages = [{"duration": 2.0, "velocity": 1e-6}, {"duration": 2.0, "velocity": 0.0}]
+    tables = klein_tables(run={"drive_displacement": 3e-6}, drive={"stage": stages})
+    (message,) = problems(tables)
+    assert "run.drive_displacement = 3e-06: is never reached" in message
+    assert "by 2e-06 m, and the last one stands still" in message
 
 
 @pytest.mark.parametrize(("law", "width"), [("uniform", 0.6), ("exponential", 1.01)])
@@ -413,6 +437,10 @@ def test_overrides():
     assert config.run.seed == 5
     assert config.contacts.reattach is False
     assert config.title == "another"
+    with pytest.raises(ConfigError, match=r"did you mean 'contacts\.delay'"):
+        Config.load(path, ["delay=1ms"])
+    with pytest.raises(ConfigError, match=r"base: names the file under another one"):
+        Config.load(path, ["base=klein.toml"])
     with pytest.raises(ConfigError, match="did you mean 'delay'"):
         Config.load(path, ["contacts.delays=1ms"])
     with pytest.raises(ConfigError, match="must look like"):
@@ -492,6 +520,60 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "b.toml").write_text('base = "a.toml"')
     with pytest.raises(ConfigError, match="based on each other"):
         Config.load(tmp_path / "a.toml")
+
+
+def test_a_configuration_with_changes(klein):
+    config = klein()
+    for changed in (
+        config.replace("contacts.delay=1ms", "run.seed=5"),
+        config.replace({"contacts.delay": "1 ms", "run": {"seed": 5}}),
+        config.replace(contacts={"delay": 1e-3}, run={"seed": 5}),
+        config.replace("contacts.delay=3ms", {"contacts.delay": 1e-3}, run={"seed": 5}),
+    ):
+        assert changed == klein(contacts__delay=1e-3, run__seed=5)
+    assert config == klein()
+    assert config.replace() == config
+    assert config.replace("slider.damping=3 1/s").slider.damping_rate == 3.0
+    assert config.replace("slider.kind=quasistatic").spring_stiffness == 97.0
+    by_stages = config.replace(drive={"stage": [{"duration": 1.0, "velocity": 1e-6}]})
+    assert by_stages.drive.velocity is None
+    for change in ("contacts.delay=-1ms", "contacts.delays=1ms", "output.interval=20 s", "delay"):
+        with pytest.raises(ConfigError):
+            config.replace(change)
+
+
+def test_no_copy_is_unchecked(klein):
+    """Neither a table nor the whole; pydantic's own copy checks nothing."""
+    config = klein()
+    with pytest.raises(ValidationError, match="greater than or equal to 0"):
+        config.contacts.model_copy(update={"delay": -1e-3})
+    with pytest.raises(ConfigError, match=r"output\.interval"):
+        config.model_copy(update={"output": config.output.model_copy(update={"interval": 20.0})})
+    with pytest.raises(ConfigError, match=r"contacts\.delay"):
+        config.model_copy(update={"contacts": config.to_dict()["contacts"] | {"delay": -1}})
+    slower = config.contacts.model_copy(update={"delay": "1 ms"})
+    assert config.model_copy(update={"contacts": slower}) == klein(contacts__delay=1e-3)
+    assert config.model_copy() == config.model_copy(deep=True) == config
+
+
+def test_a_cantilever_that_changes_takes_mass_and_stiffness_along(klein):
+    rod = {"length": 0.05, "radius": 1e-3, "density": 7800.0, "young_modulus": "200 GPa"}
+    slider = {"kind": "layered", "layers": 8, "cantilever": rod}
+    longer = klein(slider=slider).replace("slider.cantilever.length=10 cm").slider
+    assert longer == klein(slider=slider | {"cantilever": rod | {"length": 0.1}}).slider
+    heavier = klein(slider=slider | {"mass": 1.0}).replace("slider.cantilever.length=10 cm").slider
+    assert heavier.mass == 1.0
+
+
+def test_notebooks_show_a_short_table(klein):
+    shown = klein(
+        title="<b>", drive={"stage": 9 * [{"duration": 1.0, "velocity": 1e-6}]}
+    )._repr_html_()
+    assert "&lt;b&gt;" in shown
+    assert "delay = 0.0005" in shown
+    assert "(9 in all)" in shown
+    assert shown.count("<tr>") == 6
+    assert len(shown) < 2000
 
 
 def links_in_a_loop(path):

@@ -45,23 +45,24 @@ def drive_problems(config: Setting) -> Complaints:
         named = _named(kind for kind, table in SLIDERS.items() if table.driven_by_force)
         yield Complaint("drive.force_rate", f"is for {named} only", drive.force_rate)
     if run.drive_displacement is not None:
-        if not drive.velocity:
+        way = run.drive_displacement
+        if run.duration is not None:
+            yield Complaint("run.drive_displacement", "give either this or run.duration", way)
+        elif drive.stage is None and not drive.velocity:
             yield Complaint(
                 "run.drive_displacement",
-                "needs a drive.velocity that is not 0",
-                run.drive_displacement,
-            )
-        elif run.duration is not None:
-            yield Complaint(
-                "run.drive_displacement",
-                "give either this or run.duration",
-                run.drive_displacement,
+                "needs a drive.velocity that is not 0, or stages that move",
+                way,
             )
         elif math.isinf(config.duration):
+            reach = math.fsum(abs(one.velocity) * one.duration for one in drive.stage or ())
             yield Complaint(
                 "run.drive_displacement",
-                f"takes for ever at {drive.velocity:g} m/s",
-                run.drive_displacement,
+                f"is never reached: the stages move the drive by {reach:g} m, and the last one "
+                "stands still"
+                if drive.stage is not None
+                else f"takes for ever at {drive.velocity:g} m/s",
+                way,
             )
     if run.avalanches is not None:
         if not config.has_avalanches:

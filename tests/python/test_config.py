@@ -9,14 +9,16 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pint
 import pytest
 from conftest import ROOT, klein_tables
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from mesoslip import Config, ConfigError, FileError, MesoslipError
+from mesoslip import Config, ConfigError, FileError, MesoslipError, ThresholdLaw
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
+from mesoslip.configuration.threshold_law import LAWS
 from mesoslip.configuration.units import PREFIXES, SI, to_si
 from mesoslip.theory.derived import derived_quantities
 from pydantic import ValidationError
@@ -117,6 +119,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("contacts__ageing", {}, ["contacts.ageing", "not available in this version"]),
         ("contacts__threshold__law", "cauchy", ["contacts.threshold.law", "gaussian"]),
         ("contacts__threshold__relative_width", 0, ["relative_width", "greater than 0"]),
+        ("contacts__threshold__relative_width", 1e-8, ["relative_width", "at least 1e-06"]),
         ("interaction", {"strength": 0.3, "columns": 60}, ["interaction.rows", "missing"]),
         ("interaction", LATTICE | {"rows": 67}, ["interaction.rows", "even", "67"]),
         ("interaction", LATTICE | {"rows": 1}, ["interaction.rows", "greater than or equal to 2"]),
@@ -186,8 +189,12 @@ def test_what_is_wrong_is_told(key, value, words):
             ["run.drive_displacement", "drive.velocity", "not 0"],
         ),
         (
-            {"run": {"drive_displacement": 1e10}, "drive__velocity": 1e-300},
-            ["run.drive_displacement", "takes for ever at 1e-300 m/s"],
+            {"interaction": LATTICE, "output__snapshot_size": 1},
+            ["output.snapshot_size = 1", "may need", "GiB"],
+        ),
+        (
+            {"output__slip_interval": "1 ns"},
+            ["output.slip_interval = 1e-09", "may need", "GiB"],
         ),
         (
             {"run": {"avalanches": 5}, "interaction": LATTICE, "drive__velocity": 0.0},
@@ -636,6 +643,102 @@ def test_numbers_of_many_digits(value):
     (message,) = problems(klein_tables(contacts__count=value))
     assert message.startswith("case.toml: contacts.count = ")
     assert len(message) < 300
+
+
+def test_memory_of_slips_and_snapshots_that_fit(klein):
+    """As much as a run without trouble has: a slip in two seconds, avalanches through it all."""
+    klein(run__duration=1e4, output__slip_interval="10 us")
+    klein(interaction=LATTICE, output__snapshot_size=1000)
+    klein(slider={"kind": "prescribed"}, output__slip_interval="1 ns")
+    klein(interaction=LATTICE, contacts__reattach=False, output__snapshot_size=2)
+
+
+BOUNDED = [
+    ("run__duration", "s"),
+    ("drive__velocity", "m/s"),
+    ("slider__mass", "kg"),
+    ("slider__stiffness", "N/m"),
+    ("slider__damping_ratio", ""),
+    ("contacts__static_force", "N"),
+    ("contacts__stiffness", "N/m"),
+    ("contacts__area", "m^2"),
+    ("contacts__film_thickness", "m"),
+    ("contacts__film_density", "kg/m^3"),
+    ("contacts__drag_rate", "1/s"),
+    ("contacts__delay", "s"),
+]
+
+
+@pytest.mark.parametrize(("key", "unit"), BOUNDED)
+@pytest.mark.parametrize("value", [5e-324, 1e-100, 1e100, 1e300])
+def test_quantities_are_of_a_size_that_means_something(key, unit, value):
+    (message,) = problems(klein_tables(**{key: value}))
+    assert message.startswith(f"case.toml: {key.replace('__', '.')} = {value}: must be between")
+    assert f"{unit} in size, or 0" in message
+
+
+@given(st.lists(st.sampled_from(BOUNDED), unique=True), st.data())
+@settings(deadline=None)
+def test_nothing_overflows_within_the_bounds(keys, data):
+    """Klein's case with keys anywhere in their ranges is refused, or has finite quantities."""
+    exponents = {key: data.draw(st.integers(-28, 25)) for key, _ in keys}
+    exponents["slider__mass"] = data.draw(st.integers(-28, 25))
+    tables = klein_tables(**{key: 10.0**exponent for key, exponent in exponents.items()})
+    tables["contacts"]["threshold"]["law"] = data.draw(st.sampled_from(sorted(LAWS)))
+    tables["contacts"]["threshold"]["relative_width"] = 10.0 ** data.draw(st.integers(-16, 2))
+    tables["slider"] |= data.draw(st.sampled_from([{}, {"kind": "layered", "layers": 3}]))
+    if "kind" in tables["slider"]:
+        del tables["slider"]["damping_ratio"]
+    try:
+        config = Config.from_dict(tables)
+    except ConfigError:
+        return
+    derived = derived_quantities(config)
+    assert {"contact_stiffness", "omega_s", "mean_life", "F_steady"} <= derived.keys()
+    for name, value in config.slider.kernel_parameters(config).items():
+        assert math.isfinite(value), name
+    for name, value in config.contact_kind.kernel_parameters(config).items():
+        assert math.isfinite(value), name
+
+
+def test_numbers_of_numpy(klein):
+    config = klein(
+        run__seed=np.int64(5),
+        contacts__count=np.uint16(4080),
+        contacts__delay=np.float32(0.5),
+        slider__layers=np.int8(3),
+        slider__kind="layered",
+        slider__damping_ratio=None,
+    )
+    assert (config.run.seed, config.contacts.count, config.contacts.delay) == (5, 4080, 0.5)
+    assert all(type(value) is int for value in (config.run.seed, config.slider.layers))
+    assert Config.from_toml(config.to_toml()) == config
+    (message,) = problems(klein_tables(contacts__count=np.float64(2.0)))
+    assert "integer" in message
+
+
+@pytest.mark.parametrize("law", sorted(LAWS))
+@pytest.mark.parametrize("width", [1e-6, 1e-3, 0.3])
+def test_narrow_laws_have_their_quantities(klein, law, width):
+    """The steady force over that of no width is 1 + width^2/(1 - f_b^2), at first order of it."""
+    config = klein(
+        contacts__threshold={"law": law, "relative_width": width}, contacts__coupling="equal"
+    )
+    derived = derived_quantities(config)
+    assert derived["threshold_acceptance"].value == pytest.approx(1, abs=0.05)
+    if width < 0.1:
+        expected = 0.5 * (1 + 0.1) * 18e-6 * (1 + width**2 / (1 - 0.1**2))
+        assert derived["F_steady"].value == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_a_law_does_not_have():
+    law = ThresholdLaw("gaussian", 0.1)
+    for probability in (2, 0.0, 1.0, math.nan, [0.5, -1]):
+        with pytest.raises(MesoslipError, match="above 0 and below 1"):
+            law.quantile(probability)
+    assert law.quantile(0.5) == pytest.approx(1.0)
+    with pytest.raises(MesoslipError, match=r"'cauchy'.*gaussian"):
+        ThresholdLaw("cauchy", 0.1)
 
 
 def test_tables_on_a_base(tmp_path, monkeypatch):

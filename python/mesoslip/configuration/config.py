@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 from pydantic import StrictStr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -23,16 +23,8 @@ from mesoslip.configuration.files import Change, on_base, override, parse_toml, 
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table
-from mesoslip.configuration.tables import Curve, Drive, Output, Run
+from mesoslip.configuration.tables import Curve, Drive, DriveStage, Output, Run
 from mesoslip.errors import ConfigError
-
-
-class DriveStage(NamedTuple):
-    """A stage of the drive as it is run: its duration [s], and its velocity [m/s] or, for a drive
-    by force, the rate of the force [N/s]."""
-
-    duration: float
-    velocity: float
 
 
 class Config(Table):

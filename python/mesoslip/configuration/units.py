@@ -12,6 +12,7 @@ import math
 import re
 from decimal import Decimal
 from functools import cache
+from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def to_si(value: object, unit: str, example: str) -> float:
     Parameters
     ----------
     value
-        A number, taken to be in ``unit``, or a string with one number and one unit.
+        A number of any library, taken to be in ``unit``, or a string with one number and one unit.
     unit
         The SI unit, such as "N/m".
     example
@@ -74,7 +75,7 @@ def to_si(value: object, unit: str, example: str) -> float:
         If the value is not a finite quantity of the unit's dimension.
     """
     wanted = f"expected a quantity such as {example!r}, or a number in {unit}"
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    if isinstance(value, bool) or not isinstance(value, Real | str):
         raise ValueError(wanted)
     if isinstance(value, str):
         value = _parse(value, unit, wanted)

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
-    StrictInt,
     ValidationError,
     model_serializer,
     model_validator,
@@ -28,6 +27,7 @@ from mesoslip.configuration.table import (
     Rate,
     Stiffness,
     Table,
+    Whole,
     choice,
 )
 
@@ -87,7 +87,7 @@ class LayeredSlider(InertialSlider):
     """An elastic block: layers joined by springs, of which the first bears the contacts."""
 
     kind: Literal["layered"] = "layered"
-    layers: Annotated[StrictInt, Field(ge=1, le=100_000)]
+    layers: Annotated[Whole, Field(ge=1, le=100_000)]
     layer_damping: Annotated[Rate, Field(ge=0)] = 0.0
     base: Base | None = None
     solver: Solver = Solver()

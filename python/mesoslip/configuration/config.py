@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import StrictStr, ValidationError, model_validator
+from pydantic import ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from mesoslip.configuration import checks
@@ -22,7 +22,7 @@ from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Int
 from mesoslip.configuration.files import Change, on_base, override, parse_toml, read_toml
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
-from mesoslip.configuration.table import Complaint, Table
+from mesoslip.configuration.table import Complaint, Table, Text
 from mesoslip.configuration.tables import Curve, Drive, DriveStage, Output, Run
 from mesoslip.errors import ConfigError
 
@@ -30,7 +30,7 @@ from mesoslip.errors import ConfigError
 class Config(Table):
     """A whole configuration."""
 
-    title: StrictStr | None = None
+    title: Text | None = None
     run: Run
     drive: Drive
     slider: Slider

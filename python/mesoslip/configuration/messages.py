@@ -62,7 +62,7 @@ def _problem(details: ErrorDetails, source: str, whole: type[Table]) -> Problem:
     elif kind in {"model_type", "dict_type", "model_attributes_type", "union_tag_not_found"}:
         message = "must be a table"
     else:
-        message = message.replace("Input should", "must").replace("Tuple should", "must")
+        message = message.replace("Input should", "must").replace("a valid tuple", "a list")
     return Problem(source, _dotted(place), message, value)
 
 
@@ -87,7 +87,7 @@ def _about_unknown(place: list[Any], slider: str, whole: type[Table]) -> str:
     keys = _table_at(place[:-1], slider, whole).model_fields.keys()
     near = difflib.get_close_matches(name, [*keys, *([] if table else ["base"])], 1)
     # A good name in the wrong table is nearer than a name that is alike.
-    elsewhere = sorted({key for key in _all_keys(whole) if key.rpartition(".")[2] == name})
+    elsewhere = sorted({key for key in all_keys(whole) if key.rpartition(".")[2] == name})
     meant = " or ".join(repr(key) for key in elsewhere or near)
     return f"unknown key; did you mean {meant}?" if meant else "unknown key"
 
@@ -102,12 +102,12 @@ def _table_at(place: list[Any], slider: str, whole: type[Table]) -> type[Table]:
     return table
 
 
-def _all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
+def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
     """Dotted names of all keys."""
     for name, field in table.model_fields.items():
         yield outer + name
         for inner in _tables_in(field.annotation):
-            yield from _all_keys(inner, f"{outer}{name}.")
+            yield from all_keys(inner, f"{outer}{name}.")
 
 
 def _tables_in(annotation: Any) -> Iterator[type[Table]]:

@@ -7,7 +7,7 @@ from functools import partial
 from numbers import Integral
 from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, StrictInt
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StrictInt, StrictStr
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from mesoslip.configuration.units import to_si
@@ -18,7 +18,7 @@ def _within(value: object, unit: str, example: str, least: float, most: float) -
     number = to_si(value, unit, example)
     if number != 0 and not least <= abs(number) <= most:
         in_unit = "" if unit == "1" else f" {unit}"
-        raise ValueError(f"must be between {least:g} and {most:g}{in_unit} in size, or 0")
+        raise ValueError(f"must be between {least:g} and {most:g}{in_unit} in size")
     return number
 
 
@@ -32,6 +32,17 @@ def _whole(value: object) -> object:
     if isinstance(value, Integral) and not isinstance(value, int):
         return int(value)
     return value
+
+
+def _writable(text: str) -> str:
+    """A text that every file can hold; what the system takes from a command line may be none."""
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueError("is not a text in UTF-8") from error
+    if "\0" in text:
+        raise ValueError("has a character that ends texts")
+    return text
 
 
 # From below an atom's vibration to the age of the Earth.
@@ -49,6 +60,7 @@ Length = Annotated[float, _quantity("m", "3.5 nm", 1e-18, 1e9)]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3", 1e-12, 1e18)]
 Pressure = Annotated[float, _quantity("Pa", "70 GPa", 1e-9, 1e18)]
 Number = Annotated[float, _quantity("1", "0.2", 1e-15, 1e12)]
+Text = Annotated[StrictStr, AfterValidator(_writable)]
 Whole = Annotated[StrictInt, BeforeValidator(_whole)]
 
 

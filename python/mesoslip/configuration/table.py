@@ -59,7 +59,7 @@ Area = Annotated[float, _quantity("m^2", "1e-10 m^2", 1e-24, 1e15)]
 Length = Annotated[float, _quantity("m", "3.5 nm", 1e-18, 1e9)]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3", 1e-12, 1e18)]
 Pressure = Annotated[float, _quantity("Pa", "70 GPa", 1e-9, 1e18)]
-Number = Annotated[float, _quantity("1", "0.2", 1e-15, 1e12)]
+Number = Annotated[float, _quantity("1", "0.2", 1e-300, 1e12)]
 Text = Annotated[StrictStr, AfterValidator(_writable)]
 Whole = Annotated[StrictInt, BeforeValidator(_whole)]
 

@@ -5,11 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+# Characters of the longest value in a message.
+LONGEST = 100
+
 
 class MesoslipError(Exception):
     """Anything that mesoslip itself finds wrong."""
 
     exit_status = 1
+
+    def __str__(self) -> str:
+        # Names of files may be no text, which no terminal could show.
+        return super().__str__().encode("utf-8", "backslashreplace").decode()
 
 
 @dataclass(frozen=True)
@@ -25,7 +32,17 @@ class Problem:
         place = ": ".join(part for part in (self.source, self.key) if part)
         if self.value is None:
             return f"{place}: {self.message}"
-        return f"{place} = {self.value!r}: {self.message}"
+        return f"{place} = {shown(self.value)}: {self.message}"
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it: not all of a long one."""
+    try:
+        text = repr(value)
+    # Python writes no integer of thousands of digits, and no tables in tables without end.
+    except (ValueError, RecursionError):
+        return f"a {type(value).__name__} that is too long to show"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 10]} ... {text[-5:]}"
 
 
 class ConfigError(MesoslipError):

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
+import re
+import subprocess
+import sys
+from datetime import date
 
+import numpy as np
+import pint
 import pytest
 from conftest import ROOT, klein_tables
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from mesoslip import Config, ConfigError, FileError
+from mesoslip import Config, ConfigError, FileError, MesoslipError, ThresholdLaw
+from mesoslip.configuration.files import override
+from mesoslip.configuration.messages import all_keys
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.configuration.units import to_si
+from mesoslip.configuration.threshold_law import LAWS
+from mesoslip.configuration.units import PREFIXES, SI, to_si
 from mesoslip.theory.derived import derived_quantities
 from pydantic import ValidationError
 
@@ -41,6 +52,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("slider__mass", None, ["slider.mass", "missing"]),
         ("slider__stiffness", 0, ["slider.stiffness", "greater than 0"]),
         ("slider__damping_ratio", -0.1, ["slider.damping_ratio", "greater than or equal to 0"]),
+        ("slider__damping_ratio", 1e100, ["slider.damping_ratio", "between 1e-300 and 1e+12 in"]),
         ("slider__damping", 5.0, ["slider.damping", "not both"]),
         ("slider__stifness", 97, ["slider.stifness", "unknown key", "'stiffness'"]),
         ("slider__layers", 16, ["slider.layers", 'for slider.kind = "layered" only']),
@@ -111,6 +123,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("contacts__ageing", {}, ["contacts.ageing", "not available in this version"]),
         ("contacts__threshold__law", "cauchy", ["contacts.threshold.law", "gaussian"]),
         ("contacts__threshold__relative_width", 0, ["relative_width", "greater than 0"]),
+        ("contacts__threshold__relative_width", 1e-8, ["relative_width", "at least 1e-06"]),
         ("interaction", {"strength": 0.3, "columns": 60}, ["interaction.rows", "missing"]),
         ("interaction", LATTICE | {"rows": 67}, ["interaction.rows", "even", "67"]),
         ("interaction", LATTICE | {"rows": 1}, ["interaction.rows", "greater than or equal to 2"]),
@@ -137,7 +150,13 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("output__interval", "20 s", ["output.interval", "duration"]),
         ("output__interval", 1e-12, ["output.interval", "GiB"]),
         ("output__slip_interval", 0.1, ["output.slip_interval", "interval"]),
+        ("title", "a\0b", ["title", "character"]),
+        ("title", "\udcff", ["title", "UTF-8"]),
+        ("output__snapshots", 5, ["output.snapshots", "must be a list"]),
         ("outputs", {}, ["outputs", "unknown key", "'output'"]),
+        ("delay", "2 ms", ["delay: unknown key; did you mean 'contacts.delay'?"]),
+        ("run__delay", "2 ms", ["run.delay: unknown key; did you mean 'contacts.delay'?"]),
+        ("contacts__rigid", 1, ["contacts.rigid: unknown key"]),
     ],
 )
 def test_what_is_wrong_is_told(key, value, words):
@@ -177,8 +196,12 @@ def test_what_is_wrong_is_told(key, value, words):
             ["run.drive_displacement", "drive.velocity", "not 0"],
         ),
         (
-            {"run": {"drive_displacement": 1e10}, "drive__velocity": 1e-300},
-            ["run.drive_displacement", "takes for ever at 1e-300 m/s"],
+            {"interaction": LATTICE, "output__snapshot_size": 1},
+            ["output.snapshot_size = 1", "may need", "GiB"],
+        ),
+        (
+            {"output__slip_interval": "1 ns"},
+            ["output.slip_interval = 1e-09", "may need", "GiB"],
         ),
         (
             {"run": {"avalanches": 5}, "interaction": LATTICE, "drive__velocity": 0.0},
@@ -232,6 +255,27 @@ def test_lengths_of_a_run():
     assert (both.duration, both.run.avalanches) == (12, 5)
 
 
+@pytest.mark.parametrize(
+    ("way", "duration"), [(1e-6, 1.0), (3e-6, 4.0), (4.5e-6, 5.25), (8e-6, 7.0), (10e-6, 8.0)]
+)
+def test_a_way_of_stages(klein, way, duration):
+    """There, a hold, back, and on after the end of the last stage."""
+    stages = [(2.0, 1e-6), (1.0, 0.0), (2.0, -1e-6), (2.0, 2e-6)]
+    drive = {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
+    config = klein(run={"drive_displacement": way}, drive=drive)
+    assert config.duration == pytest.approx(duration)
+    travelled = [abs(stage.velocity) * stage.duration for stage in config.drive_stages]
+    assert math.fsum(travelled) == pytest.approx(way)
+
+
+def test_a_way_that_stages_do_not_go():
+    stages = [{"duration": 2.0, "velocity": 1e-6}, {"duration": 2.0, "velocity": 0.0}]
+    tables = klein_tables(run={"drive_displacement": 3e-6}, drive={"stage": stages})
+    (message,) = problems(tables)
+    assert "run.drive_displacement = 3e-06: is never reached" in message
+    assert "by 2e-06 m, and the last one stands still" in message
+
+
 @pytest.mark.parametrize(("law", "width"), [("uniform", 0.6), ("exponential", 1.01)])
 def test_thresholds_are_not_negative(law, width):
     (message,) = problems(klein_tables(contacts__threshold={"law": law, "relative_width": width}))
@@ -266,6 +310,92 @@ def test_everything_wrong_is_told_at_once():
 def test_units_are_converted(value):
     assert to_si(f"{value!r} uN", "N", "18 uN") == pytest.approx(value * 1e-6, rel=1e-12)
     assert to_si(value, "N", "18 uN") == value
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("0,5 ms", "s"),
+        ("1,47 g", "kg"),
+        ("\u22125 s", "s"),
+        ("\u0661 s", "s"),
+        ("1 ± 0.1 s", "s"),
+        ("1.2.3 s", "s"),
+        ("5 5 ms", "s"),
+        ("18..5 uN", "N"),
+        ("[1,2] g", "kg"),
+        ("g", "kg"),
+        ("1_000 g", "kg"),
+        ("9**9**9 s", "s"),
+        ("1 s**9**9", "s"),
+        ("1 s^99", "s"),
+        ("51/s", "1/s"),
+        ("1 s*", "s"),
+        ("1 (s)", "s"),
+        ("3 dB", "1"),
+        ("1 " + "m " * 10_000, "m"),
+    ],
+)
+def test_a_quantity_is_one_number_and_one_unit(text, unit):
+    with pytest.raises(ValueError, match="expected a quantity such as"):
+        to_si(text, unit, "5 ms")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("18 uN", "N", 18e-6),
+        ("1ms", "s", 1e-3),
+        ("-.5e1 m", "m", -5.0),
+        ("51.4 1/s", "1/s", 51.4),
+        ("51.4 Hz", "1/s", 51.4),
+        ("51.4 s-1", "1/s", 51.4),
+        ("956 kg/m^3", "kg/m^3", 956.0),
+        ("956 kg m**-3", "kg/m^3", 956.0),
+        ("0.956 g·cm⁻³", "kg/m^3", 956.0),
+        ("2 J/m/m", "N/m", 2.0),
+        ("20 %", "1", 0.2),
+        ("2 minute", "s", 120.0),
+        ("1 lbf", "N", pytest.approx(4.4482216152605)),
+        ("1e-99999999999 s", "s", 0.0),
+    ],
+)
+def test_units_that_are_known(text, unit, value):
+    assert to_si(text, unit, "5 ms") == value
+
+
+def test_units_mean_what_they_mean_to_pint():
+    """All our prefixes before all our units."""
+    registry = pint.UnitRegistry(cache_folder=None)
+    for unit in SI:
+        for prefix in PREFIXES:
+            theirs = registry.Quantity(1.0, prefix + unit).to_base_units()
+            ours = to_si(f"1 {prefix}{unit}", f"{theirs.units:~C}", "1")
+            assert ours == pytest.approx(theirs.magnitude, rel=1e-14, abs=0)
+
+
+@given(st.text(st.sampled_from("abdehimnostuNPµ%_°"), min_size=1, max_size=6))
+def test_no_name_of_a_unit_breaks_the_library(name):
+    with contextlib.suppress(ValueError):
+        to_si(f"1 {name}", "s", "5 ms")
+
+
+def test_units_need_no_files(tmp_path):
+    """A home folder that cannot be written to, and units that only pint knows."""
+    environment = {**os.environ, "HOME": "/proc/none", "XDG_CACHE_HOME": "/proc/none"}
+    code = (
+        "import sys; from mesoslip.configuration.units import to_si; to_si('97 N/m', 'N/m', '');"
+        "assert 'pint' not in sys.modules; print(to_si('1 minute', 's', ''))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert answer.stdout == "60.0\n"
 
 
 @given(st.text(max_size=12))
@@ -321,6 +451,10 @@ def test_overrides():
     assert config.run.seed == 5
     assert config.contacts.reattach is False
     assert config.title == "another"
+    with pytest.raises(ConfigError, match=r"did you mean 'contacts\.delay'"):
+        Config.load(path, ["delay=1ms"])
+    with pytest.raises(ConfigError, match=r"base: names the file under another one"):
+        Config.load(path, ["base=klein.toml"])
     with pytest.raises(ConfigError, match="did you mean 'delay'"):
         Config.load(path, ["contacts.delays=1ms"])
     with pytest.raises(ConfigError, match="must look like"):
@@ -342,6 +476,39 @@ def test_a_base_is_laid_under(tmp_path):
     assert config.drive_stages == ((3, 1e-6), (7, 0))
     (tmp_path / "block.toml").write_text('base = "base.toml"\n[slider]\nkind = "prescribed"\n')
     assert Config.load(tmp_path / "block.toml").slider.kind == "prescribed"
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        (["kind=quasistatic"], {"kind": "quasistatic", "stiffness": 97.0}),
+        (["kind=prescribed"], {"kind": "prescribed"}),
+        (["layers=3", "kind=layered"], {"mass": 1.47e-3, "stiffness": 97.0, "layers": 3}),
+        (["kind=layered", "layers=3", "mass=2 g"], {"mass": 2e-3, "layers": 3}),
+    ],
+)
+def test_another_kind_keeps_what_it_has_too(changes, expected, tmp_path):
+    """Klein's damping is unknown to all other kinds of sliders."""
+    path = ROOT / "runs" / "klein.toml"
+    changed = Config.load(path, [f"slider.{change}" for change in changes])
+    assert changed.to_dict()["slider"].items() >= expected.items()
+    lines = "\n".join(re.sub("=([a-z]+|2 g)$", r'="\1"', change) for change in changes)
+    (tmp_path / "over.toml").write_text(f'base = "{path}"\n[slider]\n{lines}\n')
+    assert Config.load(tmp_path / "over.toml") == changed
+
+
+def test_another_kind_refuses_what_was_set_beside_it():
+    path = ROOT / "runs" / "klein.toml"
+    for changes in (["kind=quasistatic", "mass=1 g"], ["mass=1 g", "kind=quasistatic"]):
+        with pytest.raises(ConfigError, match=r'slider\.mass.*"rigid" or "layered" only'):
+            Config.load(path, [f"slider.{change}" for change in changes])
+
+
+def test_another_kind_hides_no_mistake_of_the_base(tmp_path):
+    text = (ROOT / "runs" / "klein.toml").read_text().replace("damping_ratio", "damping_ratios")
+    (tmp_path / "base.toml").write_text(text)
+    with pytest.raises(ConfigError, match=r"slider\.damping_ratios: unknown key"):
+        Config.load(tmp_path / "base.toml", ["slider.kind=quasistatic"])
 
 
 def test_a_base_need_not_name_the_default_kind(tmp_path):
@@ -367,6 +534,259 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "b.toml").write_text('base = "a.toml"')
     with pytest.raises(ConfigError, match="based on each other"):
         Config.load(tmp_path / "a.toml")
+
+
+def test_a_configuration_with_changes(klein):
+    config = klein()
+    for changed in (
+        config.replace("contacts.delay=1ms", "run.seed=5"),
+        config.replace({"contacts.delay": "1 ms", "run": {"seed": 5}}),
+        config.replace(contacts={"delay": 1e-3}, run={"seed": 5}),
+        config.replace("contacts.delay=3ms", {"contacts.delay": 1e-3}, run={"seed": 5}),
+    ):
+        assert changed == klein(contacts__delay=1e-3, run__seed=5)
+    assert config == klein()
+    assert config.replace() == config
+    assert config.replace("slider.damping=3 1/s").slider.damping_rate == 3.0
+    assert config.replace("slider.kind=quasistatic").spring_stiffness == 97.0
+    by_stages = config.replace(drive={"stage": [{"duration": 1.0, "velocity": 1e-6}]})
+    assert by_stages.drive.velocity is None
+    for change in ("contacts.delay=-1ms", "contacts.delays=1ms", "output.interval=20 s", "delay"):
+        with pytest.raises(ConfigError):
+            config.replace(change)
+
+
+def test_no_copy_is_unchecked(klein):
+    """Neither a table nor the whole; pydantic's own copy checks nothing."""
+    config = klein()
+    with pytest.raises(ValidationError, match="greater than or equal to 0"):
+        config.contacts.model_copy(update={"delay": -1e-3})
+    with pytest.raises(ConfigError, match=r"output\.interval"):
+        config.model_copy(update={"output": config.output.model_copy(update={"interval": 20.0})})
+    with pytest.raises(ConfigError, match=r"contacts\.delay"):
+        config.model_copy(update={"contacts": config.to_dict()["contacts"] | {"delay": -1}})
+    slower = config.contacts.model_copy(update={"delay": "1 ms"})
+    assert config.model_copy(update={"contacts": slower}) == klein(contacts__delay=1e-3)
+    assert config.model_copy() == config.model_copy(deep=True) == config
+
+
+def test_a_cantilever_that_changes_takes_mass_and_stiffness_along(klein):
+    rod = {"length": 0.05, "radius": 1e-3, "density": 7800.0, "young_modulus": "200 GPa"}
+    slider = {"kind": "layered", "layers": 8, "cantilever": rod}
+    longer = klein(slider=slider).replace("slider.cantilever.length=10 cm").slider
+    assert longer == klein(slider=slider | {"cantilever": rod | {"length": 0.1}}).slider
+    heavier = klein(slider=slider | {"mass": 1.0}).replace("slider.cantilever.length=10 cm").slider
+    assert heavier.mass == 1.0
+
+
+def test_notebooks_show_a_short_table(klein):
+    shown = klein(
+        title="<b>", drive={"stage": 9 * [{"duration": 1.0, "velocity": 1e-6}]}
+    )._repr_html_()
+    assert "&lt;b&gt;" in shown
+    assert "delay = 0.0005" in shown
+    assert "(9 in all)" in shown
+    assert shown.count("<tr>") == 6
+    assert len(shown) < 2000
+
+
+def links_in_a_loop(path):
+    path.symlink_to(path)
+
+
+def much_too_long(path):
+    path.touch()
+    os.truncate(path, 2**27)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (os.mkfifo, "not a regular file"),
+        (lambda path: path.symlink_to("/dev/zero"), "not a regular file"),
+        (links_in_a_loop, "Too many levels"),
+        (much_too_long, "128 MiB are too much"),
+        (lambda path: path.write_bytes(b"title = '\xff'"), "not a text in UTF-8"),
+        (lambda path: path.write_text('base = "a\\u0000b"'), "name of a file"),
+        (lambda path: path.write_text('base = ""'), "name of a file"),
+        (lambda path: path.write_text("base = 5"), "name of a file"),
+        (lambda path: path.write_text('base = "' + 300 * "a" + '"'), "name too long"),
+        (lambda path: path.write_text('base = "case.toml"'), "based on each other"),
+        (lambda path: path.write_text("a = " + 2000 * "["), "nested too deeply"),
+        (lambda path: path.write_text("a = " + 5000 * "9"), "not valid TOML"),
+    ],
+)
+@pytest.mark.parametrize("as_base", [False, True])
+def test_no_file_breaks_the_reader(make, words, as_base, tmp_path):
+    """Devices and pipes without end, loops, and what no parser can hold."""
+    path = tmp_path / "case.toml"
+    make(path)
+    if as_base:
+        path = tmp_path / "over.toml"
+        path.write_text('base = "case.toml"')
+    with pytest.raises(MesoslipError, match=words) as caught:
+        Config.load(path)
+    assert caught.value.exit_status == 2
+    assert "\n" not in str(caught.value)
+
+
+def test_names_that_are_no_text(tmp_path):
+    with pytest.raises(FileError, match=r"\\udcff\.toml: no such file") as caught:
+        Config.load(tmp_path / os.fsdecode(b"\xff.toml"))
+    str(caught.value).encode()
+    with pytest.raises(FileError, match="not the name of a file"):
+        Config.load(tmp_path / "a\0b.toml")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [10**400, 10**5000, "1" * 400 + " kg"],
+    ids=["more than doubles", "more than Python writes", "text"],
+)
+def test_numbers_of_many_digits(value):
+    (message,) = problems(klein_tables(slider__mass=value))
+    assert message.startswith("case.toml: slider.mass = ")
+    assert len(message) < 300
+    (message,) = problems(klein_tables(contacts__count=value))
+    assert message.startswith("case.toml: contacts.count = ")
+    assert len(message) < 300
+
+
+def test_memory_of_slips_and_snapshots_that_fit(klein):
+    """As much as a run without trouble has: a slip in two seconds, avalanches through it all."""
+    klein(run__duration=1e4, output__slip_interval="10 us")
+    klein(interaction=LATTICE, output__snapshot_size=1000)
+    klein(slider={"kind": "prescribed"}, output__slip_interval="1 ns")
+    klein(interaction=LATTICE, contacts__reattach=False, output__snapshot_size=2)
+
+
+BOUNDED = [
+    ("run__duration", "s"),
+    ("drive__velocity", "m/s"),
+    ("slider__mass", "kg"),
+    ("slider__stiffness", "N/m"),
+    ("contacts__static_force", "N"),
+    ("contacts__stiffness", "N/m"),
+    ("contacts__area", "m^2"),
+    ("contacts__film_thickness", "m"),
+    ("contacts__film_density", "kg/m^3"),
+    ("contacts__drag_rate", "1/s"),
+    ("contacts__delay", "s"),
+]
+
+
+@pytest.mark.parametrize(("key", "unit"), BOUNDED)
+@pytest.mark.parametrize("value", [5e-324, 1e-100, 1e100, 1e300])
+def test_quantities_are_of_a_size_that_means_something(key, unit, value):
+    (message,) = problems(klein_tables(**{key: value}))
+    assert message.startswith(f"case.toml: {key.replace('__', '.')} = {value}: must be between")
+    assert f"{unit} in size" in message
+
+
+@given(st.lists(st.sampled_from(BOUNDED), unique=True), st.data())
+@settings(deadline=None)
+def test_nothing_overflows_within_the_bounds(keys, data):
+    """Klein's case with keys anywhere in their ranges is refused, or has finite quantities."""
+    exponents = {key: data.draw(st.integers(-28, 25)) for key, _ in keys}
+    exponents["slider__mass"] = data.draw(st.integers(-28, 25))
+    tables = klein_tables(**{key: 10.0**exponent for key, exponent in exponents.items()})
+    tables["contacts"]["threshold"]["law"] = data.draw(st.sampled_from(sorted(LAWS)))
+    tables["contacts"]["threshold"]["relative_width"] = 10.0 ** data.draw(st.integers(-16, 2))
+    tables["slider"] |= data.draw(st.sampled_from([{}, {"kind": "layered", "layers": 3}]))
+    if "kind" in tables["slider"]:
+        del tables["slider"]["damping_ratio"]
+    try:
+        config = Config.from_dict(tables)
+    except ConfigError:
+        return
+    derived = derived_quantities(config)
+    assert {"contact_stiffness", "omega_s", "mean_life", "F_steady"} <= derived.keys()
+    for name, value in config.slider.kernel_parameters(config).items():
+        assert math.isfinite(value), name
+    for name, value in config.contact_kind.kernel_parameters(config).items():
+        assert math.isfinite(value), name
+
+
+ANYTHING = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=6)
+    | st.sampled_from([10**400, "5 ms", "kind", b"a", date(2026, 1, 1), np.int64(3)]),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["kind", "mass", "duration", "velocity", "law", "base", "x"]), inner
+        )
+    ),
+    max_leaves=5,
+)
+
+
+@given(st.sampled_from(sorted(all_keys(Config))), ANYTHING, st.sampled_from([{}, LAYERED]))
+@settings(deadline=None, max_examples=300)
+def test_nothing_breaks_the_checks(key, value, slider):
+    """Anything at any key is taken, or refused in words."""
+    changes = {"slider": slider} if slider else {}
+    for config in (
+        lambda: Config.from_dict(klein_tables(**changes)).replace({key: value}),
+        lambda: Config.from_dict(override(klein_tables(**changes), [{key: value}])),
+    ):
+        with contextlib.suppress(ConfigError):
+            checked = config()
+            assert Config.from_toml(checked.to_toml()) == checked
+            checked._repr_html_()
+
+
+def test_numbers_of_numpy(klein):
+    config = klein(
+        run__seed=np.int64(5),
+        contacts__count=np.uint16(4080),
+        contacts__delay=np.float32(0.5),
+        slider__layers=np.int8(3),
+        slider__kind="layered",
+        slider__damping_ratio=None,
+    )
+    assert (config.run.seed, config.contacts.count, config.contacts.delay) == (5, 4080, 0.5)
+    assert all(type(value) is int for value in (config.run.seed, config.slider.layers))
+    assert Config.from_toml(config.to_toml()) == config
+    (message,) = problems(klein_tables(contacts__count=np.float64(2.0)))
+    assert "integer" in message
+
+
+@pytest.mark.parametrize("law", sorted(LAWS))
+@pytest.mark.parametrize("width", [1e-6, 1e-3, 0.3])
+def test_narrow_laws_have_their_quantities(klein, law, width):
+    """The steady force over that of no width is 1 + width^2/(1 - f_b^2), at first order of it."""
+    config = klein(
+        contacts__threshold={"law": law, "relative_width": width}, contacts__coupling="equal"
+    )
+    derived = derived_quantities(config)
+    assert derived["threshold_acceptance"].value == pytest.approx(1, abs=0.05)
+    if width < 0.1:
+        expected = 0.5 * (1 + 0.1) * 18e-6 * (1 + width**2 / (1 - 0.1**2))
+        assert derived["F_steady"].value == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_a_law_does_not_have():
+    law = ThresholdLaw("gaussian", 0.1)
+    for probability in (2, 0.0, 1.0, math.nan, [0.5, -1]):
+        with pytest.raises(MesoslipError, match="above 0 and below 1"):
+            law.quantile(probability)
+    assert law.quantile(0.5) == pytest.approx(1.0)
+    with pytest.raises(MesoslipError, match=r"'cauchy'.*gaussian"):
+        ThresholdLaw("cauchy", 0.1)
+
+
+def test_tables_on_a_base(tmp_path, monkeypatch):
+    """Nested tables are laid over a file of the current folder, as a file over one of its own."""
+    (tmp_path / "klein.toml").write_text((ROOT / "runs" / "klein.toml").read_text())
+    monkeypatch.chdir(tmp_path)
+    config = Config.from_dict({"base": "klein.toml", "contacts": {"delay": "2 ms"}})
+    assert config == Config.load("klein.toml", ["contacts.delay=2 ms"])
+    with pytest.raises(FileError, match=r"klain\.toml: no such file"):
+        Config.from_dict({"base": "klain.toml"})
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,17 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from mesoslip.configuration.sliders import SLIDERS, base
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Curve, Run
+from mesoslip.configuration.tables import Curve, DriveStage, Run
 
 # What a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
 # snapshot [bytes].
 BYTES_PER_SAMPLE = 3 * 7 * 8
+BYTES_PER_SAMPLE_OF_SLIP = 3 * 10 * 8
 BYTES_PER_LAYER = 2 * 8
 BYTES_PER_AVALANCHE = 3 * 10 * 8
 BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
@@ -33,6 +34,8 @@ class Setting(base.Setting, Protocol):
     @property
     def duration(self) -> float: ...
     @property
+    def drive_stages(self) -> Sequence[DriveStage]: ...
+    @property
     def output_interval(self) -> float: ...
     @property
     def has_avalanches(self) -> bool: ...
@@ -45,23 +48,24 @@ def drive_problems(config: Setting) -> Complaints:
         named = _named(kind for kind, table in SLIDERS.items() if table.driven_by_force)
         yield Complaint("drive.force_rate", f"is for {named} only", drive.force_rate)
     if run.drive_displacement is not None:
-        if not drive.velocity:
+        way = run.drive_displacement
+        if run.duration is not None:
+            yield Complaint("run.drive_displacement", "give either this or run.duration", way)
+        elif drive.stage is None and not drive.velocity:
             yield Complaint(
                 "run.drive_displacement",
-                "needs a drive.velocity that is not 0",
-                run.drive_displacement,
-            )
-        elif run.duration is not None:
-            yield Complaint(
-                "run.drive_displacement",
-                "give either this or run.duration",
-                run.drive_displacement,
+                "needs a drive.velocity that is not 0, or stages that move",
+                way,
             )
         elif math.isinf(config.duration):
+            reach = math.fsum(abs(one.velocity) * one.duration for one in drive.stage or ())
             yield Complaint(
                 "run.drive_displacement",
-                f"takes for ever at {drive.velocity:g} m/s",
-                run.drive_displacement,
+                f"is never reached: the stages move the drive by {reach:g} m, and the last one "
+                "stands still"
+                if drive.stage is not None
+                else f"takes for ever at {drive.velocity:g} m/s",
+                way,
             )
     if run.avalanches is not None:
         if not config.has_avalanches:
@@ -140,6 +144,9 @@ def memory_problems(config: Setting) -> Complaints:
     together = min(run.realizations, os.cpu_count() or 1)
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
+    finer = 0.0 if output.slip_interval is None else _time_in_slips(config) / output.slip_interval
+    lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
+    after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
     for key, needed, value in (
         (
             "contacts.count",
@@ -149,25 +156,52 @@ def memory_problems(config: Setting) -> Complaints:
         ("run.avalanches", BYTES_PER_AVALANCHE * in_catalogue * run.realizations, run.avalanches),
         (
             "output.snapshots",
-            BYTES_PER_CONTACT_IN_SNAPSHOT
-            * contacts.count
-            * len(output.snapshots)
-            * run.realizations,
+            lattices * len(output.snapshots),
             f"{len(output.snapshots)} times",
+        ),
+        (
+            "output.snapshot_size",
+            lattices * min(after, run.avalanches or math.inf),
+            output.snapshot_size,
         ),
         (
             "output.interval",
             per_sample * config.expected_duration / config.output_interval * run.realizations,
             config.output_interval,
         ),
+        (
+            "output.slip_interval",
+            BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations,
+            output.slip_interval,
+        ),
     ):
         if needed > memory:
             yield Complaint(
                 key,
-                f"the run needs {needed / 2**30:.3g} GiB for this, and the machine has "
+                f"the run may need {needed / 2**30:.3g} GiB for this, and the machine has "
                 f"{memory / 2**30:.3g} GiB",
                 value,
             )
+
+
+def _time_in_slips(config: Setting) -> float:
+    """About how long slips take together, if each lasts two periods, after the spring's loading to
+    the static force [s]."""
+    slider = config.slider
+    if config.drive_speed == 0 or slider.slip_velocity(config) == 0:
+        return 0.0
+    loading = config.contacts.static_force / slider.spring_stiffness / config.drive_speed
+    return config.expected_duration * min(1.0, 4 * slider.quiet_time / loading)
+
+
+def _breaks(config: Setting) -> float:
+    """About how many contacts break: one after each mean breaking stretch, and under a force that
+    grows each of them about once, before the slider slides without end."""
+    contacts = config.contacts
+    if not contacts.reattach or config.drive.force_rate is not None:
+        return contacts.count
+    way = math.fsum(abs(stage.velocity) * stage.duration for stage in config.drive_stages)
+    return contacts.count * way / contacts.break_stretch
 
 
 def _named_jumping() -> str:

@@ -5,43 +5,32 @@ Everything that is wrong with a configuration is reported at once.
 
 from __future__ import annotations
 
-import difflib
+import html
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Self, get_args
+from typing import Any, Self
 
-from pydantic import StrictStr, ValidationError, model_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic import ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 from mesoslip.configuration import checks
 from mesoslip.configuration.contacts import contact_kind
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
-from mesoslip.configuration.files import override, parse_toml, read_toml
-from mesoslip.configuration.sliders import SLIDERS, Slider
-from mesoslip.configuration.table import Complaint, Table
-from mesoslip.configuration.tables import Curve, Drive, Output, Run
-from mesoslip.errors import ConfigError, Problem
-
-# Tables and keys that the format knows and this version does not.
-NOT_YET_KEYS = {"contacts": ("ageing",)}
-
-
-class DriveStage(NamedTuple):
-    """A stage of the drive as it is run: its duration [s], and its velocity [m/s] or, for a drive
-    by force, the rate of the force [N/s]."""
-
-    duration: float
-    velocity: float
+from mesoslip.configuration.files import Change, on_base, override, parse_toml, read_toml
+from mesoslip.configuration.messages import problems
+from mesoslip.configuration.sliders import Slider
+from mesoslip.configuration.table import Complaint, Table, Text
+from mesoslip.configuration.tables import Curve, Drive, DriveStage, Output, Run
+from mesoslip.errors import ConfigError
 
 
 class Config(Table):
     """A whole configuration."""
 
-    title: StrictStr | None = None
+    title: Text | None = None
     run: Run
     drive: Drive
     slider: Slider
@@ -75,7 +64,7 @@ class Config(Table):
         # Without a drive there is no length of the run, to which what is recorded is compared.
         return complaints or [*checks.output_problems(self)] or [*checks.memory_problems(self)]
 
-    @cached_property
+    @property
     def contact_kind(self) -> ContactKind:
         """The kind of contacts."""
         return contact_kind(self.run, self.interaction)
@@ -95,11 +84,24 @@ class Config(Table):
         """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
             return self.run.duration
-        if self.run.drive_displacement is not None and self.drive.velocity:
-            return self.run.drive_displacement / abs(self.drive.velocity)
+        if self.run.drive_displacement is not None:
+            return self._time_for(self.run.drive_displacement)
         if self.drive.stage is not None:
             return math.fsum(stage.duration for stage in self.drive.stage)
         return math.inf
+
+    def _time_for(self, way: float) -> float:
+        """Time in which the drive goes a way, there and back both counted [s]."""
+        time = speed = 0.0
+        for stage in self.drive.stage or ():
+            speed = abs(stage.velocity)
+            if speed * stage.duration >= way:
+                return time + way / speed
+            time += stage.duration
+            way -= speed * stage.duration
+        # The last stage lasts as long as the run.
+        speed = speed if self.drive.stage else abs(self.drive.velocity or 0.0)
+        return time + way / speed if speed > 0 else math.inf
 
     @property
     def expected_duration(self) -> float:
@@ -163,7 +165,7 @@ class Config(Table):
         return self.output.interval or self.expected_duration / 10000
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Config:
+    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Config:
         """Read a TOML file and what it is based on, lay overrides over it, and check it.
 
         Parameters
@@ -181,11 +183,54 @@ class Config(Table):
             If anything in it is wrong.
         """
         path = Path(path)
-        return cls.from_dict(override(read_toml(path, ()), overrides), source=str(path))
+        return cls._checked(override(read_toml(path), overrides), str(path))
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
-        """Check a configuration given as nested tables.
+        """Check a configuration given as nested tables; their ``base`` may name a file under them.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        ConfigError
+            If anything in it is wrong.
+        """
+        return cls._checked(on_base(tables, source, Path()), source)
+
+    @classmethod
+    def from_toml(
+        cls, text: str, source: str = "configuration", overrides: Iterable[Change] = ()
+    ) -> Config:
+        """Check a configuration given as the text of a TOML file, with changes laid over it."""
+        return cls._checked(override(parse_toml(text, source), overrides), source)
+
+    @classmethod
+    def _checked(cls, tables: Mapping[str, Any], source: str) -> Config:
+        try:
+            return cls.model_validate(tables)
+        except ValidationError as error:
+            raise ConfigError(problems(error, source, cls)) from None
+
+    def replace(self, *changes: Change, **tables: Any) -> Config:
+        """A configuration with changes, checked like any other.
+
+        Parameters
+        ----------
+        changes
+            Texts such as "contacts.delay=1ms", or tables such as {"contacts.delay": 1e-3}.
+        tables
+            Keys of tables, such as ``contacts={"delay": "1 ms"}``; what is not named stays.
+
+        Raises
+        ------
+        ConfigError
+            If anything in it is wrong.
+        """
+        return self._checked(override(self.to_dict(), (*changes, tables)), "configuration")
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy; with other tables, if they can be run.
 
         Raises
         ------
@@ -193,16 +238,18 @@ class Config(Table):
             If anything in it is wrong.
         """
         try:
-            return cls.model_validate(tables)
+            return super().model_copy(update=update, deep=deep)
         except ValidationError as error:
-            raise ConfigError(_problems(error, source)) from None
+            raise ConfigError(problems(error, "configuration", type(self))) from None
 
-    @classmethod
-    def from_toml(
-        cls, text: str, source: str = "configuration", overrides: Iterable[str] = ()
-    ) -> Config:
-        """Check a configuration given as the text of a TOML file, with changes laid over it."""
-        return cls.from_dict(override(parse_toml(text, source), overrides), source)
+    def _repr_html_(self) -> str:
+        """A short table of what is set, for notebooks."""
+        rows = "".join(
+            f"<tr><th>{html.escape(name)}</th>"
+            f"<td style='text-align: left'>{html.escape(_summary(table))}</td></tr>"
+            for name, table in self.model_dump(exclude_none=True, exclude_unset=True).items()
+        )
+        return f"<table><caption>mesoslip configuration, in SI units</caption>{rows}</table>"
 
     def to_dict(self) -> dict[str, Any]:
         """The configuration as nested tables with plain SI numbers."""
@@ -215,74 +262,12 @@ class Config(Table):
         return tomli_w.dumps(self.to_dict())
 
 
-def _problems(error: ValidationError, source: str) -> list[Problem]:
-    """Everything that pydantic found, in our words."""
-    problems = []
-    for details in error.errors():
-        if details["type"] == "tables":
-            problems += [Problem(source, *one) for one in details["ctx"]["complaints"]]
-        else:
-            problems.append(_problem_of(details, source))
-    return problems
-
-
-def _problem_of(details: ErrorDetails, source: str) -> Problem:
-    place = list(details["loc"])
-    if place[0] == "slider" and len(place) > 1 and place[1] in SLIDERS:
-        del place[1]
-    context = details.get("ctx", {})
-    kind, value, message = details["type"], details["input"], details["msg"]
-    table, name = _dotted(place[:-1]), str(place[-1]) if place else ""
-    if kind == "table":
-        return Problem(source, _dotted([*place, context["key"]]), context["message"])
-    if kind == "missing":
-        return Problem(source, _dotted(place), "missing; it has no default")
-    if kind == "extra_forbidden":
-        if name in NOT_YET_KEYS.get(table, ()):
-            return Problem(source, _dotted(place), "not available in this version")
-        kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
-        if table == "slider" and kinds:
-            named = " or ".join(f'"{kind}"' for kind in kinds)
-            return Problem(source, _dotted(place), f"is for slider.kind = {named} only")
-        near = difflib.get_close_matches(name, _known_keys(place[:-1], details), 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        return Problem(source, _dotted(place), f"unknown key{hint}")
-    if kind in {"union_tag_invalid", "literal_error"}:
-        if kind == "union_tag_invalid":
-            place, value = [*place, "kind"], context["tag"]
-            expected = context["expected_tags"]
-        else:
-            expected = context["expected"]
-        message = f"must be {expected}"
-    elif kind == "value_error":
-        message = str(context["error"])
-    elif kind in {"model_type", "dict_type", "model_attributes_type", "union_tag_not_found"}:
-        message = "must be a table"
-    else:
-        message = message.replace("Input should", "must").replace("Tuple should", "must")
-    return Problem(source, _dotted(place), message, value)
-
-
-def _dotted(place: Iterable[Any]) -> str:
-    text = ""
-    for part in place:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}"
-    return text.lstrip(".")
-
-
-def _known_keys(place: list[Any], details: ErrorDetails) -> list[str]:
-    """Keys of the table at a place of the file."""
-    model: type[Table] = Config
-    for name in place:
-        if isinstance(name, str):
-            inner = list(_tables_in(model.model_fields[name].annotation))
-            model = SLIDERS[str(details["loc"][1])] if name == "slider" else inner[0]
-    return [*model.model_fields, *(["base"] if model is Config else [])]
-
-
-def _tables_in(annotation: Any) -> Iterator[type[Table]]:
-    """The tables that an annotation names."""
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _tables_in(part)
+def _summary(table: object) -> str:
+    """A table, or a list of them, on a line."""
+    if isinstance(table, dict):
+        inner = (f"{key} = {_summary(value)}" for key, value in table.items())
+        return ", ".join(inner)
+    if isinstance(table, list | tuple):
+        shown = [f"({_summary(one)})" for one in table[:4]]
+        return ", ".join(shown) + (f", ... ({len(table)} in all)" if len(table) > 4 else "")
+    return f"{table:g}" if isinstance(table, float) else str(table)

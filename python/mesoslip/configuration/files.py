@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+import stat
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from mesoslip.configuration.sliders import DEFAULT, SLIDERS
 from mesoslip.errors import ConfigError, FileError, Problem
 
 # Keys that exclude each other: laid over a base, one replaces the other.
@@ -17,46 +19,121 @@ EXCLUSIVE = {
     "slider": ("damping", "damping_ratio"),
 }
 
+# Size of the longest file that is read [bytes]; a million stages take less.
+LONGEST_FILE = 2**26
 
-def read_toml(path: Path, outer: tuple[Path, ...]) -> dict[str, Any]:
-    """Tables of a file, laid over those of its base."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise FileError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise FileError(f"{path}: is a directory, not a configuration file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read: {error}") from None
-    tables = parse_toml(text, str(path))
+Change = str | Mapping[str, Any]
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Tables of a file, laid over those of its base.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If it is not valid TOML, or files are based on each other.
+    """
+    return _read(path, ())
+
+
+def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> dict[str, Any]:
+    """Tables laid over those of the file that their key ``base`` names, relative to a folder.
+
+    Raises
+    ------
+    FileError, ConfigError
+        See `read_toml`.
+    """
+    return _on_base(dict(tables), source, folder, ())
+
+
+def _read(path: Path, outer: tuple[Path, ...]) -> dict[str, Any]:
+    return _on_base(parse_toml(_text(path), str(path)), str(path), path.parent, (*outer, path))
+
+
+def _on_base(
+    tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]
+) -> dict[str, Any]:
     base = tables.pop("base", None)
     if base is None:
         return tables
-    if not isinstance(base, str):
-        raise ConfigError([Problem(str(path), "base", "must be the name of a file", base)])
-    outer = (*outer, path.resolve())
-    base_path = path.parent / base
-    if base_path.resolve() in outer:
-        raise ConfigError([Problem(str(path), "base", "files are based on each other", base)])
-    return _merge(read_toml(base_path, outer), tables)
+    if not isinstance(base, str) or not base or "\0" in base:
+        raise ConfigError([Problem(source, "base", "must be the name of a file", base)])
+    path = folder / base
+    if any(_are_the_same(path, one) for one in outer):
+        raise ConfigError([Problem(source, "base", "files are based on each other", base)])
+    return _lay(_read(path, outer), tables)
+
+
+def _are_the_same(path: Path, other: Path) -> bool:
+    """Whether two names are of one file, whatever links lead to it."""
+    try:
+        return path.samefile(other)
+    # What cannot be found or read is told by who reads it.
+    except OSError:
+        return False
+
+
+def _text(path: Path) -> str:
+    """Text of a file.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, is no regular file, which may have no end, or is too long.
+    """
+    try:
+        state = path.stat()
+        if stat.S_ISDIR(state.st_mode):
+            raise FileError(f"{path}: is a directory, not a configuration file")
+        if not stat.S_ISREG(state.st_mode):
+            raise FileError(f"{path}: is not a regular file")
+        if state.st_size > LONGEST_FILE:
+            raise FileError(
+                f"{path}: {state.st_size / 2**20:.0f} MiB are too much for a configuration file, "
+                f"which may have {LONGEST_FILE / 2**20:.0f} MiB"
+            )
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such file") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not a text in UTF-8: {error.reason}") from None
+    except ValueError as error:
+        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """Tables of a text in TOML.
+
+    Raises
+    ------
+    ConfigError
+        If it is not valid TOML, or nested too deeply to be read.
+    """
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise ConfigError([Problem(source, "", "is nested too deeply")]) from None
+    # The parser's own error is one of these, and so is that of a number with too many digits.
+    except ValueError as error:
         raise ConfigError([Problem(source, "", f"not valid TOML: {error}")]) from None
 
 
-def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
-    """Lay tables over others.
+def _lay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Lay tables over those of a base; a slider of another kind keeps the keys that it has too."""
+    slider, change = base.get("slider"), over.get("slider")
+    if isinstance(slider, Mapping) and isinstance(change, Mapping) and "kind" in change:
+        base = {**base, "slider": _of_kind(slider, change["kind"])}
+    return _merge(base, over)
 
-    Of keys that exclude each other the one laid over stays; another kind of slider starts anew.
-    """
+
+def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
+    """Merge tables; of keys that exclude each other the later one stays."""
     merged = dict(base)
-    kind = base.get("kind", "rigid")
-    if table == "slider" and over.get("kind", kind) != kind:
-        merged = {}
     exclusive = EXCLUSIVE.get(table, ())
     if any(key in over for key in exclusive):
         merged = {key: value for key, value in merged.items() if key not in exclusive}
@@ -69,11 +146,39 @@ def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") ->
     return merged
 
 
-def override(tables: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Lay changes such as "contacts.delay=1ms" over tables."""
-    for change in overrides:
-        tables = _merge(tables, _parse_change(change))
-    return tables
+def _of_kind(slider: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
+    """Keys of a slider, without those that its own kind has and another one has not."""
+    old, new = (
+        SLIDERS.get(name) if isinstance(name, str) else None
+        for name in (slider.get("kind", DEFAULT), kind)
+    )
+    if old is None or new is None:
+        return slider
+    dropped = old.model_fields.keys() - new.model_fields.keys()
+    return {key: value for key, value in slider.items() if key not in dropped}
+
+
+def override(tables: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+    """Lay changes over tables.
+
+    Parameters
+    ----------
+    tables
+        Nested tables.
+    changes
+        Texts such as "contacts.delay=1ms", or tables, whose names may be dotted.
+
+    Raises
+    ------
+    ConfigError
+        If a text does not look like that.
+    """
+    # All of them at once: what is set beside a new kind is not dropped with the old one's keys.
+    together: dict[str, Any] = {}
+    for change in changes:
+        tables_of_it = _parse_change(change) if isinstance(change, str) else _undotted(change)
+        together = _merge(together, tables_of_it)
+    return _lay(tables, together)
 
 
 def _parse_change(text: str) -> dict[str, Any]:
@@ -84,10 +189,18 @@ def _parse_change(text: str) -> dict[str, Any]:
         raise ConfigError([Problem("--set", text, "must look like contacts.delay=1ms")])
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         parsed = value
-    outer, _, last = key.rpartition(".")
-    tables = {last: parsed}
-    for part in reversed(outer.split(".") if outer else ()):
-        tables = {part: tables}
-    return tables
+    return _undotted({key: parsed})
+
+
+def _undotted(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables whose names may be dotted, as nested ones."""
+    nested: dict[str, Any] = {}
+    for key, value in tables.items():
+        *outer, last = str(key).split(".")
+        one = {last: value}
+        for name in reversed(outer):
+            one = {name: one}
+        nested = _merge(nested, one)
+    return nested

@@ -4,30 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from numbers import Integral
+from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StrictInt, StrictStr
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from mesoslip.configuration.units import to_si
 
 
-def _quantity(unit: str, example: str) -> Any:
-    return BeforeValidator(partial(to_si, unit=unit, example=example))
+def _within(value: object, unit: str, example: str, least: float, most: float) -> float:
+    """A quantity in an SI unit that is 0 or of a size that means something."""
+    number = to_si(value, unit, example)
+    if number != 0 and not least <= abs(number) <= most:
+        in_unit = "" if unit == "1" else f" {unit}"
+        raise ValueError(f"must be between {least:g} and {most:g}{in_unit} in size")
+    return number
 
 
-Time = Annotated[float, _quantity("s", "0.5 ms")]
-Velocity = Annotated[float, _quantity("m/s", "0.1 um/s")]
-Mass = Annotated[float, _quantity("kg", "1.47 g")]
-Stiffness = Annotated[float, _quantity("N/m", "97 N/m")]
-Rate = Annotated[float, _quantity("1/s", "51.4 1/s")]
-Force = Annotated[float, _quantity("N", "18 uN")]
-ForceRate = Annotated[float, _quantity("N/s", "1 uN/s")]
-Area = Annotated[float, _quantity("m^2", "1e-10 m^2")]
-Length = Annotated[float, _quantity("m", "3.5 nm")]
-Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3")]
-Pressure = Annotated[float, _quantity("Pa", "70 GPa")]
-Number = Annotated[float, _quantity("1", "0.2")]
+def _quantity(unit: str, example: str, least: float, most: float) -> Any:
+    """A quantity whose size is bounded, so that nothing that follows from it overflows."""
+    return BeforeValidator(partial(_within, unit=unit, example=example, least=least, most=most))
+
+
+def _whole(value: object) -> object:
+    """Whole numbers of other libraries as Python's own."""
+    if isinstance(value, Integral) and not isinstance(value, int):
+        return int(value)
+    return value
+
+
+def _writable(text: str) -> str:
+    """A text that every file can hold; what the system takes from a command line may be none."""
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueError("is not a text in UTF-8") from error
+    if "\0" in text:
+        raise ValueError("has a character that ends texts")
+    return text
+
+
+# From below an atom's vibration to the age of the Earth.
+Time = Annotated[float, _quantity("s", "0.5 ms", 1e-18, 1e18)]
+# Up to that of light.
+Velocity = Annotated[float, _quantity("m/s", "0.1 um/s", 1e-20, 3e8)]
+Mass = Annotated[float, _quantity("kg", "1.47 g", 1e-27, 1e24)]
+Stiffness = Annotated[float, _quantity("N/m", "97 N/m", 1e-18, 1e18)]
+Rate = Annotated[float, _quantity("1/s", "51.4 1/s", 1e-18, 1e24)]
+Force = Annotated[float, _quantity("N", "18 uN", 1e-18, 1e18)]
+ForceRate = Annotated[float, _quantity("N/s", "1 uN/s", 1e-24, 1e18)]
+# From an atom's nucleus to the Earth.
+Area = Annotated[float, _quantity("m^2", "1e-10 m^2", 1e-24, 1e15)]
+Length = Annotated[float, _quantity("m", "3.5 nm", 1e-18, 1e9)]
+Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3", 1e-12, 1e18)]
+Pressure = Annotated[float, _quantity("Pa", "70 GPa", 1e-9, 1e18)]
+Number = Annotated[float, _quantity("1", "0.2", 1e-300, 1e12)]
+Text = Annotated[StrictStr, AfterValidator(_writable)]
+Whole = Annotated[StrictInt, BeforeValidator(_whole)]
 
 
 class Complaint(NamedTuple):
@@ -45,6 +79,13 @@ class Table(BaseModel):
     """A table of the file: unknown keys are errors, and nothing changes after checking."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy; with other values, checked like those of any table."""
+        if not update:
+            return super().model_copy(deep=deep)
+        values = {name: getattr(self, name) for name in self.model_fields_set}
+        return self.model_validate({**values, **update})
 
 
 def problem(key: str, message: str) -> PydanticCustomError:

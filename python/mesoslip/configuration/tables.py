@@ -4,9 +4,9 @@ rooms of their own. Adding a key is adding a field.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
-from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from mesoslip.configuration.table import (
     ForceRate,
@@ -15,6 +15,7 @@ from mesoslip.configuration.table import (
     Table,
     Time,
     Velocity,
+    Whole,
     problem,
 )
 
@@ -28,9 +29,9 @@ class Run(Table):
     engine: Literal["eq", "me"] = "eq"
     duration: Annotated[Time, Field(gt=0)] | None = None
     drive_displacement: Annotated[Length, Field(gt=0)] | None = None
-    avalanches: Annotated[StrictInt, Field(ge=1, lt=2**62)] | None = None
-    realizations: Annotated[StrictInt, Field(ge=1, lt=2**31)] = 1
-    seed: Annotated[StrictInt, Field(ge=0, lt=2**63)] = 1
+    avalanches: Annotated[Whole, Field(ge=1, lt=2**62)] | None = None
+    realizations: Annotated[Whole, Field(ge=1, lt=2**31)] = 1
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 1
     resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
 
 
@@ -63,6 +64,14 @@ class Drive(Table):
         return self
 
 
+class DriveStage(NamedTuple):
+    """A stage of the drive as it is run: its duration [s], and its velocity [m/s] or, for a drive
+    by force, the rate of the force [N/s]."""
+
+    duration: float
+    velocity: float
+
+
 class Output(Table):
     """What is recorded; sliders without inertia have no slips, whatever ``slip_interval``."""
 
@@ -70,9 +79,9 @@ class Output(Table):
     slip_interval: Annotated[Time, Field(gt=0)] | None = None
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
     layers: StrictBool = False
-    avalanche_size: Annotated[StrictInt, Field(ge=1, lt=2**53)] | None = None
+    avalanche_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
     snapshots: tuple[Annotated[Time, Field(ge=0)], ...] = ()
-    snapshot_size: Annotated[StrictInt, Field(ge=1, lt=2**53)] | None = None
+    snapshot_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
 
 
 class Curve(Table):

@@ -16,6 +16,8 @@ from mesoslip.errors import MesoslipError
 
 # The widest law whose quantiles the kernels can still compute.
 WIDEST = 20.0
+# The narrowest one: in double precision narrower ones lose the digits of their shape.
+NARROWEST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,27 @@ class ThresholdLaw:
     relative_width: float
     minimum: float = 0.0
 
+    def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise MesoslipError(f"there is no law {self.law!r}, but there are {', '.join(LAWS)}")
+
     @property
     def acceptance(self) -> float:
         """Probability that a draw is not rejected."""
         return self._kernel(3, np.empty(0))[1]
 
     def quantile(self, probability: ArrayLike) -> NDArray[np.float64]:
-        """Threshold that is exceeded with a given probability, 0 < probability < 1."""
+        """Threshold that is exceeded with a given probability.
+
+        Raises
+        ------
+        MesoslipError
+            If a probability is not above 0 and below 1.
+        """
+        values = np.asarray(probability, dtype=np.float64)
+        wrong = values[~((values > 0) & (values < 1))]
+        if wrong.size > 0:
+            raise MesoslipError(f"a probability must be above 0 and below 1, not {wrong[0]:g}")
         return self._evaluate(1, probability)
 
     def density(self, threshold: ArrayLike) -> NDArray[np.float64]:

@@ -1,21 +1,60 @@
-"""Quantities with units, through pint; everything inside mesoslip is a plain number in SI."""
+"""Quantities with units; everything inside mesoslip is a plain number in SI.
+
+A quantity is one number and one unit. Both are read here, by patterns that leave nothing to guess.
+SI units are converted here too, exactly; for the names of others there is pint, which takes a while
+to load.
+"""
 
 from __future__ import annotations
 
+import decimal
 import math
+import re
+from decimal import Decimal
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from numbers import Real
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
+NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|nan|inf)")
+RECIPROCAL = re.compile(r"1\s*/")
+# A name, and an exponent as in m^2, m**2, m2, or s-1.
+FACTOR = re.compile(
+    r"\s*(?P<name>[A-Za-zµμÅ°%]+(?:_[A-Za-z]+)*)(?:(?:\^|\*\*)?(?P<exponent>[+-]?[1-9])(?![0-9]))?\s*"
+)
+SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
-@cache
-def registry() -> UnitRegistry[float]:
-    """The unit registry; made at first use, as that takes a while."""
-    import pint
+PREFIXES = {"": 0, "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3}
+PREFIXES |= {"c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
 
-    return pint.UnitRegistry(cache_folder=":auto:")
+# Characters of the longest quantity.
+LONGEST = 200
+
+# More digits than any conversion needs, and exponents of any size, which become 0 or infinity.
+EXACT = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN, traps=[])
+
+
+class Unit(NamedTuple):
+    """A unit: how much it is in SI, and its powers of metre, kilogram, second, and of others."""
+
+    factor: Decimal
+    dimension: tuple[float, ...]
+
+
+# Names with which all prefixes go: how much of metre, kilogram and second.
+SI = {
+    "m": Unit(Decimal(1), (1, 0, 0)),
+    "g": Unit(Decimal("1e-3"), (0, 1, 0)),
+    "s": Unit(Decimal(1), (0, 0, 1)),
+    "N": Unit(Decimal(1), (1, 1, -2)),
+    "Pa": Unit(Decimal(1), (-1, 1, -2)),
+    "J": Unit(Decimal(1), (2, 1, -2)),
+    "W": Unit(Decimal(1), (2, 1, -3)),
+    "Hz": Unit(Decimal(1), (0, 0, -1)),
+}
+NONE = Unit(Decimal(1), (0, 0, 0))
 
 
 def to_si(value: object, unit: str, example: str) -> float:
@@ -24,7 +63,7 @@ def to_si(value: object, unit: str, example: str) -> float:
     Parameters
     ----------
     value
-        A number, taken to be in ``unit``, or a string with a number and a unit.
+        A number of any library, taken to be in ``unit``, or a string with one number and one unit.
     unit
         The SI unit, such as "N/m".
     example
@@ -36,28 +75,110 @@ def to_si(value: object, unit: str, example: str) -> float:
         If the value is not a finite quantity of the unit's dimension.
     """
     wanted = f"expected a quantity such as {example!r}, or a number in {unit}"
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    if isinstance(value, bool) or not isinstance(value, Real | str):
         raise ValueError(wanted)
     if isinstance(value, str):
         value = _parse(value, unit, wanted)
-    if not math.isfinite(value):
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
         raise ValueError(f"must be finite; {wanted}")
-    return float(value)
+    return number
+
+
+def _parse(text: str, unit: str, wanted: str) -> float:
+    """A string as a number in SI."""
+    text = text.strip()
+    number = NUMBER.match(text)
+    after = "" if number is None else text[number.end() :]
+    name = after.strip()
+    is_reciprocal = RECIPROCAL.match(name) and after != name
+    if (
+        number is None
+        or len(text) > LONGEST
+        or (name and not (is_reciprocal or FACTOR.match(name)))
+    ):
+        raise ValueError(f"is not one number and one unit; {wanted}")
+    given = _unit(name)
+    if given is None:
+        raise ValueError(f"has the unit {name!r}, which is not known; {wanted}")
+    if given.dimension != _known(unit).dimension:
+        raise ValueError(f"has {f'the unit {name}' if name else 'no unit'}; {wanted}")
+    return float(EXACT.multiply(EXACT.create_decimal(number[0]), given.factor))
+
+
+def _known(unit: str) -> Unit:
+    found = _unit("" if unit == "1" else unit)
+    assert found is not None
+    return found
 
 
 @cache
-def _parse(text: str, unit: str, wanted: str) -> float:
+def _unit(text: str) -> Unit | None:
+    """The unit that a product of factors is, as in "1/s", "N/m", "kg m^-3"; None if it is none."""
+    unit = NONE
+    if text == "":
+        return unit
+    rest = text.translate(SUPERSCRIPTS)
+    sign = 1
+    if RECIPROCAL.match(rest):
+        rest, sign = rest.partition("/")[2], -1
+    while True:
+        match = FACTOR.match(rest)
+        factor = None if match is None else _named(match["name"])
+        if match is None or factor is None:
+            return None
+        power = sign * int(match["exponent"] or 1)
+        unit = Unit(
+            EXACT.multiply(unit.factor, EXACT.power(factor.factor, power)),
+            _added(unit.dimension, factor.dimension, power),
+        )
+        rest = rest[match.end() :]
+        if not rest:
+            return unit
+        sign = -1 if rest[0] == "/" else 1
+        rest = rest[1:] if rest[0] in "/*·" else rest
+
+
+def _added(one: tuple[float, ...], other: tuple[float, ...], times: int) -> tuple[float, ...]:
+    length = max(len(one), len(other))
+    one, other = (part + (0,) * (length - len(part)) for part in (one, other))
+    return tuple(first + times * second for first, second in zip(one, other, strict=True))
+
+
+def _named(name: str) -> Unit | None:
+    """The unit of a name."""
+    for symbol, unit in SI.items():
+        prefix = name.removesuffix(symbol)
+        if prefix != name and prefix in PREFIXES:
+            return Unit(unit.factor.scaleb(PREFIXES[prefix]), unit.dimension)
+    return _named_by_pint(name)
+
+
+@cache
+def registry() -> UnitRegistry[float]:
+    """pint's units; made at first use, as that takes a while, and kept in no file."""
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+def _named_by_pint(name: str) -> Unit | None:
+    """The unit of a name that is not of the SI."""
     import pint
 
     try:
-        quantity: Any = registry().Quantity(text)
-    # What the parser raises for text that is no quantity is not specified.
-    except Exception as error:
-        raise ValueError(f"is not a quantity; {wanted}") from error
-    try:
-        return float(quantity.to(unit).magnitude)
-    except pint.DimensionalityError:
-        given = "no unit" if quantity.unitless else f"the unit {quantity.units}"
-        raise ValueError(f"has {given}; {wanted}") from None
-    except (OverflowError, TypeError, pint.OffsetUnitCalculusError):
-        raise ValueError(f"is not a quantity; {wanted}") from None
+        none, one = (registry().Quantity(count, name).to_base_units() for count in (0.0, 1.0))
+    # A number, such as "nan", is a ValueError.
+    except (pint.PintError, ValueError):
+        return None
+    # Degrees and decibels do not multiply.
+    if none.magnitude != 0:
+        return None
+    powers: dict[str, Any] = dict(one.dimensionality)
+    known = tuple(float(powers.pop(f"[{what}]", 0)) for what in ("length", "mass", "time"))
+    # Whatever else a unit measures, no key of a configuration does.
+    dimension = known + ((1.0,) if powers else ())
+    return Unit(Decimal(one.magnitude), dimension)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Self
 
-from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from mesoslip.configuration.table import (
     Area,
@@ -19,10 +19,11 @@ from mesoslip.configuration.table import (
     Stiffness,
     Table,
     Time,
+    Whole,
     choice,
     problem,
 )
-from mesoslip.configuration.threshold_law import LAWS, ThresholdLaw
+from mesoslip.configuration.threshold_law import LAWS, NARROWEST, ThresholdLaw
 
 # Choices, and their codes in the kernels.
 COUPLINGS = {"scaled": 1, "equal": 2}
@@ -47,7 +48,11 @@ class Threshold(Table):
     relative_width: Annotated[Number, Field(gt=0)]
 
     @model_validator(mode="after")
-    def _not_too_wide(self) -> Self:
+    def _width_that_is_possible(self) -> Self:
+        if self.relative_width < NARROWEST:
+            raise problem(
+                "relative_width", f"must be at least {NARROWEST:g} (is {self.relative_width:g})"
+            )
         law = LAWS[self.law]
         # A width given by four digits of an irrational bound is meant to be the bound.
         if self.relative_width > law.widest * (1 + 1e-4):
@@ -70,7 +75,7 @@ class Threshold(Table):
 class Contacts(Table):
     """The contacts of the interface; forces, stiffness and area are those of all together."""
 
-    count: Annotated[StrictInt, Field(ge=1, lt=2**31)]
+    count: Annotated[Whole, Field(ge=1, lt=2**31)]
     static_force: Annotated[Force, Field(gt=0)]
     stiffness: Annotated[Stiffness, Field(gt=0)]
     area: Annotated[Area, Field(gt=0)] | None = None
@@ -135,10 +140,10 @@ class Contacts(Table):
 class Interaction(Table):
     """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
 
-    strength: Annotated[Number, Field(le=1e100)]
+    strength: Number
     lattice: Annotated[str, choice(LATTICES)] = "triangular"
-    columns: Annotated[StrictInt, Field(ge=2)]
-    rows: Annotated[StrictInt, Field(ge=2)]
+    columns: Annotated[Whole, Field(ge=2)]
+    rows: Annotated[Whole, Field(ge=2)]
 
     @model_validator(mode="after")
     def _contacts_attach(self) -> Self:

@@ -6,7 +6,13 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictInt, ValidationError, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+    model_validator,
+)
 
 from mesoslip.configuration.sliders.base import Quantity, Setting
 from mesoslip.configuration.sliders.inertial import InertialSlider
@@ -21,6 +27,7 @@ from mesoslip.configuration.table import (
     Rate,
     Stiffness,
     Table,
+    Whole,
     choice,
 )
 
@@ -80,7 +87,7 @@ class LayeredSlider(InertialSlider):
     """An elastic block: layers joined by springs, of which the first bears the contacts."""
 
     kind: Literal["layered"] = "layered"
-    layers: Annotated[StrictInt, Field(ge=1, le=100_000)]
+    layers: Annotated[Whole, Field(ge=1, le=100_000)]
     layer_damping: Annotated[Rate, Field(ge=0)] = 0.0
     base: Base | None = None
     solver: Solver = Solver()
@@ -97,6 +104,15 @@ class LayeredSlider(InertialSlider):
         except ValidationError:
             return tables
         return {"mass": cantilever.mass, "stiffness": cantilever.stiffness, **tables}
+
+    @model_serializer(mode="wrap")
+    def _without_what_follows(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out mass and stiffness of the cantilever, which follow it if it is changed."""
+        table: dict[str, Any] = handler(self)
+        for name in ("mass", "stiffness"):
+            if self.cantilever is not None and getattr(self.cantilever, name) == table.get(name):
+                del table[name]
+        return table
 
     @property
     def frequencies(self) -> tuple[float, ...]:

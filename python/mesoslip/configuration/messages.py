@@ -1,0 +1,118 @@
+"""What is wrong with a configuration, in the words of the format."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from typing import Any, get_args
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from mesoslip.configuration.sliders import SLIDERS
+from mesoslip.configuration.table import Table
+from mesoslip.errors import Problem
+
+# Tables and keys that the format knows and this version does not.
+NOT_YET_KEYS = {"contacts": ("ageing",)}
+
+
+def problems(error: ValidationError, source: str, whole: type[Table]) -> list[Problem]:
+    """Everything that is wrong with a configuration.
+
+    Parameters
+    ----------
+    error
+        What the library found.
+    source
+        Where the configuration is from.
+    whole
+        The table of all tables.
+    """
+    found = []
+    for details in error.errors():
+        if details["type"] == "tables":
+            found += [Problem(source, *one) for one in details["ctx"]["complaints"]]
+        else:
+            found.append(_problem(details, source, whole))
+    return found
+
+
+def _problem(details: ErrorDetails, source: str, whole: type[Table]) -> Problem:
+    place, slider = list(details["loc"]), ""
+    if place[:1] == ["slider"] and len(place) > 1 and place[1] in SLIDERS:
+        slider = str(place.pop(1))
+    context = details.get("ctx", {})
+    kind, value, message = details["type"], details["input"], details["msg"]
+    if kind == "table":
+        return Problem(source, _dotted([*place, context["key"]]), context["message"])
+    if kind == "missing":
+        return Problem(source, _dotted(place), "missing; it has no default")
+    if kind == "extra_forbidden":
+        return Problem(source, _dotted(place), _about_unknown(place, slider, whole))
+    if kind in {"union_tag_invalid", "literal_error"}:
+        if kind == "union_tag_invalid":
+            place, value = [*place, "kind"], context["tag"]
+            expected = context["expected_tags"]
+        else:
+            expected = context["expected"]
+        message = f"must be {expected}"
+    elif kind == "value_error":
+        message = str(context["error"])
+    elif kind in {"model_type", "dict_type", "model_attributes_type", "union_tag_not_found"}:
+        message = "must be a table"
+    else:
+        message = message.replace("Input should", "must").replace("a valid tuple", "a list")
+    return Problem(source, _dotted(place), message, value)
+
+
+def _dotted(place: Iterable[Any]) -> str:
+    text = ""
+    for part in place:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return text.lstrip(".")
+
+
+def _about_unknown(place: list[Any], slider: str, whole: type[Table]) -> str:
+    """What to say of a key that its table does not have."""
+    table, name = _dotted(place[:-1]), str(place[-1])
+    if name in NOT_YET_KEYS.get(table, ()):
+        return "not available in this version"
+    if (table, name) == ("", "base"):
+        return "names the file under another one, and cannot be laid over it"
+    kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
+    if table == "slider" and kinds:
+        named = " or ".join(f'"{kind}"' for kind in kinds)
+        return f"is for slider.kind = {named} only"
+    keys = _table_at(place[:-1], slider, whole).model_fields.keys()
+    near = difflib.get_close_matches(name, [*keys, *([] if table else ["base"])], 1)
+    # A good name in the wrong table is nearer than a name that is alike.
+    elsewhere = sorted({key for key in all_keys(whole) if key.rpartition(".")[2] == name})
+    meant = " or ".join(repr(key) for key in elsewhere or near)
+    return f"unknown key; did you mean {meant}?" if meant else "unknown key"
+
+
+def _table_at(place: list[Any], slider: str, whole: type[Table]) -> type[Table]:
+    """The table at a place of the file."""
+    table = whole
+    for name in place:
+        if isinstance(name, str):
+            inner = _tables_in(table.model_fields[name].annotation)
+            table = SLIDERS[slider] if name == "slider" else next(inner)
+    return table
+
+
+def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
+    """Dotted names of all keys."""
+    for name, field in table.model_fields.items():
+        yield outer + name
+        for inner in _tables_in(field.annotation):
+            yield from all_keys(inner, f"{outer}{name}.")
+
+
+def _tables_in(annotation: Any) -> Iterator[type[Table]]:
+    """The tables that an annotation names."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _tables_in(part)

@@ -154,7 +154,7 @@ def group(output: PathLike | xr.DataTree, name: str) -> xr.Dataset:
     FileError
         If the output cannot be read or has no such group.
     """
-    tree = output if isinstance(output, xr.DataTree) else files.read(output)
+    tree = output if isinstance(output, xr.DataTree) else files.read(Path(output))
     if name not in tree.children:
         there = ", ".join(tree.children) or "none"
         raise FileError(f"the output has no group {name!r}; it has {there}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Iterable, Iterator
@@ -20,6 +21,8 @@ from mesoslip.output.layout import Entry, GroupLayout, RunResults
 # Variables with fewer values are not worth compressing.
 LEAST_COMPRESSED = 1000
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+# Slots of the table in which the chunks of a variable in memory are found.
+CACHE_SLOTS = 11
 
 # What rows of groups were called in files of earlier versions, and what they are called now.
 OLD_NAMES = {
@@ -166,13 +169,14 @@ def _create_group(
     sizes = {**root.sizes, **form.sizes}
     made: dict[str, layout.Values] = {}
     for name, entry in form.entries.items():
+        storage = _storage(entry, [sizes[one] for one in entry.dimensions])
         variable = place.createVariable(
-            name,
-            entry.dtype,
-            entry.dimensions,
-            fill_value=entry.fill_value,
-            **_storage(entry, [sizes[one] for one in entry.dimensions]),
+            name, entry.dtype, entry.dimensions, fill_value=entry.fill_value, **storage
         )
+        if storage:
+            # Blocks fill chunks: the library's own cache would hold hundreds of megabytes.
+            size = entry.dtype.itemsize * math.prod(storage["chunksizes"])
+            variable.set_var_chunk_cache(2 * size, CACHE_SLOTS, 1.0)
         variable.set_auto_maskandscale(False)
         variable.setncatts(entry.meaning.attributes)
         auxiliary = form.auxiliary_coordinates(name)
@@ -184,18 +188,13 @@ def _create_group(
 
 def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
     """Compression of a variable, and chunks that hold a block of rows."""
-    size = 1
-    for length in shape:
-        size *= length
-    if size <= LEAST_COMPRESSED or entry.is_coordinate:
+    if math.prod(shape) <= LEAST_COMPRESSED or entry.is_coordinate:
         return {}
     # One realization at a time; of long dimensions after the first no more than a block's worth.
     chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
     along = 1 if entry.is_padded else 0
-    width = 1
-    for length in shape[along + 1 :]:
-        width *= length
-    chunks[along] = max(1, min(shape[along], layout.BLOCK_ROWS, layout.BLOCK_NUMBERS // width))
+    most = min(layout.BLOCK_ROWS, layout.BLOCK_NUMBERS // math.prod(shape[along + 1 :]))
+    chunks[along] = max(1, min(shape[along], most))
     return {**COMPRESSION, "chunksizes": chunks}
 
 

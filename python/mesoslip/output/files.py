@@ -223,6 +223,11 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
         if "configuration" not in tree.attrs:
             raise FileError(f"{path}: not an output of mesoslip")
         yield tree
+    except (OSError, RuntimeError) as error:
+        # What is read later than here may turn out to be damaged.
+        if "NetCDF" in str(error) or "HDF" in str(error):
+            raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
+        raise
     finally:
         for data in groups.values():
             data.close()

@@ -95,7 +95,7 @@ def simulate(
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
-    """Derived quantities of a configuration by name, see `mesoslip.derived`."""
+    """Derived quantities of a configuration by name, see `mesoslip.theory.derived`."""
     return derived_quantities(as_config(config))
 
 
@@ -118,7 +118,7 @@ def curve(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
 
 
 def onset(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
-    """The onset of slip by Eqs. S46 and S47, see `mesoslip.slip_onset.onset_of_slip`.
+    """The onset of slip by Eqs. S46 and S47, see `mesoslip.theory.slip_onset.onset_of_slip`.
 
     Raises
     ------
@@ -175,8 +175,8 @@ def avalanches(
 ) -> xr.Dataset:
     """The catalogue of avalanches of an output, dimension ``avalanche``.
 
-    See `mesoslip.avalanche_summary` for their statistics, and `mesoslip.avalanche_statistics` for
-    fits and histograms of sizes.
+    See `mesoslip.avalanche_summary` for their statistics, and for fits and histograms of sizes
+    `mesoslip.analysis.avalanche_statistics`.
 
     Parameters
     ----------

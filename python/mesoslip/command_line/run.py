@@ -35,7 +35,7 @@ def run(
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
-    files.check_writable(path)
+    files.check_writable(path, [config])
     with progress_shown(quiet) as progress:
         results = api.simulate(checked, workers=workers, progress=progress)
     told = layout.attributes(results)

@@ -110,6 +110,39 @@ def test_both_ways_to_write_give_the_same(results, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["built.nc", "streamed.nc"]
 
 
+def test_rows_of_the_kernel_become_variables(results):
+    """Each row of each table stands in its place, with its realization."""
+    tree = layout.build_tree(results)
+    for place, one in enumerate(results.realizations):
+        trace = one.rows("trace").array
+        force = tree["spring_force"].values[place]
+        np.testing.assert_array_equal(force[: len(trace)], trace[:, 4])
+        assert np.isnan(force[len(trace) :]).all()
+        slips, data = one.rows("slips").array, mesoslip.group(tree, "slips")
+        mine = data["realization_index"].values == place
+        np.testing.assert_array_equal(data["force_drop"].values[mine], slips[:, 3] - slips[:, 4])
+        np.testing.assert_array_equal(data["contacts_broken"].values[mine], slips[:, 6])
+        tables = {
+            "slip_traces": ("slip_trace", {"sample_time": 0, "velocity": 3, "slip": -1}),
+            "avalanches": ("avalanches", {"start_time": 0, "size": 2, "force_drop": 4}),
+            "snapshots": ("snapshot_places", {"snapshot_time": 0, "avalanche_size": 2}),
+        }
+        for group in tables.keys() & tree.children.keys():
+            table, columns = tables[group]
+            data, rows = mesoslip.group(tree, group), one.rows(table).array
+            mine = data["realization_index"].values == place
+            for name, column in columns.items():
+                np.testing.assert_array_equal(data[name].values[mine], rows[:, column], name)
+        if "snapshots" in tree.children:
+            stretch = tree["snapshots/stretch"].values
+            mine = tree["snapshots/realization_index"].values == place
+            rows = one.rows("snapshots").array
+            np.testing.assert_array_equal(stretch[mine].reshape(rows.shape[:2]), rows[..., 0])
+        if "layer" in tree.dims:
+            rows = one.rows("layers").array
+            np.testing.assert_array_equal(tree["layer_displacement"].values[place], rows)
+
+
 @pytest.mark.parametrize("rows", [1, 7])
 def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
     """Blocks that end anywhere, within and between realizations."""

@@ -74,3 +74,8 @@ def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"mesoslip.{_LAZY[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """What there is, of which some is imported only when it is asked for."""
+    return sorted({*globals(), *__all__})

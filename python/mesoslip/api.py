@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
@@ -17,6 +17,10 @@ from mesoslip.output import files, layout
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import Results, run_realizations
 from mesoslip.theory.derived import Derived, derived_quantities
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
 PathLike = str | os.PathLike[str]
 
@@ -95,7 +99,7 @@ def simulate(
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
-    """Derived quantities of a configuration by name, see `mesoslip.derived`."""
+    """Derived quantities of a configuration by name, see `mesoslip.theory.derived`."""
     return derived_quantities(as_config(config))
 
 
@@ -118,7 +122,7 @@ def curve(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
 
 
 def onset(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
-    """The onset of slip by Eqs. S46 and S47, see `mesoslip.slip_onset.onset_of_slip`.
+    """The onset of slip by Eqs. S46 and S47, see `mesoslip.theory.slip_onset.onset_of_slip`.
 
     Raises
     ------
@@ -158,7 +162,7 @@ def group(output: PathLike | xr.DataTree, name: str) -> xr.Dataset:
     FileError
         If the output cannot be read or has no such group.
     """
-    tree = output if isinstance(output, xr.DataTree) else read(output)
+    tree = output if isinstance(output, xr.DataTree) else files.read(Path(output))
     if name not in tree.children:
         there = ", ".join(tree.children) or "none"
         raise FileError(f"the output has no group {name!r}; it has {there}")
@@ -175,8 +179,8 @@ def avalanches(
 ) -> xr.Dataset:
     """The catalogue of avalanches of an output, dimension ``avalanche``.
 
-    See `mesoslip.avalanche_summary` for their statistics, and `mesoslip.avalanche_statistics` for
-    fits and histograms of sizes.
+    See `mesoslip.avalanche_summary` for their statistics, and for fits and histograms of sizes
+    `mesoslip.analysis.avalanche_statistics`.
 
     Parameters
     ----------
@@ -223,11 +227,13 @@ def avalanche_summary(
 
 def plot(
     output: PathLike | xr.DataTree,
-    figure: PathLike,
+    file: PathLike | None = None,
     *,
     view: str | None = None,
     snapshot: int | None = None,
-) -> None:
+    figure: Figure | SubFigure | None = None,
+    ax: Axes | None = None,
+) -> Figure | SubFigure:
     """Draw an output of any command.
 
     Of a run: spring force with one slip in an inset, velocity, detached contacts; of a slider
@@ -238,31 +244,48 @@ def plot(
     ----------
     output
         The output.
-    figure
-        The file. If its name ends in ``.gif`` it is an animation of the lattice: of the avalanche
-        that spreads before a snapshot, or of all snapshots.
+    file
+        Where to save the picture; nowhere by default. If its name ends in ``.gif`` it is an
+        animation of the lattice: of the avalanche that spreads before a snapshot, or of all
+        snapshots.
     view
         Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
+    figure
+        Figure, or part of one, to draw into; a new one by default.
+    ax
+        Axes for the panel that tells most, and for nothing else.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        What was drawn, or drawn into.
 
     Raises
     ------
     FileError
-        If the output cannot be read or does not have what is to be drawn, or the figure cannot be
+        If the output cannot be read or does not have what is to be drawn, or the picture cannot be
         written.
+    ConfigError
+        If there is no such view.
     """
     from mesoslip.plots import avalanches as avalanche_plots
     from mesoslip.plots.draw import draw
     from mesoslip.plots.style import save
 
-    tree = output if isinstance(output, xr.DataTree) else read(output)
-    if Path(figure).suffix == ".gif":
+    if not isinstance(output, xr.DataTree):
+        with files.opened(Path(output)) as tree:
+            return plot(tree, file, view=view, snapshot=snapshot, figure=figure, ax=ax)
+    path = None if file is None else Path(file)
+    if path is not None and path.suffix == ".gif":
         if view not in {None, "lattice"}:
-            raise FileError(f"{figure}: only the lattice can be shown in motion, not {view!r}")
-        avalanche_plots.animate(tree, Path(figure), snapshot)
-    else:
-        save(draw(tree, view, snapshot), Path(figure))
+            raise FileError(f"{path}: only the lattice can be shown in motion, not {view!r}")
+        return avalanche_plots.animate(output, path, snapshot)
+    drawn = draw(output, view, snapshot, figure=figure, axes=ax)
+    if path is not None:
+        save(drawn, path)
+    return drawn
 
 
 def figures(

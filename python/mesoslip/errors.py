@@ -61,5 +61,11 @@ class FileError(MesoslipError):
     exit_status = 2
 
 
+class WriteError(FileError):
+    """A file that the system failed to write, such as on a full disk."""
+
+    exit_status = 1
+
+
 class RunError(MesoslipError):
     """A run that failed."""

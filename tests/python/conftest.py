@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copy
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mesoslip import Config
+from mesoslip.command_line.main import main
 
 ROOT = Path(__file__).parents[2]
 
@@ -54,3 +56,18 @@ def klein():
         return Config.from_dict(klein_tables(**changes))
 
     return configure
+
+
+@pytest.fixture
+def command(monkeypatch, capfd):
+    """Run a command; returns exit status, standard output and standard error."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["mesoslip", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exit_:
+            main()
+        captured = capfd.readouterr()
+        assert "Traceback" not in captured.err
+        return exit_.value.code or 0, captured.out, captured.err
+
+    return call

@@ -15,7 +15,6 @@ import pytest
 import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables
-from mesoslip.command_line.main import main
 
 
 @pytest.fixture
@@ -25,21 +24,6 @@ def short(tmp_path):
     tables = klein_tables(contacts__count=50, run__duration=2.2, output__slip_interval=1e-3)
     path.write_text(tomli_w.dumps(tables))
     return path
-
-
-@pytest.fixture
-def command(monkeypatch, capfd):
-    """Run a command; returns exit status, standard output and standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["mesoslip", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exit_:
-            main()
-        captured = capfd.readouterr()
-        assert "Traceback" not in captured.err
-        return exit_.value.code or 0, captured.out, captured.err
-
-    return call
 
 
 def test_run_writes_a_cf_file(short, tmp_path, command):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import mesoslip
@@ -109,6 +111,39 @@ def test_both_ways_to_write_give_the_same(results, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["built.nc", "streamed.nc"]
 
 
+def test_rows_of_the_kernel_become_variables(results):
+    """Each row of each table stands in its place, with its realization."""
+    tree = layout.build_tree(results)
+    for place, one in enumerate(results.realizations):
+        trace = one.rows("trace").array
+        force = tree["spring_force"].values[place]
+        np.testing.assert_array_equal(force[: len(trace)], trace[:, 4])
+        assert np.isnan(force[len(trace) :]).all()
+        slips, data = one.rows("slips").array, mesoslip.group(tree, "slips")
+        mine = data["realization_index"].values == place
+        np.testing.assert_array_equal(data["force_drop"].values[mine], slips[:, 3] - slips[:, 4])
+        np.testing.assert_array_equal(data["contacts_broken"].values[mine], slips[:, 6])
+        tables = {
+            "slip_traces": ("slip_trace", {"sample_time": 0, "velocity": 3, "slip": -1}),
+            "avalanches": ("avalanches", {"start_time": 0, "size": 2, "force_drop": 4}),
+            "snapshots": ("snapshot_places", {"snapshot_time": 0, "avalanche_size": 2}),
+        }
+        for group in tables.keys() & tree.children.keys():
+            table, columns = tables[group]
+            data, rows = mesoslip.group(tree, group), one.rows(table).array
+            mine = data["realization_index"].values == place
+            for name, column in columns.items():
+                np.testing.assert_array_equal(data[name].values[mine], rows[:, column], name)
+        if "snapshots" in tree.children:
+            stretch = tree["snapshots/stretch"].values
+            mine = tree["snapshots/realization_index"].values == place
+            rows = one.rows("snapshots").array
+            np.testing.assert_array_equal(stretch[mine].reshape(rows.shape[:2]), rows[..., 0])
+        if "layer" in tree.dims:
+            rows = one.rows("layers").array
+            np.testing.assert_array_equal(tree["layer_displacement"].values[place], rows)
+
+
 @pytest.mark.parametrize("rows", [1, 7])
 def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
     """Blocks that end anywhere, within and between realizations."""
@@ -150,6 +185,53 @@ def test_interrupted_realizations_of_different_length(klein, tmp_path):
     assert np.isfinite(force).sum(axis=1).tolist() == [3, 50, 20]
     assert np.isfinite(tree["time"].values).all()
     assert tree["detached_contacts"].dtype == np.float64
+
+
+MANY = """
+import resource, sys
+import mesoslip
+import numpy as np
+from mesoslip.output import files
+from pathlib import Path
+import subprocess
+import sys
+from types import SimpleNamespace
+
+class Rows:
+    def __init__(self, count, columns):
+        self.count, self.columns = count, columns
+
+    def __len__(self):
+        return self.count
+
+    def blocks(self, most):
+        for start in range(0, self.count, most):
+            rows = np.zeros((min(most, self.count - start), self.columns))
+            rows += np.arange(start, start + len(rows))[:, None]
+            yield rows
+
+tables = {"trace": Rows(1_500_000, 9), "slip_trace": Rows(1_500_000, 10), "slips": Rows(0, 7)}
+one = SimpleNamespace(
+    rows=tables.get, number=0, time=1.0, ending="", breaks=1, advances=1, kernel_seconds=1.0,
+    energy=np.ones(8), energy_residual=0.0,
+)
+config = mesoslip.Config.load(sys.argv[1])
+results = SimpleNamespace(config=config, complete=True, wall_seconds=1.0, realizations=[one])
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+files.write_results(results, Path(sys.argv[2]))
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
+"""
+
+
+def test_a_long_run_is_written_in_little_memory(tmp_path):
+    """200 MB of samples take a fixed part of that."""
+    arguments = [str(ROOT / "runs" / "klein.toml"), str(tmp_path / "long.nc")]
+    command = [sys.executable, "-c", MANY, *arguments]
+    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert float(told) < 100
+    with xr.open_datatree(tmp_path / "long.nc", engine="netcdf4") as tree:
+        assert tree["velocity"].values[0, -1] == 1_499_999
+        assert tree["slip_traces/sample_time"].values[100_000] == 100_000
 
 
 def test_no_group_hides_a_coordinate_of_its_parent(results):

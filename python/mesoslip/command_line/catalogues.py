@@ -10,6 +10,17 @@ import typer
 
 from mesoslip.command_line.options import JsonOption, OutputArgument, show
 
+# Scale and unit of the statistics of slips: those of the table above them.
+SHOWN = {
+    "force_before": (1e6, "uN"),
+    "force_after": (1e6, "uN"),
+    "force_drop": (1e6, "uN"),
+    "peak_velocity": (1e6, "um/s"),
+    "contacts_broken": (1.0, ""),
+    "slip_time": (1e3, "ms"),
+    "waiting_time": (1.0, "s"),
+}
+
 
 def slips(
     output: OutputArgument,
@@ -22,6 +33,8 @@ def slips(
     from mesoslip.analysis import slips as catalogue
     from mesoslip.output import files
 
+    if table is not None:
+        files.check_writable(table, [output])
     tree = files.read_run(output)
     if table is not None:
         catalogue.write_csv(tree, table)
@@ -42,12 +55,15 @@ def slips(
             f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8.0f}"
         )
     typer.echo(f"{len(rows)} slips")
-    for name, values in statistics.items():
-        if name != "slips":
+    for name, (scale, unit) in SHOWN.items():
+        if name in statistics:
+            mean, deviation, least, greatest = (
+                scale * statistics[name][what]
+                for what in ("mean", "standard_deviation", "minimum", "maximum")
+            )
             typer.echo(
-                f"{name:16} mean {values['mean']:.5g}, standard deviation "
-                f"{values['standard_deviation']:.2g}, from {values['minimum']:.5g} "
-                f"to {values['maximum']:.5g}  (SI)"
+                f"{name:16} mean {mean:.5g}, standard deviation {deviation:.2g}, "
+                f"from {least:.5g} to {greatest:.5g} {unit}".rstrip()
             )
 
 
@@ -79,6 +95,8 @@ def avalanches(
     from mesoslip.analysis.avalanche_statistics import ccdf, logarithmic_bins
     from mesoslip.output import files
 
+    if table is not None:
+        files.check_writable(table, [output])
     tree = files.read_run(output)
     start = _time(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)

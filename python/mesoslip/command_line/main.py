@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import io
+import os
+import shlex
 import sys
+from contextlib import suppress
 from typing import Annotated
 
 import typer
 
 from mesoslip.command_line import catalogues, pictures, run, theory
 from mesoslip.errors import MesoslipError
+from mesoslip.output.provenance import COMMAND_LINE
 
 COMMANDS = (
     run.run,
@@ -54,10 +59,48 @@ for _command in COMMANDS:
 
 def main() -> None:
     """Run the command line and exit."""
+    _open_streams()
+    typed = shlex.join(["mesoslip", *sys.argv[1:]])
+    # A name that is not UTF-8 must not keep an output from being written.
+    token = COMMAND_LINE.set(typed.encode("utf-8", "backslashreplace").decode())
+    status: object = 0
     try:
         app()
+    except SystemExit as end:
+        status = end.code
     except MesoslipError as error:
         typer.echo(f"mesoslip: {error}", err=True)
-        sys.exit(error.exit_status)
+        status = error.exit_status
     except KeyboardInterrupt:
-        sys.exit(run.INTERRUPTED)
+        status = run.INTERRUPTED
+    except MemoryError:
+        typer.echo("mesoslip: there is not enough memory for this", err=True)
+        status = 1
+    except OSError as error:
+        status = _told_in_vain(error)
+    finally:
+        COMMAND_LINE.reset(token)
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        status = _told_in_vain(error)
+    sys.exit(status)  # type: ignore[arg-type]
+
+
+def _open_streams() -> None:
+    """Give the program the streams that it was started without, and let them take any name."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            # The lowest free number is taken, which is that of the stream.
+            os.open(os.devnull, os.O_RDWR)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _told_in_vain(error: OSError) -> int:
+    """Say that the standard output cannot be written to, and do not try again at the end."""
+    typer.echo(f"mesoslip: the output cannot be written: {error.strerror or error}", err=True)
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    return 1

@@ -47,8 +47,11 @@ def plot(
 ) -> None:
     """Draw an output."""
     from mesoslip import api
+    from mesoslip.output import files
 
-    path = figure or output.with_suffix(".png")
+    path = figure or output.parent / f"{output.stem or 'output'}.png"
+    if output.is_file():
+        files.check_writable(path, [output])
     api.plot(output, path, view=view.value if view is not None else None, snapshot=snapshot)
     typer.echo(str(path), err=True)
 

@@ -61,7 +61,7 @@ def run(
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
-    files.check_writable(path)
+    files.check_writable(path, [config])
 
     def tell(text: str) -> None:
         typer.echo(f"{path}: {text}", err=True)

@@ -49,7 +49,7 @@ def curve(
 
     checked = api.as_config(config, changes or ())
     if output is not None:
-        files.check_writable(output)
+        files.check_writable(output, [config])
     _tell_without_interaction(checked)
     force_curve = ForceCurve(checked)
     if output is not None:
@@ -84,7 +84,7 @@ def onset(
 
     checked = api.as_config(config, changes or ())
     if output is not None:
-        files.check_writable(output)
+        files.check_writable(output, [config])
     _tell_without_interaction(checked)
     tree = api.onset(checked)
     if output is not None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import math
 import os
+import shutil
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -13,13 +16,29 @@ import netCDF4
 import xarray as xr
 
 from mesoslip.configuration.config import Config
-from mesoslip.errors import FileError
+from mesoslip.errors import FileError, WriteError
 from mesoslip.output import layout, variables
 from mesoslip.output.layout import Entry, GroupLayout, RunResults
 
 # Variables with fewer values are not worth compressing.
 LEAST_COMPRESSED = 1000
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+# Bytes that are written to see whether more can be.
+PROBE_BYTES = 2**16
+# Memory for chunks of each variable that is read; the library's own is 64 MB.
+CHUNK_CACHE = 2**22
+# What a damaged file may raise in the libraries that read it.
+DAMAGES = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+# Slots of the table in which the chunks of a variable in memory are found.
+CACHE_SLOTS = 11
 
 # What rows of groups were called in files of earlier versions, and what they are called now.
 OLD_NAMES = {
@@ -35,6 +54,16 @@ GROUPS = {
     "avalanches": variables.AVALANCHES,
     "snapshots": variables.SNAPSHOTS,
     "critical": variables.CRITICAL,
+}
+
+
+# Dimensions and variables that commands need of an output of a run: of its root, and of groups that
+# it may have.
+ROOT_NEEDS = tuple(variables.TRACE)[:6]
+NEEDS = {
+    "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
+    "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
+    "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:8]),
 }
 
 
@@ -54,6 +83,8 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
         If the path is no place for a file, is one that is read, or its folder cannot be made or
         written to.
     """
+    if path.suffix == ".toml":
+        raise FileError(f"{path}: is the name of a configuration; give another one to the output")
     target = _target(path)
     for one in map(Path, reads):
         if target.exists() and one.exists() and target.samefile(one):
@@ -61,9 +92,10 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
     part = _temporary(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        part.touch()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
+        # A full disk takes an empty file.
+        part.write_bytes(bytes(PROBE_BYTES))
+    except (OSError, ValueError) as error:
+        raise _not_written(path, target, error) from error
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
@@ -89,6 +121,20 @@ def _target(path: Path) -> Path:
     return target
 
 
+def _not_written(path: Path, target: Path, error: Exception) -> FileError:
+    """What to say of a file that could not be written."""
+    reason = getattr(error, "strerror", None) or error
+    is_full = getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}
+    # HDF5 tells a full disk as an error of its own, or as a lack of permission.
+    with suppress(OSError):
+        is_full = is_full or shutil.disk_usage(target.parent).free < PROBE_BYTES
+    if is_full:
+        return WriteError(f"{path}: cannot be written: no space left on the disk")
+    if "HDF" in str(error):
+        return WriteError(f"{path}: cannot be written: {reason}; is the disk full?")
+    return FileError(f"{path}: cannot be written: {reason}")
+
+
 def _temporary(path: Path) -> Path:
     """A name beside a file, with its ending, that no other process or thread has."""
     return path.with_name(f".{os.getpid()}-{threading.get_ident()}.{path.name}")
@@ -110,8 +156,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         yield part
         part.replace(target)
     except (OSError, RuntimeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"{path}: cannot be written: {reason}") from error
+        raise _not_written(path, target, error) from error
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
@@ -166,13 +211,14 @@ def _create_group(
     sizes = {**root.sizes, **form.sizes}
     made: dict[str, layout.Values] = {}
     for name, entry in form.entries.items():
+        storage = _storage(entry, [sizes[one] for one in entry.dimensions])
         variable = place.createVariable(
-            name,
-            entry.dtype,
-            entry.dimensions,
-            fill_value=entry.fill_value,
-            **_storage(entry, [sizes[one] for one in entry.dimensions]),
+            name, entry.dtype, entry.dimensions, fill_value=entry.fill_value, **storage
         )
+        if storage:
+            # Blocks fill chunks: the library's own cache would hold hundreds of megabytes.
+            size = entry.dtype.itemsize * math.prod(storage["chunksizes"])
+            variable.set_var_chunk_cache(2 * size, CACHE_SLOTS, 1.0)
         variable.set_auto_maskandscale(False)
         variable.setncatts(entry.meaning.attributes)
         auxiliary = form.auxiliary_coordinates(name)
@@ -184,18 +230,13 @@ def _create_group(
 
 def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
     """Compression of a variable, and chunks that hold a block of rows."""
-    size = 1
-    for length in shape:
-        size *= length
-    if size <= LEAST_COMPRESSED or entry.is_coordinate:
+    if math.prod(shape) <= LEAST_COMPRESSED or entry.is_coordinate:
         return {}
     # One realization at a time; of long dimensions after the first no more than a block's worth.
     chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
     along = 1 if entry.is_padded else 0
-    width = 1
-    for length in shape[along + 1 :]:
-        width *= length
-    chunks[along] = max(1, min(shape[along], layout.BLOCK_ROWS, layout.BLOCK_NUMBERS // width))
+    most = min(layout.BLOCK_ROWS, layout.BLOCK_NUMBERS // math.prod(shape[along + 1 :]))
+    chunks[along] = max(1, min(shape[along], most))
     return {**COMPRESSION, "chunksizes": chunks}
 
 
@@ -211,22 +252,106 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
     path = Path(path)
     if path.is_dir():
         raise FileError(f"{path}: is a directory, not an output file")
-    if not path.exists():
-        raise FileError(f"{path}: no such file")
+    _check_signature(path)
+    groups: dict[str, xr.Dataset] = {}
     try:
-        groups = xr.open_groups(path, engine="netcdf4")
-    except (OSError, ValueError, RuntimeError) as error:
-        raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
-    try:
+        groups = _groups(path)
         tree = xr.DataTree.from_dict(
             {name: _renamed(name.strip("/"), data) for name, data in groups.items()}
         )
-        if "configuration" not in tree.attrs:
-            raise FileError(f"{path}: not an output of mesoslip")
+        _check_layout(tree, path)
+    except DAMAGES as error:
+        _close(groups)
+        raise FileError(f"{path}: a damaged netCDF-4 file") from error
+    except FileError:
+        _close(groups)
+        raise
+    try:
         yield tree
+    except (OSError, RuntimeError) as error:
+        # What is read later than here may turn out to be damaged.
+        if "NetCDF" in str(error) or "HDF" in str(error):
+            raise FileError(f"{path}: a damaged netCDF-4 file") from error
+        raise
     finally:
-        for data in groups.values():
-            data.close()
+        _close(groups)
+
+
+def _close(groups: dict[str, xr.Dataset]) -> None:
+    for data in groups.values():
+        data.close()
+
+
+def _groups(path: Path) -> dict[str, xr.Dataset]:
+    """The groups of a file, with little memory for what is read of them."""
+    before = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(CHUNK_CACHE)
+    try:
+        return xr.open_groups(path, engine="netcdf4")
+    finally:
+        netCDF4.set_chunk_cache(*before)
+
+
+def _check_signature(path: Path) -> None:
+    """Make sure that a file looks like netCDF-4 before a library opens it.
+
+    Raises
+    ------
+    FileError
+        If it does not, or cannot be read.
+    """
+    try:
+        if not path.exists():
+            raise FileError(f"{path}: no such file")
+        if not path.is_file():
+            raise FileError(f"{path}: is a device or the like, not an output file")
+        with path.open("rb") as file:
+            start = file.read(8)
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path}: cannot be read: {error}") from error
+    if path.suffix == ".toml":
+        raise FileError(
+            f"{path}: is a configuration, not an output (netCDF); make one of it first: "
+            f"mesoslip run {path}"
+        )
+    if start != b"\x89HDF\r\n\x1a\n":
+        raise FileError(f"{path}: not a netCDF-4 file")
+
+
+def _check_layout(tree: xr.DataTree, path: Path) -> None:
+    """Make sure that what commands use of an output is there, as numbers in the right dimensions.
+
+    Raises
+    ------
+    FileError
+        If it is not.
+    """
+    if "configuration" not in tree.attrs:
+        raise FileError(f"{path}: not an output of mesoslip")
+    wrong = [
+        f"attribute {name}"
+        for name in ("configuration", "title", "comment", "complete")
+        if not isinstance(tree.attrs.get(name, ""), str)
+    ]
+    if "spring_force" in tree.data_vars:
+        needed = {"": (("realization", "time"), ROOT_NEEDS), "slips": (("slip",), variables.SLIPS)}
+        needed |= {name: one for name, one in NEEDS.items() if name in tree.children}
+        for group, (dimensions, names) in needed.items():
+            if group and group not in tree.children:
+                wrong.append(f"group {group}")
+                continue
+            data = tree.children[group].to_dataset() if group else tree.to_dataset()
+            wrong += [
+                f"variable {group}/{name}"
+                for name in names
+                if name not in data
+                or data[name].dims[: len(dimensions)] != dimensions
+                or data[name].dtype.kind not in "fiu"
+            ]
+        if not {"realization", "time"} <= tree.coords.keys():
+            wrong.append("coordinates realization and time")
+    if wrong:
+        raise FileError(f"{path}: a damaged netCDF-4 file: {wrong[0]} is missing or wrong")
 
 
 def _renamed(name: str, data: xr.Dataset) -> xr.Dataset:
@@ -251,8 +376,8 @@ def read(path: str | Path) -> xr.DataTree:
     with opened(path) as tree:
         try:
             return tree.load()
-        except (OSError, ValueError, RuntimeError) as error:
-            raise FileError(f"{path}: not a netCDF-4 file, or a damaged one") from error
+        except DAMAGES as error:
+            raise FileError(f"{path}: a damaged netCDF-4 file") from error
 
 
 def read_run(path: str | Path) -> xr.DataTree:

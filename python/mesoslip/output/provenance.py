@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from mesoslip import _build, _core
+from mesoslip import _build
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -29,6 +29,9 @@ SUMMARIES = {
 
 def program_attributes(config: Config, command: str) -> dict[str, Any]:
     """Attributes of every output: what was computed, by what."""
+    # Here, as the command line imports this module, which is to start at once.
+    from mesoslip import _core
+
     now = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"mesoslip {version('mesoslip')}"
     asked = COMMAND_LINE.get() or f"mesoslip.{command} in Python"

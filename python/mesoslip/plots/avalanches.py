@@ -27,7 +27,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.files import written_whole
 from mesoslip.output.layout import group_of
-from mesoslip.plots.style import STYLE
+from mesoslip.plots.style import Canvas, canvas, styled
 
 Array = NDArray[np.float64]
 
@@ -40,18 +40,26 @@ FRAME_SECONDS = 0.08
 BLANK = "0.93"
 
 
-def overview(tree: xr.DataTree) -> Figure:
-    """Contact force and sizes of avalanches against the displacement of the slider."""
+def draw_force(axes: Axes, tree: xr.DataTree) -> None:
+    """Draw the contact force against the displacement of the slider."""
     root = tree.to_dataset().isel(realization=0)
+    at = root["displacement"].values * 1e6
+    axes.plot(at, root["contact_force"].values * 1e6, color="black")
+    axes.set_ylabel("contact force (µN)")
+    axes.set_xlabel("displacement (µm)")
+    axes.set_title(tree.attrs["title"], loc="left")
+
+
+def overview(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
+    """Contact force and sizes of avalanches against the displacement of the slider."""
     data = catalogue_of_first(tree)
     config = Config.from_toml(tree.attrs["configuration"])
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 5))
+    with styled():
+        figure = canvas(figure, (6.5, 5))
         force, sizes = figure.subplots(2, 1, sharex=True)
-        at, where = root["displacement"].values * 1e6, data["displacement"].values * 1e6
-        force.plot(at, root["contact_force"].values * 1e6, color="black")
-        force.set_ylabel("contact force (µN)")
-        force.set_title(tree.attrs["title"], loc="left")
+        draw_force(force, tree)
+        force.set_xlabel("")
+        where = data["displacement"].values * 1e6
         sizes.semilogy(where, data["size"].values, ".", color="black", markersize=2)
         sizes.set_ylabel("avalanche size")
         sizes.set_ylim(0.8, 1.25 * max(config.contacts.count, data["size"].values.max(initial=1)))
@@ -84,26 +92,37 @@ def draw_distribution(
     axes.loglog(centre, law, color=points.get_color(), linewidth=0.7, alpha=0.7)
 
 
-def distribution(tree: xr.DataTree) -> Figure:
-    """Density and complementary cumulative distribution of the sizes of avalanches."""
+def sizes_of_law(tree: xr.DataTree) -> Array:
+    """Sizes of the avalanches of an output, without those that broke all that was left."""
     data = group_of(tree, "avalanches")
-    sizes = data["size"].values[~failures(tree, data)]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 3))
+    sizes: Array = data["size"].values[~failures(tree, data)]
+    return sizes
+
+
+def draw_density(axes: Axes, tree: xr.DataTree) -> None:
+    """Draw the density of the sizes of avalanches, and the law that fits them."""
+    sizes = sizes_of_law(tree)
+    fit = fit_power_law(sizes, replicas=0)
+    draw_distribution(axes, sizes, fit)
+    axes.set_xlabel("avalanche size $s$")
+    axes.set_ylabel("$P(s)$")
+    if fit is not None:
+        label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
+        label += f"{fit.exponent_error:.3f}"
+        if np.isfinite(fit.cutoff):
+            label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
+        axes.set_title(label, loc="left")
+
+
+def distribution(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
+    """Density and complementary cumulative distribution of the sizes of avalanches."""
+    with styled():
+        figure = canvas(figure, (6.5, 3))
         density, cumulative = figure.subplots(1, 2)
-        for axes in (density, cumulative):
-            axes.set_xlabel("avalanche size $s$")
-        density.set_ylabel("$P(s)$")
+        draw_density(density, tree)
+        cumulative.loglog(*ccdf(sizes_of_law(tree)), color="black", drawstyle="steps-pre")
+        cumulative.set_xlabel("avalanche size $s$")
         cumulative.set_ylabel("$P(S \\geq s)$")
-        fit = fit_power_law(sizes, replicas=0)
-        draw_distribution(density, sizes, fit)
-        cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-pre")
-        if fit is not None:
-            label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
-            label += f"{fit.exponent_error:.3f}"
-            if np.isfinite(fit.cutoff):
-                label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
-            density.set_title(label, loc="left")
         cumulative.set_title(tree.attrs["title"], loc="left")
     return figure
 
@@ -163,36 +182,41 @@ def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
     return data.isel(snapshot=number)
 
 
-def lattice(tree: xr.DataTree, number: int | None = None) -> Figure:
+def draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
+    """Draw how near to breaking the contacts of a snapshot are."""
+    drawn = draw_contacts(
+        axes, snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
+    )
+    axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label="force over threshold")
+    axes.set_title(f"{snapshot['snapshot_time'].item():.6g} s; grey: detached", loc="left")
+
+
+def lattice(tree: xr.DataTree, number: int | None = None, figure: Canvas | None = None) -> Canvas:
     """The contacts on their lattice: how near to breaking, and in what order those of an avalanche
     broke."""
     snapshot = chosen_snapshot(tree, number)
     size = snapshot["avalanche_size"].item()
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 3.4) if size else (3.6, 3.4))
+    with styled():
+        figure = canvas(figure, (6.5, 3.4) if size else (3.6, 3.4))
         panels = figure.subplots(1, 2 if size else 1, squeeze=False)[0]
-        drawn = draw_contacts(
-            panels[0], snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
-        )
-        figure.colorbar(drawn, ax=panels[0], shrink=0.8, label="force over threshold")
-        panels[0].set_title(f"{snapshot['snapshot_time'].item():.6g} s; grey: detached", loc="left")
+        draw_load(panels[0], snapshot)
         if size:
-            draw_generations(figure, panels[1], snapshot)
+            draw_generations(panels[1], snapshot)
             panels[1].set_title(f"an avalanche of {size} breaks", loc="left")
     return figure
 
 
-def draw_generations(figure: Figure, axes: Axes, snapshot: xr.Dataset) -> None:
+def draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:
     """Draw the order in which the contacts of an avalanche let go."""
     generation = snapshot["generation"].values.astype(float)
     generation[generation == 0] = np.nan
     drawn = draw_contacts(
         axes, snapshot, generation, cmap="inferno_r", norm=Normalize(1, np.nanmax(generation))
     )
-    figure.colorbar(drawn, ax=axes, shrink=0.8, label="generation")
+    axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label="generation")
 
 
-def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
+def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> Figure:
     """Write an animation: an avalanche that spreads, or else the snapshots one after another.
 
     Raises
@@ -205,7 +229,7 @@ def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
     mine = everything["realization_index"].values == snapshot["realization_index"].item()
     everything = everything.isel(snapshot=np.flatnonzero(mine))
     spreads = bool(snapshot["avalanche_size"].item())
-    with mpl.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(3.6, 3.4), dpi=120)
         axes = figure.subplots()
         if spreads:
@@ -236,3 +260,4 @@ def animate(tree: xr.DataTree, path: Path, number: int | None = None) -> None:
         film = FuncAnimation(figure, show, frames=len(frames))
         with written_whole(path) as part:
             film.save(part, writer=PillowWriter(fps=round(1 / FRAME_SECONDS)))
+    return figure

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.colors import Normalize
@@ -22,7 +22,7 @@ from mesoslip.output import files
 from mesoslip.output.layout import group_of
 from mesoslip.plots import avalanches as avalanche_plots
 from mesoslip.plots import run as plots
-from mesoslip.plots.style import CONTACT, SPRING, STYLE, save
+from mesoslip.plots.style import CONTACT, SPRING, save, styled
 from mesoslip.plots.theory import draw_onset
 
 
@@ -431,9 +431,13 @@ def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
         raise FileError(f"outputs are missing; make them first: make {targets}")
     paths = []
     for name in names:
-        trees = [files.read(outputs / f"{run}.nc") for run in FIGURES[name].runs]
-        with mpl.rc_context(STYLE):
-            figure = FIGURES[name].draw(trees)
+        with ExitStack() as stack:
+            trees = [
+                stack.enter_context(files.opened(outputs / f"{run}.nc"))
+                for run in FIGURES[name].runs
+            ]
+            with styled():
+                figure = FIGURES[name].draw(trees)
         path = folder / f"{name}.png"
         save(figure, path)
         paths.append(path)

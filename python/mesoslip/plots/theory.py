@@ -4,54 +4,61 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.plots.style import STYLE
+from mesoslip.plots.style import Canvas, canvas, styled
 
 Array = NDArray[np.float64]
 
 
-def force_curve(tree: xr.DataTree) -> Figure:
+def draw_curve(axes: Axes, tree: xr.DataTree) -> None:
+    """Draw the force of the master equation over displacement, with the point of instability."""
+    contacts = Config.from_toml(tree.attrs["configuration"]).contacts
+    unit = contacts.static_force / contacts.stiffness
+    data = tree.to_dataset()
+    x: Array = data["displacement"].values / unit
+    axes.plot(x, data["contact_force"].values / contacts.static_force, color="black")
+    steady = tree.attrs["F_steady"] / contacts.static_force
+    axes.axhline(steady, color="tab:blue", linestyle=":", label="stationary sliding")
+    if "X_c" in tree.attrs:
+        axes.plot(
+            tree.attrs["X_c"] / unit,
+            tree.attrs["F_c"] / contacts.static_force,
+            "o",
+            color="tab:red",
+            markersize=4,
+            label="instability $X_c$",
+        )
+    axes.set_ylabel("$F/F_s$")
+    axes.set_xlabel("displacement $X k/f_s$")
+    axes.set_xlim(0, x[-1])
+    axes.legend()
+    axes.set_title(f"{tree.attrs['title']}; $K^*$ = {tree.attrs['K_star']:.4g} N/m", loc="left")
+
+
+def force_curve(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
     """Force and slope of the master equation over displacement, with the points of instability."""
     config = Config.from_toml(tree.attrs["configuration"])
     contacts = config.contacts
     unit = contacts.static_force / contacts.stiffness
     data = tree.to_dataset()
     x: Array = data["displacement"].values / unit
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 4.2))
+    with styled():
+        figure = canvas(figure, (6.5, 4.2))
         force, slope = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
-        force.plot(x, data["contact_force"].values / contacts.static_force, color="black")
-        steady = tree.attrs["F_steady"] / contacts.static_force
-        force.axhline(steady, color="tab:blue", linestyle=":", label="stationary sliding")
-        force.set_ylabel("$F/F_s$")
+        draw_curve(force, tree)
+        force.set_xlabel("")
         slope.plot(x, data["slope"].values / contacts.stiffness, color="black")
         slope.set_ylabel("$F'/Nk$")
         slope.set_xlabel("displacement $X k/f_s$")
-        slope.set_xlim(0, x[-1])
         if np.isfinite(config.spring_stiffness):
             spring = -config.spring_stiffness / contacts.stiffness
             slope.axhline(spring, color="tab:red", linestyle="--", label="$-K/Nk$")
             slope.legend(loc="lower right")
-        if "X_c" in tree.attrs:
-            force.plot(
-                tree.attrs["X_c"] / unit,
-                tree.attrs["F_c"] / contacts.static_force,
-                "o",
-                color="tab:red",
-                markersize=4,
-                label="instability $X_c$",
-            )
-        force.legend()
-        force.set_title(
-            f"{tree.attrs['title']}; $K^*$ = {tree.attrs['K_star']:.4g} N/m", loc="left"
-        )
     return figure
 
 
@@ -72,12 +79,23 @@ def draw_onset(axes: Axes, tree: xr.DataTree, **style: Any) -> None:
             )
 
 
-def slip_onset(tree: xr.DataTree) -> Figure:
+def draw_drop(axes: Axes, tree: xr.DataTree) -> None:
+    """Draw the drop of the spring force after the onset of slip."""
+    draw_onset(axes, tree)
+    axes.set_xlabel(r"$\tau = \Omega_S (t - t_c)$")
+    axes.set_ylabel(r"$\Delta F_d/F_s$")
+    if tree.children:
+        axes.legend()
+    else:
+        axes.set_title(tree.attrs["comment"], loc="left")
+
+
+def slip_onset(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
     """Drop of the spring force after the onset of slip, with double logarithmic axes beside it."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 3))
+    with styled():
+        figure = canvas(figure, (6.5, 3))
         plain, logarithmic = figure.subplots(1, 2)
-        draw_onset(plain, tree)
+        draw_drop(plain, tree)
         for name, style in ONSETS.items():
             if name not in tree.children:
                 continue
@@ -87,12 +105,6 @@ def slip_onset(tree: xr.DataTree) -> Figure:
             logarithmic.loglog(
                 time, -data["asymptote"].values[1:], color=style["color"], linestyle=":"
             )
-        plain.set_xlabel(r"$\tau = \Omega_S (t - t_c)$")
-        plain.set_ylabel(r"$\Delta F_d/F_s$")
         logarithmic.set_xlabel(r"$\tau$")
         logarithmic.set_ylabel(r"$-\Delta F_d/F_s$; dotted: at short times")
-        if tree.children:
-            plain.legend()
-        else:
-            plain.set_title(tree.attrs["comment"], loc="left")
     return figure

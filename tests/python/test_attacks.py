@@ -1,0 +1,226 @@
+"""Damaged files, odd streams, outputs in the place of inputs: one message, nothing destroyed."""
+
+from __future__ import annotations
+
+import os
+import pydoc
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import mesoslip
+import netCDF4
+import numpy as np
+import pytest
+import tomli_w
+from conftest import ROOT, klein_tables
+from mesoslip.output import files
+
+OLD = ROOT / "tests" / "reference" / "old.nc"
+
+
+@pytest.fixture
+def short(tmp_path):
+    path = tmp_path / "short.toml"
+    tables = klein_tables(contacts__count=50, run__duration=0.2)
+    path.write_text(tomli_w.dumps(tables))
+    return path
+
+
+def test_functions_are_seen():
+    """By dir, completion and help, though they are imported late; docstrings name what exists."""
+    code = "import mesoslip, sys; assert 'numpy' not in sys.modules; print(dir(mesoslip))"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    for name in ("run", "slips", "avalanche_summary", "Config", "plot"):
+        assert f"'{name}'" in told.stdout
+        assert name in dir(mesoslip)
+    assert "Simulate." in pydoc.render_doc(mesoslip)
+    package = Path(mesoslip.__file__).parent
+    named = {
+        name
+        for path in package.rglob("*.py")
+        for name in re.findall(r"`(mesoslip\.[\w.]+)`", path.read_text())
+    }
+    assert named
+    for name in named:
+        assert pydoc.locate(name) is not None, name
+
+
+def test_history_is_what_was_typed(short, tmp_path, command):
+    output = tmp_path / "out with space.nc"
+    assert command("run", short, "-o", output, "--set", "contacts.delay=1 ms")[0] == 0
+    history = mesoslip.read(output).attrs["history"]
+    assert f"mesoslip run {short} -o '{output}' --set 'contacts.delay=1 ms'" in history
+    assert "in Python" in mesoslip.run(short).attrs["history"]
+
+
+def test_statistics_are_in_the_units_of_the_table(command):
+    told = command("slips", OLD)[1]
+    assert "SI" not in told
+    catalogue = mesoslip.slips(OLD)
+    line = next(line for line in told.splitlines() if line.startswith("force_drop"))
+    assert line.endswith("uN")
+    mean = float(re.search(r"mean ([\d.e+-]+)", line).group(1))
+    assert mean == pytest.approx(1e6 * catalogue["force_drop"].values.mean(), rel=1e-4)
+
+
+def test_a_configuration_is_no_output(short, command):
+    status, _, told = command("slips", short)
+    assert status == 2
+    assert "is a configuration, not an output" in told
+    assert f"mesoslip run {short}" in told
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "short.toml", "-o", "short.toml"),
+        ("run", "short.toml", "-o", "other.toml"),
+        ("curve", "short.toml", "-o", "short.toml"),
+        ("onset", "short.toml", "-o", "link.nc"),
+        ("run", "in.nc", "-o", "in.nc"),
+        ("slips", "in.nc", "--csv", "in.nc"),
+        ("avalanches", "in.nc", "--csv", "./in.nc"),
+        ("plot", "in.nc", "-o", "in.nc"),
+        ("run", "short.toml", "-o", "fifo"),
+        ("slips", "in.nc", "--csv", "/dev/full"),
+        ("plot", "in.nc", "-o", "/dev/null"),
+        ("plot", "."),
+        ("plot", "in.nc", "-o", "."),
+        ("slips", "fifo"),
+        ("plot", "/dev/zero"),
+        ("run", "short.toml", "-o", "loop/out.nc"),
+        ("run", "short.toml", "-o", "/proc/nowhere/out.nc"),
+    ],
+)
+def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, command, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other.toml").write_text("title = 'mine'\n")
+    (tmp_path / "in.nc").write_bytes(OLD.read_bytes())
+    (tmp_path / "link.nc").symlink_to(short)
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    os.mkfifo(tmp_path / "fifo")
+    before = {path: path.lstat().st_mode for path in tmp_path.rglob("*")}
+    held = {path: path.read_bytes() for path in tmp_path.glob("*.[nt]*")}
+    status, _, told = command(*arguments)
+    assert status == 2
+    assert told.startswith("mesoslip: ")
+    assert {path: path.lstat().st_mode for path in tmp_path.rglob("*")} == before
+    assert {path: path.read_bytes() for path in held} == held
+    assert Path("/dev/null").is_char_device()
+
+
+def test_links_are_followed(short, tmp_path, command):
+    (tmp_path / "store").mkdir()
+    (tmp_path / "out.nc").symlink_to(tmp_path / "store" / "real.nc")
+    assert command("run", short, "-o", tmp_path / "out.nc")[0] == 0
+    assert (tmp_path / "out.nc").is_symlink()
+    assert mesoslip.read(tmp_path / "store" / "real.nc")["time"].size
+
+
+def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
+    """Half a table does not appear, and the old one stays."""
+    table = tmp_path / "slips.csv"
+    table.write_text("old")
+
+    def fill():
+        with files.written_whole(table) as part:
+            part.write_text("half")
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(mesoslip.MesoslipError, match="no space") as told:
+        fill()
+    assert told.value.exit_status == 1
+    # netCDF says other things of a full disk.
+    monkeypatch.setattr(files.shutil, "disk_usage", lambda _: Free())
+    with pytest.raises(mesoslip.MesoslipError, match="no space"), files.written_whole(table):
+        raise PermissionError(13, "Permission denied")
+    assert table.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [table]
+
+
+class Free:
+    free = 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")
+def test_a_stream_that_takes_nothing():
+    with Path("/dev/full").open("w") as full:
+        line = [sys.executable, "-m", "mesoslip", "info", str(ROOT / "runs" / "klein.toml")]
+        result = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, check=False)
+    assert result.returncode == 1
+    assert result.stderr.decode() == (
+        "mesoslip: the output cannot be written: No space left on device\n"
+    )
+
+
+@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+def test_closed_streams(closed, short, tmp_path):
+    output = tmp_path / "out.nc"
+    line = f"{sys.executable} -m mesoslip run {short} -o {output} {closed}"
+    assert subprocess.run(["sh", "-c", line], check=False).returncode == 0
+    assert mesoslip.read(output)["time"].size
+
+
+def test_names_that_are_not_utf_8(short, tmp_path, command):
+    strange = os.fsdecode(bytes(tmp_path) + b"/\xff.toml")
+    Path(strange).write_bytes(short.read_bytes())
+    assert command("run", strange, "-o", tmp_path / "out.nc")[0] == 0
+    status, _, told = command("run", strange, "-o", strange[:-5] + ".nc")
+    assert status in {0, 2}
+    assert told.count("mesoslip: ") == (status == 2)
+    assert command("slips", strange)[0] == 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda file: file.setncattr("configuration", 7),
+        lambda file: file.renameGroup("slips", "slops"),
+        lambda file: file["slips"].renameVariable("force_drop", "force_dropped"),
+        lambda file: file.renameVariable("time", "tome"),
+        lambda file: file["slip_traces"].renameVariable("velocity", "v"),
+        lambda file: file.renameVariable("velocity", "v"),
+    ],
+)
+def test_a_file_that_lacks_what_is_needed(damage, tmp_path):
+    path = tmp_path / "in.nc"
+    path.write_bytes(OLD.read_bytes())
+    with netCDF4.Dataset(path, "a") as file:
+        damage(file)
+    for use in (mesoslip.slips, mesoslip.plot, mesoslip.avalanches):
+        with pytest.raises(mesoslip.FileError, match=r"in\.nc"):
+            use(path)
+
+
+DAMAGED = """
+import sys, warnings
+import mesoslip
+from pathlib import Path
+import numpy as np
+warnings.simplefilter("ignore")
+data, path = Path(sys.argv[1]).read_bytes(), Path(sys.argv[2])
+generator = np.random.default_rng(int(sys.argv[3]))
+told = 0
+for _ in range(int(sys.argv[4])):
+    flipped = bytearray(data)
+    flipped[generator.integers(len(data))] ^= 1 << generator.integers(8)
+    path.write_bytes(flipped)
+    for use in (mesoslip.read, mesoslip.slips, mesoslip.plot, mesoslip.info):
+        try:
+            use(path)
+        except mesoslip.MesoslipError:
+            told += 1
+print(told)
+"""
+
+
+def test_flipped_bits(tmp_path):
+    """Each use of a damaged file gives numbers or one message."""
+    arguments = [str(OLD), str(tmp_path / "in.nc"), "5", "40"]
+    result = subprocess.run(
+        [sys.executable, "-c", DAMAGED, *arguments], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    assert np.isfinite(int(result.stdout))

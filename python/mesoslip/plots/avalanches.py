@@ -94,15 +94,17 @@ def distribution(tree: xr.DataTree) -> Figure:
             axes.set_xlabel("avalanche size $s$")
         density.set_ylabel("$P(s)$")
         cumulative.set_ylabel("$P(S \\geq s)$")
-        fit = fit_power_law(sizes, replicas=0)
+        fit = fit_power_law(sizes)
         draw_distribution(density, sizes, fit)
         cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-pre")
         if fit is not None:
             label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
             label += f"{fit.exponent_error:.3f}"
-            if np.isfinite(fit.cutoff):
+            if fit.cutoff_is_resolved:
                 label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
-            density.set_title(label, loc="left")
+            if fit.is_rejected:
+                label += f"\nrejected: sizes are not of this law (p = {fit.p_value:.2g})"
+            density.set_title(label, loc="left", color="tab:red" if fit.is_rejected else "black")
         cumulative.set_title(tree.attrs["title"], loc="left")
     return figure
 

@@ -21,6 +21,8 @@ from scipy import special
 Array = NDArray[np.float64]
 
 SAMPLES = 200
+# Not those that the way of choosing was found with.
+FIRST_SEED = 100_000
 COUNTS = (500, 5_000, 50_000, 500_000)
 # Half the width of 95 % intervals, in standard errors.
 HALF_WIDTH = 1.96
@@ -100,7 +102,8 @@ def fits(
 ) -> list[PowerLawFit]:
     """Fits of independent samples."""
     found = [
-        fit_power_law(draw(weights, count, seed), smallest, replicas=0) for seed in range(samples)
+        fit_power_law(draw(weights, count, FIRST_SEED + one), smallest, replicas=0)
+        for one in range(samples)
     ]
     return [fit for fit in found if fit is not None]
 

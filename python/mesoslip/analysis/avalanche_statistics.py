@@ -33,12 +33,12 @@ RESOLVED = 0.01
 REJECTED = 0.05
 
 # A law may begin where its leading correction is within so many standard errors of none, and where
-# sizes in bins agree with it at this level ...
-CORRECTION = 1.0
-AGREEMENT = 0.05
-# ... and is fitted from so many times that size: what was too small to be seen there biases the
-# exponent by less than its error here.
-BEYOND = 4
+# sizes in bins agree with it at this level: stricter ones go on for the noise of the largest sizes.
+CORRECTION = 2.0
+AGREEMENT = 0.01
+# It is fitted from so many times that size: what was too small to be seen there biases the exponent
+# by less than its error here.
+BEYOND = 6
 # A least size that is chosen leaves at least this number of sizes, and this ratio of sizes.
 LEAST_LEFT = 50
 LEAST_RANGE = 10
@@ -62,8 +62,10 @@ MOST_STEPS = 200
 # them, and of synthetic sizes, which are uniform between two of them.
 MISFIT_STEP = 0.05
 TABLE_STEP = 0.002
-# Powers of the size in stretched exponentials.
+# Powers of the size in stretched exponentials, and least sigma of lognormal laws: sums over steeper
+# ones would need more nodes.
 POWERS = (1e-3, 3.0)
+LEAST_SIGMA = 0.1
 # Two laws differ if the logarithm of their ratio varies more than this.
 LEAST_DIFFERENCE = 1e-12
 
@@ -607,7 +609,7 @@ def fit_power_law(
     The exponent of a geometric law is 0, and less than that of sizes that mostly grow more likely;
     it is sought above LEAST_EXPONENT. Errors are those of the observed information, and hold for
     independent sizes. Where ``smallest`` is chosen they hold too, as was measured: intervals of
-    1.96 errors cover at 91 to 98 % for laws with corrections in powers of 1/s.
+    1.96 errors cover at 90 % and more for laws with corrections in powers of 1/s.
 
     The cutoff is always fitted with the exponent. It is resolved if its significance is below
     RESOLVED: twice the logarithm of the ratio of likelihoods with and without is zero for half of
@@ -626,10 +628,10 @@ def fit_power_law(
         Positive integers, of any shape.
     smallest
         Sizes below it are left out. None chooses: of ten in a decade, the first where a correction
-        (1 + a/s) is within a standard error of none and the bins agree, times BEYOND, as far as
-        LEAST_LEFT sizes and a ratio of LEAST_RANGE remain above. Where a law is first seen to fit
-        it is about as wrong as its errors, and they cover at 60 % there; from BEYOND times that
-        on it is wrong by much less. If none fits, the one of the least distance.
+        (1 + a/s) is within CORRECTION standard errors of none and the bins agree, times BEYOND, as
+        far as LEAST_LEFT sizes and a ratio of LEAST_RANGE remain above. Where a law is first seen
+        to fit it is about as wrong as its errors are wide; from BEYOND times that on it is wrong by
+        much less. If none fits, the one of the least distance.
     largest
         Sizes above are left out, and the law ends here.
     replicas
@@ -700,9 +702,10 @@ def compare_laws(sizes: ArrayLike, fit: PowerLawFit) -> tuple[LawComparison, ...
     """Other laws of the sizes that a power law with a cutoff was fitted to, from its least size on.
 
     ``pure`` power law, p ~ s^-τ; ``lognormal``, p ~ exp(-(ln s - mu)²/(2 sigma²))/s; and
-    ``stretched_exponential``, p ~ s^(power - 1) exp(-(s/scale)^power), whose power is sought within
-    POWERS. The first is the power law without a cutoff and is tested as that; the others by Vuong's
-    ratio of likelihoods [1]_, two-sided, for independent sizes.
+    ``stretched_exponential``, p ~ s^(power - 1) exp(-(s/scale)^power), with ``log_scale``, the
+    logarithm of the scale, and a power within POWERS; sigma is at least LEAST_SIGMA. The first is
+    the power law without a cutoff and is tested as that; the others by Vuong's ratio of likelihoods
+    [1]_, two-sided, for independent sizes.
 
     Parameters
     ----------
@@ -746,9 +749,18 @@ def compare_laws(sizes: ArrayLike, fit: PowerLawFit) -> tuple[LawComparison, ...
         logarithm: Array = (power - 1) * r - decay * np.expm1(power * r) / power
         return logarithm
 
-    start = chosen.pure.exponent
+    # Starts: nearly the pure law, and a law with its middle at the sizes.
+    part = tally.counts / tally.total
+    r = np.log(tally.sizes / fit.smallest)
+    centre = float(part @ r)
+    spread = max(math.sqrt(float(part @ (r - centre) ** 2)), LEAST_SIGMA)
+    bend = 1 / (2 * spread**2)
     slope, curvature = _likeliest_parameters(
-        tally, rule, lognormal, [start, 0.01], [(None, None), (1e-9, None)]
+        tally,
+        rule,
+        lognormal,
+        [[chosen.pure.exponent, 0.01], [-2 * bend * centre, bend]],
+        [(-r[-1] / LEAST_SIGMA**2, None), (1e-9, 1 / (2 * LEAST_SIGMA**2))],
     )
     found.append(
         _vuong(
@@ -764,12 +776,19 @@ def compare_laws(sizes: ArrayLike, fit: PowerLawFit) -> tuple[LawComparison, ...
         )
     )
     power, decay = _likeliest_parameters(
-        tally, rule, stretched, [0.3, max(start - 1, 0.1)], [POWERS, (1e-9, None)]
+        tally,
+        rule,
+        stretched,
+        [[0.3, max(chosen.pure.exponent - 1, 0.1)], [1.0, max(math.exp(-centre), 1e-12)]],
+        [POWERS, (1e-12, None)],
     )
     found.append(
         _vuong(
             "stretched_exponential",
-            {"power": power, "scale": fit.smallest * (power / decay) ** (1 / power)},
+            {
+                "power": power,
+                "log_scale": log_smallest + math.log(power / decay) / power,
+            },
             tally,
             rule,
             chosen.law,
@@ -787,7 +806,7 @@ def _likeliest_parameters(
     tally: _Tally,
     rule: _Rule,
     logarithm: Callable[[Array, Array], Array],
-    start: list[float],
+    starts: list[list[float]],
     bounds: list[tuple[float | None, float | None]],
 ) -> tuple[float, float]:
     """The two parameters of the likeliest law of ln(s/smallest), within bounds."""
@@ -797,13 +816,17 @@ def _likeliest_parameters(
         height = logarithm(rule.log_ratio, parameters)
         return _log_norm(rule, height) - float(part @ logarithm(r, parameters))
 
-    best = optimize.minimize(
-        cost,
-        start,
-        bounds=bounds,
-        method="Nelder-Mead",
-        options={"xatol": 1e-7, "fatol": 1e-12, "maxiter": 2000, "maxfev": 2000},
-    )
+    found = [
+        optimize.minimize(
+            cost,
+            start,
+            bounds=bounds,
+            method="Nelder-Mead",
+            options={"xatol": 1e-7, "fatol": 1e-12, "maxiter": 2000, "maxfev": 2000},
+        )
+        for start in starts
+    ]
+    best = min(found, key=lambda one: one.fun)
     first, second = best.x
     return float(first), float(second)
 

@@ -102,6 +102,7 @@ def distribution(tree: xr.DataTree) -> Figure:
             label += f"{fit.exponent_error:.3f}"
             if fit.cutoff_is_resolved:
                 label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
+            label += f"\nfrom $s$ = {fit.smallest} on, {fit.count / sizes.size:.2g} of them"
             if fit.is_rejected:
                 label += f"\nrejected: sizes are not of this law (p = {fit.p_value:.2g})"
             density.set_title(label, loc="left", color="tab:red" if fit.is_rejected else "black")

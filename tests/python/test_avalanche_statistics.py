@@ -358,6 +358,17 @@ def test_an_unresolved_cutoff_is_not_left_out():
     assert np.mean(cut) > 0.9
 
 
+def test_local_exponent_of_bursts():
+    """Fits of exact bursts give the nearest pure law of Hemmer and Hansen's, not yet 5/2."""
+    table = exponent_coverage.bundle()
+    expected = exponent_coverage.local_exponent(table, 30)
+    assert expected == pytest.approx(2.565, abs=0.002)
+    tail = table[29:]
+    fit = fit_power_law(draw_from(tail, 300_000, 36) + 29, 30, replicas=0)
+    assert abs(fit.pure_exponent - expected) < 4 * fit.pure_exponent_error < 0.02
+    assert abs(fit.pure_exponent - 2.5) > 10 * fit.pure_exponent_error
+
+
 def comparison(sizes, law: str, smallest: int = 1, largest: int | None = None):
     fit = fit_power_law(sizes, smallest, largest, replicas=0)
     return {one.law: one for one in compare_laws(sizes, fit)}[law], fit

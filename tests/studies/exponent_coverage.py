@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from mesoslip.analysis.avalanche_statistics import PowerLawFit, fit_power_law
 from numpy.typing import NDArray
-from scipy import special
+from scipy import optimize, special
 
 Array = NDArray[np.float64]
 
@@ -136,6 +136,31 @@ def local_exponent(weights: Array, smallest: int) -> float:
     return low
 
 
+def local_law(weights: Array, smallest: int) -> tuple[float, float]:
+    """Exponent and cutoff of the law with a cutoff that is nearest to a law from a size on."""
+    s = np.arange(float(smallest), len(weights) + 1)
+    part = weights[smallest - 1 :] / np.sum(weights[smallest - 1 :])
+    log_mean, mean = float(part @ np.log(s)), float(part @ s)
+
+    def cost(at: Array) -> float:
+        rate = math.exp(at[1])
+        norm = float(special.logsumexp(-at[0] * np.log(s) - rate * s))
+        return norm + at[0] * log_mean + rate * mean
+
+    best = optimize.minimize(
+        cost, [1.5, -math.log(10 * mean)], method="Nelder-Mead", options={"fatol": 1e-13}
+    )
+    return float(best.x[0]), math.exp(-best.x[1])
+
+
+def bursts_by_sorting(fibres: int, generator: np.random.Generator) -> NDArray[np.int64]:
+    """Bursts of a bundle with uniform thresholds: distances of records of its force."""
+    spacing = generator.standard_exponential(fibres + 1)
+    threshold = np.cumsum(spacing[:-1]) / np.sum(spacing)
+    force = threshold * np.arange(fibres, 0, -1)
+    return np.diff(np.flatnonzero(force >= np.maximum.accumulate(force)))
+
+
 def main() -> None:
     samples = int(sys.argv[1]) if len(sys.argv) > 1 else SAMPLES
     print("| law | sizes | coverage | mean bias | median error | median least size |")
@@ -156,6 +181,18 @@ def main() -> None:
     weights = bundle(10_000_000)
     for smallest in (1, 10, 30, 100, 300, 1000):
         print(f"| {smallest} | {local_exponent(weights, smallest):.4f} |")
+    print("\n| fibres | bundles | exponent from 30 | from 100 | from 300 |\n|---|---|---|---|---|")
+    for fibres, bundles in ((10**5, 4000), (10**6, 400), (10**7, 40)):
+        generator = np.random.default_rng(fibres)
+        sizes = np.concatenate([bursts_by_sorting(fibres, generator) for _ in range(bundles)])
+        sizes = sizes[sizes >= 30]
+        row = [fit_power_law(sizes, smallest, replicas=0) for smallest in (30, 100, 300)]
+        shown = [f"{one.pure_exponent:.4f} ± {one.pure_exponent_error:.4f}" for one in row if one]
+        print(f"| {fibres} | {bundles} | {' | '.join(shown)} |", flush=True)
+    print("\n| K/Nk | from | exponent | cutoff |\n|---|---|---|---|")
+    for ratio, smallest in ((0.01, 10), (0.1, 10), (1.0, 4)):
+        exponent, cutoff = local_law(sliding(ratio), smallest)
+        print(f"| {ratio:g} | {smallest} | {exponent:.4f} | {cutoff:.4g} |")
 
 
 if __name__ == "__main__":

@@ -760,7 +760,7 @@ def compare_laws(sizes: ArrayLike, fit: PowerLawFit) -> tuple[LawComparison, ...
         rule,
         lognormal,
         [[chosen.pure.exponent, 0.01], [-2 * bend * centre, bend]],
-        [(-r[-1] / LEAST_SIGMA**2, None), (1e-9, 1 / (2 * LEAST_SIGMA**2))],
+        [(min(-r[-1] / LEAST_SIGMA**2, LEAST_EXPONENT), None), (1e-9, 1 / (2 * LEAST_SIGMA**2))],
     )
     found.append(
         _vuong(

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import exponent_coverage
+import mesoslip
 import numpy as np
 import pytest
+from conftest import klein_tables
+from mesoslip import Config
 from mesoslip.analysis import avalanche_statistics
 from mesoslip.analysis.avalanche_statistics import (
     ccdf,
@@ -15,6 +19,7 @@ from mesoslip.analysis.avalanche_statistics import (
     logarithmic_bins,
 )
 from mesoslip.errors import MesoslipError
+from mesoslip.plots import avalanches as avalanche_plots
 from scipy import optimize, special, stats
 
 
@@ -564,3 +569,53 @@ def test_ccdf():
     drawn = draw(1000, 21, 1.5, 100.0)
     sizes, part = ccdf(drawn)
     np.testing.assert_allclose(part, [np.mean(drawn >= size) for size in sizes])
+
+
+def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
+    """In the table, in JSON, in the summary and in the picture; and none that is not."""
+    from mesoslip.command_line import main as cli
+
+    tables = klein_tables(
+        slider={"kind": "quasistatic", "stiffness": 60.0},
+        run={"avalanches": 20_000},
+        contacts__count=20_000,
+        contacts__coupling="equal",
+        contacts__initial="steady",
+        contacts__threshold={"law": "exponential", "relative_width": 1.0},
+    )
+    del tables["output"]
+    config = tmp_path / "sliding.toml"
+    config.write_text(Config.from_dict(tables).to_toml())
+    output = tmp_path / "sliding.nc"
+
+    def command(*words: object) -> str:
+        monkeypatch.setattr("sys.argv", ["mesoslip", *map(str, words)])
+        try:
+            cli.main()
+        except SystemExit as stop:
+            if stop.code:
+                raise
+        return capsys.readouterr().out
+
+    command("run", config, "-o", output, "--quiet")
+    tree = mesoslip.avalanche_summary(output)
+    assert tree["fit_rejected"] == 0
+    assert tree["tested_count"] == tree["fitted_count"] == tree["fitted_share"] * tree["count"]
+    assert "warning" not in command("avalanches", output)
+
+    shown = command("avalanches", output, "--smallest", 1)
+    assert "warning: the sizes are not of this law (p = 0.005)" in shown
+    answer = json.loads(command("avalanches", output, "--smallest", 1, "--json"))["statistics"]
+    assert answer["fit_rejected"] == 1
+    assert answer["tested_count"] == answer["count"]
+    for law in ("pure", "lognormal", "stretched_exponential"):
+        assert f"{law}_ratio" in shown
+        assert 0 <= answer[f"{law}_p_value"] <= 1
+        assert math.isfinite(answer[f"{law}_ratio"])
+
+    with mesoslip.output.store.read_run(output) as run:
+        title = avalanche_plots.distribution(run).axes[0].get_title("left")
+        assert "rejected" not in title
+        assert f"from $s$ = {tree['smallest_fitted']:g} on" in title
+        monkeypatch.setattr(avalanche_plots, "fit_power_law", lambda sizes: fit_power_law(sizes, 1))
+        assert "rejected" in avalanche_plots.distribution(run).axes[0].get_title("left")

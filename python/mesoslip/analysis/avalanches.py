@@ -107,7 +107,7 @@ def statistics(
         See `avalanches`.
     smallest
         Least size that the law is fitted to; chosen by default, see
-        `mesoslip.avalanche_statistics.fit_power_law`.
+        `mesoslip.analysis.avalanche_statistics.fit_power_law`.
 
     Returns
     -------

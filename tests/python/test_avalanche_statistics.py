@@ -246,7 +246,7 @@ def test_all_sizes_are_tested(monkeypatch):
 
 
 def test_a_heavy_tail_is_rejected():
-    """Bursts of a bundle: the few large ones lie far above the law, unseen by the distance."""
+    """Bursts of a bundle, whose few large ones lie far above the law: small as the distance is."""
     sizes = exponent_coverage.draw(exponent_coverage.bundle(), 400_000, 1)
     fit = fit_power_law(sizes, 1, replicas=50)
     assert fit.distance < 0.6 / math.sqrt(len(sizes))

@@ -425,7 +425,7 @@ class _Misfit(NamedTuple):
     distance: float
     """Kolmogorov and Smirnov's."""
     chi_squared: float
-    """Of the sizes in logarithmic bins: it sees tails, which the distance does not."""
+    """Of the sizes in logarithmic bins: it weighs tails more than the distance does."""
     agreement: float
     """Probability of a larger one; 1 if there are too few bins to tell."""
 
@@ -619,7 +619,7 @@ def fit_power_law(
 
     The goodness of fit goes by synthetic samples of the fitted law, each with a fit of its own
     [1]_, and by two misfits together: the Kolmogorov-Smirnov distance, and χ² of the sizes in
-    logarithmic bins, since the distance is blind to tails. Of more than TEST_SIZES sizes, only so
+    logarithmic bins, which weighs tails more. Of more than TEST_SIZES sizes, only so
     many, chosen at random, are tested.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from mesoslip.analysis.avalanche_statistics import fit_power_law
+from mesoslip.analysis.avalanche_statistics import REJECTED, compare_laws, fit_power_law
 from mesoslip.analysis.slips import write_table
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
@@ -43,8 +43,19 @@ SUMMARY = {
     "cutoff_error": ("1", "standard error of the cutoff"),
     "smallest_fitted": ("1", "least size that the law is fitted to"),
     "fitted_count": ("1", "avalanches that the law is fitted to"),
+    "fitted_share": ("1", "share of the avalanches that the law is fitted to"),
     "fit_distance": ("1", "greatest distance of the law's distribution from theirs"),
-    "fit_p_value": ("1", "probability of such a distance if the law were right"),
+    "fit_p_value": ("1", "probability that sizes of the law fit as badly"),
+    "tested_count": ("1", "avalanches that this was tested with"),
+    "fit_rejected": ("1", f"1 if that is less than {REJECTED:g}: the sizes are not of the law"),
+    "pure_exponent": ("1", "exponent of the law without cutoff, from the same size on"),
+    "pure_exponent_error": ("1", "its standard error if there is no cutoff"),
+    "pure_ratio": ("1", "log-likelihood of the law over that without cutoff"),
+    "pure_p_value": ("1", "probability of such a ratio without cutoff"),
+    "lognormal_ratio": ("1", "log-likelihood of the law over a lognormal one; > 0: likelier"),
+    "lognormal_p_value": ("1", "probability of such a ratio, of any sign, if both are as good"),
+    "stretched_exponential_ratio": ("1", "the same over a stretched exponential"),
+    "stretched_exponential_p_value": ("1", "probability of such a ratio if both are as good"),
 }
 
 
@@ -126,19 +137,39 @@ def statistics(
     is_failure = failures(tree, data)
     if is_failure.any():
         result["failure_size"] = float(sizes[is_failure].mean())
-    fit = fit_power_law(sizes[~is_failure], smallest=smallest)
+    sizes = sizes[~is_failure]
+    fit = fit_power_law(sizes, smallest=smallest)
     if fit is not None:
         result |= {
             "exponent": fit.exponent,
             "exponent_error": fit.exponent_error,
-            "cutoff": fit.cutoff if math.isfinite(fit.cutoff) else None,
-            "cutoff_error": fit.cutoff_error if math.isfinite(fit.cutoff) else None,
+            "cutoff": fit.cutoff if fit.cutoff_is_resolved else None,
+            "cutoff_error": fit.cutoff_error if fit.cutoff_is_resolved else None,
             "smallest_fitted": float(fit.smallest),
             "fitted_count": float(fit.count),
+            "fitted_share": fit.count / sizes.size,
             "fit_distance": fit.distance,
             "fit_p_value": fit.p_value,
+            "tested_count": float(fit.tested),
+            "fit_rejected": float(fit.is_rejected),
+            "pure_exponent": fit.pure_exponent,
+            "pure_exponent_error": fit.pure_exponent_error,
         }
+        for one in compare_laws(sizes, fit):
+            result[f"{one.law}_ratio"] = one.log_likelihood_ratio
+            result[f"{one.law}_p_value"] = one.p_value
     return result
+
+
+def warning(statistics: dict[str, float | None]) -> str | None:
+    """What must be said beside an exponent, or None: that its law is rejected."""
+    p_value = statistics.get("fit_p_value")
+    if not statistics.get("fit_rejected") or p_value is None:
+        return None
+    return (
+        f"the sizes are not of this law (p = {p_value:.2g}): its exponent and cutoff do not "
+        "describe them"
+    )
 
 
 def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:

@@ -127,6 +127,9 @@ def avalanches(
         )
     for name, value in statistics.items():
         show(name, value, *avalanche_catalogue.SUMMARY[name])
+    warning = avalanche_catalogue.warning(statistics)
+    if warning is not None:
+        typer.echo(f"warning: {warning}")
 
 
 def _time(text: str, option: str) -> float:

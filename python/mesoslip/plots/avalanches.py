@@ -102,16 +102,19 @@ def sizes_of_law(tree: xr.DataTree) -> Array:
 def draw_density(axes: Axes, tree: xr.DataTree) -> None:
     """Draw the density of the sizes of avalanches, and the law that fits them."""
     sizes = sizes_of_law(tree)
-    fit = fit_power_law(sizes, replicas=0)
+    fit = fit_power_law(sizes)
     draw_distribution(axes, sizes, fit)
     axes.set_xlabel("avalanche size $s$")
     axes.set_ylabel("$P(s)$")
     if fit is not None:
         label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
         label += f"{fit.exponent_error:.3f}"
-        if np.isfinite(fit.cutoff):
+        if fit.cutoff_is_resolved:
             label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
-        axes.set_title(label, loc="left")
+        label += f"\nfrom $s$ = {fit.smallest} on, {fit.count / sizes.size:.2g} of them"
+        if fit.is_rejected:
+            label += f"\nrejected: sizes are not of this law (p = {fit.p_value:.2g})"
+        axes.set_title(label, loc="left", color="tab:red" if fit.is_rejected else "black")
 
 
 def distribution(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:

@@ -353,10 +353,12 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
     for tree, color in zip(sliders, ("tab:green", "tab:orange", "tab:red"), strict=True):
         config = configuration(tree)
         sizes = avalanche_catalogue.avalanches(tree)["size"].values
-        fit = avalanche_statistics.fit_power_law(sizes, smallest=10, replicas=0)
+        fit = avalanche_statistics.fit_power_law(sizes, smallest=10)
         label = f"$K/Nk$ = {config.spring_stiffness / config.contacts.stiffness:g}"
         if fit is not None:
             label += rf": $\tau$ = {fit.exponent:.3f}, $s_c$ = {fit.cutoff:.3g}"
+            if fit.is_rejected:
+                label += f" (rejected, p = {fit.p_value:.2g})"
         avalanche_plots.draw_distribution(stationary, sizes, fit, color=color, label=label)
     for tree, force_above, color, exponent in (
         (bundle, None, "black", 2.5),

@@ -27,6 +27,13 @@ module mesoslip_sliders_rigid
    integer :: i
    real(wp), parameter :: inverse(longest_series + 2) = [(1.0_wp / i, i=1, longest_series + 2)]
 
+   !> Greatest terms of a series that is reverted: what the reversion leaves out, 42 A_2**5,
+   !> 28 A_2 A_3**2, 7 A_3 A_4 and the like, is below 1e-16.
+   real(wp), parameter :: most_a_2 = 3.0e-4_wp, most_a_3 = 1.0e-7_wp, most_a_4 = 1.0e-10_wp, &
+      & most_a_5 = 3.0e-14_wp
+   !> Greatest terms with which the reversion is still right to some 1e-6
+   real(wp), parameter :: fair_a_2 = 2.0e-2_wp, fair_a_3 = 1.0e-3_wp
+
    !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
    real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
       & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
@@ -43,6 +50,8 @@ module mesoslip_sliders_rigid
    type :: system_type
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
       real(wp) :: inverse_mass, stiffness, drag, spring
+      !> How far the drive is ahead of the slider at the start of a step [m]
+      real(wp) :: drive_gap
    end type system_type
 
    !> Velocity of the slider with derivatives, and the same of the damper.
@@ -119,9 +128,19 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
+      call step_on(self, law, window)
+   end subroutine advance
+
+   !> One step: by the short way, which nearly all steps between two events can take, or by any.
+   subroutine step_on(self, law, window)
+      type(slider_rigid_type), intent(inout) :: self
+      type(interface_law_type), intent(in) :: law
+      type(window_type), intent(in) :: window
+
       real(wp) :: rate, step, gap
       type(system_type) :: system
-      logical :: ends
+      type(motion_rates_type) :: early
+      logical :: ends, is_done
 
       self%law = law
       self%step_time = self%time
@@ -131,7 +150,14 @@ contains
       system%stiffness = (self%stiffness + law%stiffness) * system%inverse_mass
       system%drag = law%drag * system%inverse_mass
       system%spring = self%stiffness * system%inverse_mass
+      system%drive_gap = self%drive_displacement - self%displacement &
+         & + self%drive_velocity * (self%time - self%drive_time)
       rate = sqrt(abs(system%stiffness)) + system%drag + 2.0_wp * self%damping
+      early = rates(self, system, system%drive_gap)
+
+      call glide(self, system, window, early, rate, is_done)
+      if (is_done) return
+
       step = window%end_time - self%time
       ends = step * rate <= longest_step
       if (.not. ends) step = longest_step / rate
@@ -149,19 +175,106 @@ contains
       if (.not. step > 0.0_wp) return
       ! The number of terms is a constant in each call: the compiler makes a copy for each.
       if (rate * step <= short_step) then
-         call move(self, system, window, step, ends, few_terms)
+         call move(self, system, window, early, step, ends, few_terms)
       else if (rate * step <= middling_step) then
-         call move(self, system, window, step, ends, some_terms)
+         call move(self, system, window, early, step, ends, some_terms)
       else
-         call move(self, system, window, step, ends, most_terms)
+         call move(self, system, window, early, step, ends, most_terms)
       end if
-   end subroutine advance
+   end subroutine step_on
 
-   !> Move for a step, or to the first end of the window or turning point within it.
-   subroutine move(self, system, window, longest, ends, terms)
+   !> The short way: a step that a short series covers and in which the slider keeps its pace.
+   !>
+   !> With p the time in which the way to the next break would be made at the present velocity, the
+   !> series of the displacement is way/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion
+   !> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), to rounding
+   !> or nearly so. Other steps, one in ten, are left to move.
+   subroutine glide(self, system, window, early, rate, is_done)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+      !> Fastest rate of the system [1/s]
+      real(wp), intent(in) :: rate
+      !> Whether the step was made; if not, nothing has changed but the series
+      logical, intent(out) :: is_done
+
+      real(wp) :: target, way, pace, rest, passage, step, change, a_2, a_3, a_4, a_5, inverse_pace
+      logical :: crosses
+      integer :: term
+
+      is_done = .false.
+      target = merge(window%upper, window%lower, early%velocity > 0.0_wp)
+      pace = abs(early%velocity)
+      way = sign(1.0_wp, early%velocity) * (target - self%displacement)
+      rest = window%end_time - self%time
+      if (.not. (pace > 0.0_wp .and. way > 0.0_wp .and. rest > 0.0_wp)) return
+
+      if (way < 2.0_wp * pace * rest) then
+         inverse_pace = 1.0_wp / early%velocity
+         passage = way * abs(inverse_pace)
+         if (rate * min(passage, rest) > 0.99_wp * short_step) return
+         call expand(self, system, early, few_terms)
+         change = passage * inverse_pace
+         a_2 = inverse(2) * self%series(1) * change
+         change = change * passage
+         a_3 = inverse(3) * self%series(2) * change
+         change = change * passage
+         a_4 = inverse(4) * self%series(3) * change
+         a_5 = inverse(5) * self%series(4) * (change * passage)
+         if (abs(a_2) > fair_a_2 .or. abs(a_3) > fair_a_3) return
+         step = passage - passage * (a_2 - (2.0_wp * a_2**2 - a_3) &
+            & + (a_2 * (5.0_wp * a_2**2 - 5.0_wp * a_3) + a_4) &
+            & - (7.0_wp * a_2**2 * (2.0_wp * a_2**2 - 3.0_wp * a_3) + 6.0_wp * a_2 * a_4 &
+            & + 3.0_wp * a_3**2 - a_5))
+         if (abs(a_2) > most_a_2 .or. abs(a_3) > most_a_3 .or. abs(a_4) > most_a_4 &
+            & .or. abs(a_5) > most_a_5) step = nearer(self%series, way, step)
+         crosses = step <= rest
+         if (.not. crosses) step = rest
+      else
+         ! Too far from any break to come to it in the time that is left.
+         if (rate * rest > short_step) return
+         call expand(self, system, early, few_terms)
+         change = 0.0_wp
+         do term = few_terms - 1, 1, -1
+            change = (change + abs(self%series(term))) * rest
+         end do
+         if (.not. change < 0.5_wp * pace) return
+         crosses = .false.
+         step = rest
+      end if
+
+      is_done = .true.
+      self%terms = few_terms
+      call arrive(self, system, window, early, step, crosses, target, .not. crosses, .false., &
+         & few_terms)
+   end subroutine glide
+
+   !> A time of a crossing made exact by one step of Halley's method, the error of which is cubic.
+   pure function nearer(series, way, time) result(better)
+      !> Coefficients of the velocity
+      real(wp), intent(in) :: series(0:)
+      !> Size of the way
+      real(wp), intent(in) :: way
+      !> Time of the crossing, right to some 1e-6
+      real(wp), intent(in) :: time
+      real(wp) :: better
+
+      real(wp) :: velocity, change
+
+      velocity = horner(series, few_terms, time)
+      change = (integral(series, few_terms, time) - sign(way, velocity)) / velocity
+      better = time - change * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
+   end function nearer
+
+   !> Any way: move for a step, or to the first end of the window or turning point within it.
+   subroutine move(self, system, window, early, longest, ends, terms)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      type(window_type), intent(in) :: window
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
       !> Length of the step [s]
       real(wp), intent(in) :: longest
       !> Whether the step comes to the end of the window's time
@@ -169,14 +282,10 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, change, reach, target, sense, drive_gap, way, swept, extension
+      real(wp) :: step, change, reach, target, sense
       logical :: crosses, turns
-      type(motion_rates_type) :: early, late
       integer :: term
 
-      drive_gap = self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time)
-      early = rates(self, system, drive_gap)
       call expand(self, system, early, terms)
       self%terms = terms
 
@@ -195,6 +304,29 @@ contains
             & window%lower - self%displacement, change, step, crosses, turns, sense)
          target = merge(window%upper, window%lower, sense > 0.0_wp)
       end if
+      call arrive(self, system, window, early, step, crosses, target, &
+         & ends .and. .not. (crosses .or. turns) .and. step >= longest, turns, terms)
+   end subroutine move
+
+   !> Come to the end of a step whose series is known.
+   subroutine arrive(self, system, window, early, step, crosses, target, ends, turns, terms)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      type(window_type), intent(in) :: window
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+      !> Length of the step [s]
+      real(wp), intent(in) :: step
+      !> Whether it comes to an end of the window, and the displacement there [m]
+      logical, intent(in) :: crosses
+      real(wp), intent(in) :: target
+      !> Whether it comes to the end of the window's time, or to a turning point
+      logical, intent(in) :: ends, turns
+      !> Terms of the series
+      integer, intent(in) :: terms
+
+      real(wp) :: drive_gap, way, swept, extension
+      type(motion_rates_type) :: late
 
       way = integral(self%series, terms, step)
       swept = second_integral(self%series, terms, step)
@@ -205,14 +337,14 @@ contains
       else
          self%displacement = self%displacement + way
       end if
-      if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
+      if (ends) then
          self%time = window%end_time
       else
          self%time = self%time + step
       end if
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
 
-      extension = step * (drive_gap + 0.5_wp * self%drive_velocity * step) - swept
+      extension = step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept
       ! From the balance of momentum, M dV + M dW = the impulse of spring and contacts.
       if (self%damping > 0.0_wp) then
          self%mean_velocity = self%mean_velocity - (self%velocity - early%velocity) &
@@ -228,7 +360,7 @@ contains
       self%start_acceleration = early%acceleration
       call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
       call add_losses(self, early, late, step, terms)
-   end subroutine move
+   end subroutine arrive
 
    !> Velocity and its derivatives, from the equation of motion.
    pure function rates(self, system, drive_gap) result(motion)

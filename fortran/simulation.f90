@@ -4,6 +4,8 @@ module mesoslip_simulation
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_schedule, only: most_events, schedule_type
+   use mesoslip_watch, only: watch_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_avalanches, only: avalanche_recorder_type
    use mesoslip_contacts_base, only: contacts_type
@@ -55,12 +57,17 @@ module mesoslip_simulation
       integer(i8) :: advances = 0
       !> Why the run is over, an ending_ code
       integer :: ending = ending_none
+      !> Breaks, and attachments, in a schedule; 0 for none. The numbers do not depend on it
+      integer :: longest_schedule = most_events
 
       !> Whether the run has been started
       logical :: is_started = .false.
 
       !> A state that was put away and has not been fetched
       type(archive_type), private :: kept
+
+      !> What comes next; between two calls of run it is over
+      type(schedule_type), private :: schedule
 
       integer, private :: stage = 1
       !> Advances since time or displacement changed
@@ -85,7 +92,8 @@ module mesoslip_simulation
       procedure :: restore
       !> Whether all parts are there
       procedure :: is_whole
-      procedure, private :: advance, follow, finish, is_broken, slides
+      procedure, private :: advance, advance_once, run_ahead, change_stage, follow, finish, &
+         & is_broken, slides, longest_step, farthest
    end type simulation_type
 
 contains
@@ -136,6 +144,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       integer(i8) :: last
+      integer(i8) :: advances
       real(wp) :: time, displacement, most_breaks, work
 
       ! One advance may break very many contacts, and a segment must not last for minutes.
@@ -149,10 +158,12 @@ contains
             if (self%contacts%breaks > most_breaks) exit
             if (self%recorder%is_full() .or. self%avalanches%is_full()) exit
          end if
-         work = work + self%slider%cost + self%contacts%cost
+         advances = self%advances
          time = self%slider%time
          displacement = self%slider%displacement
          call self%advance(last, most_breaks)
+         work = work + real(max(1_i8, self%advances - advances), wp) &
+            & * (self%slider%cost + self%contacts%cost)
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
             return
@@ -175,8 +186,67 @@ contains
       end do
    end subroutine run
 
-   !> One advance of the slider and the events at its end, or several in the midst of an avalanche.
+   !> Some advances of the slider through a schedule, or one.
    subroutine advance(self, last, most_breaks)
+      class(simulation_type), intent(inout) :: self
+      !> Advances, and breaks, after which to stop
+      integer(i8), intent(in) :: last
+      real(wp), intent(in) :: most_breaks
+
+      self%schedule%is_over = .true.
+      if (self%slider%runs_ahead .and. self%longest_schedule > 0 &
+         & .and. .not. self%avalanches%sees_each()) then
+         call self%contacts%plan(self%slider%pose(), self%longest_schedule, self%schedule)
+      end if
+      if (self%schedule%is_over) then
+         call self%advance_once(last, most_breaks)
+      else
+         call self%run_ahead(last)
+      end if
+   end subroutine advance
+
+   !> The slider runs ahead through the schedule, and contacts keep their books afterwards.
+   subroutine run_ahead(self, last)
+      class(simulation_type), intent(inout) :: self
+      !> Advances after which to stop
+      integer(i8), intent(in) :: last
+
+      type(watch_type) :: watch
+      type(pose_type) :: before
+      type(interface_law_type) :: law
+      logical :: turns
+
+      self%schedule%end_time = self%stage_end(self%stage)
+      self%schedule%longest_step = self%longest_step()
+      self%schedule%farthest = self%farthest()
+      before = self%slider%pose()
+      do
+         watch = self%recorder%watch(self%slider)
+         watch%most_steps = last - self%advances
+         call self%slider%run_ahead(self%schedule, watch)
+         self%advances = self%advances + watch%steps
+         call self%recorder%pass_over(watch)
+         turns = self%slider%sense * self%schedule%direction < 0.0_wp
+         if (watch%is_caught) then
+            call self%recorder%record(self%slider, real(self%schedule%detached, wp), &
+               & self%contacts%breaks + self%schedule%broken)
+            if (.not. turns) call self%schedule%pass(self%slider%time, self%slider%displacement)
+         end if
+         if (turns .or. self%schedule%is_over .or. self%advances >= last) exit
+      end do
+      call self%contacts%settle(self%schedule, self%slider%pose())
+      call self%avalanches%pass_over(self%schedule%moments, self%contacts%breaks)
+      if (turns) then
+         ! The schedule was for the other direction: what is due at the turn is for contacts to say.
+         law = self%contacts%law()
+         call self%contacts%respond(before, self%slider%pose())
+         call self%avalanches%see_response(self%slider, self%contacts, law)
+      end if
+      call self%change_stage()
+   end subroutine run_ahead
+
+   !> One advance of the slider and the events at its end, or several in the midst of an avalanche.
+   subroutine advance_once(self, last, most_breaks)
       class(simulation_type), intent(inout) :: self
       !> Advances, and breaks, after which to stop
       integer(i8), intent(in) :: last
@@ -185,7 +255,7 @@ contains
       type(pose_type) :: before
       type(interface_law_type) :: law
       type(window_type) :: window
-      real(wp) :: sampling, end_time
+      real(wp) :: end_time
 
       before = self%slider%pose()
       call self%contacts%offer(before, law, window)
@@ -193,12 +263,7 @@ contains
          call self%finish(ending_broken)
          return
       end if
-      sampling = self%recorder%parameters%interval
-      if (self%recorder%parameters%slip_interval > 0.0_wp) then
-         sampling = min(sampling, self%recorder%parameters%slip_interval)
-      end if
-      end_time = min(self%stage_end(self%stage), &
-         & self%slider%time + 0.5_wp * most_samples_in_step * sampling)
+      end_time = min(self%stage_end(self%stage), self%slider%time + self%longest_step())
       window%end_time = min(window%end_time, end_time)
 
       call self%slider%advance(law, window)
@@ -237,6 +302,24 @@ contains
 
       call self%contacts%respond(before, self%slider%pose())
       call self%avalanches%see_response(self%slider, self%contacts, law)
+      call self%change_stage()
+   end subroutine advance_once
+
+   !> Longest step of the slider, so that it does not come past too many samples [s].
+   pure function longest_step(self) result(step)
+      class(simulation_type), intent(in) :: self
+      real(wp) :: step
+
+      step = self%recorder%parameters%interval
+      if (self%recorder%parameters%slip_interval > 0.0_wp) then
+         step = min(step, self%recorder%parameters%slip_interval)
+      end if
+      step = 0.5_wp * most_samples_in_step * step
+   end function longest_step
+
+   !> Go over to the next stage of the drive, or to the end; move the origin along.
+   subroutine change_stage(self)
+      class(simulation_type), intent(inout) :: self
 
       ! An avalanche under a slider without inertia has to end before a stage does.
       if (self%slider%time >= self%stage_end(self%stage) &
@@ -249,7 +332,7 @@ contains
          call self%slider%drive(self%stage_velocity(self%stage))
       end if
       call self%follow()
-   end subroutine advance
+   end subroutine change_stage
 
    !> Whether contacts break under a force without end.
    pure function slides(self)
@@ -285,14 +368,22 @@ contains
       self%ending = ending
    end subroutine finish
 
+   !> Distance of the slider from the origin of displacements at which this is moved [m].
+   pure function farthest(self) result(distance)
+      class(simulation_type), intent(in) :: self
+      real(wp) :: distance
+
+      distance = farthest_stretches * self%contacts%parameters%static_force &
+         & / self%contacts%parameters%stiffness
+   end function farthest
+
    !> Move the origin of displacements along with the slider.
    subroutine follow(self)
       class(simulation_type), intent(inout) :: self
 
       real(wp) :: grid, shift
 
-      if (abs(self%slider%displacement) * self%contacts%parameters%stiffness &
-         & < farthest_stretches * self%contacts%parameters%static_force) return
+      if (abs(self%slider%displacement) < self%farthest()) return
       ! On a grid of powers of two the origin and the new displacement have no rounding error.
       grid = scale(1.0_wp, &
          & exponent(self%contacts%parameters%static_force / self%contacts%parameters%stiffness))

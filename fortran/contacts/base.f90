@@ -11,6 +11,7 @@ module mesoslip_contacts_base
    use mesoslip_contacts_mechanics, only: coupling_scaled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
+   use mesoslip_schedule, only: schedule_type
    implicit none
    private
 
@@ -72,6 +73,9 @@ module mesoslip_contacts_base
       procedure(offer_interface), deferred :: offer
       !> Break and attach contacts after a motion of the slider
       procedure(respond_interface), deferred :: respond
+      !> Write a schedule of what comes next, and keep the books of what came
+      procedure :: plan
+      procedure :: settle
       !> Move the origin of displacements
       procedure(shift_origin_interface), deferred :: shift_origin
       !> Elastic energy of the pinned contacts
@@ -181,6 +185,31 @@ module mesoslip_contacts_base
    end interface
 
 contains
+
+   !> Write a schedule of what comes next: nothing unless a kind of contacts knows.
+   subroutine plan(self, pose, most, schedule)
+      !> The contacts
+      class(contacts_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Greatest number of breaks, and of attachments
+      integer, intent(in) :: most
+      !> The schedule; at its end if there is none
+      type(schedule_type), intent(inout) :: schedule
+
+      schedule%is_over = .true.
+   end subroutine plan
+
+   !> Keep the books of a schedule; for contacts that write none.
+   subroutine settle(self, schedule, pose)
+      !> The contacts
+      class(contacts_type), intent(inout) :: self
+      !> The schedule, as far as the slider came
+      type(schedule_type), intent(in) :: schedule
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+   end subroutine settle
 
    !> Extent of the avalanche that is over; nothing for contacts without a place.
    subroutine take_extent(self, extent)

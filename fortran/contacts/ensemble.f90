@@ -9,7 +9,8 @@ module mesoslip_contacts_ensemble
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
-   use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set
+   use mesoslip_contacts_set, only: contact_set_type, drag_of, exchange_set, law_set
+   use mesoslip_schedule, only: most_events, schedule_type
    use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate, behind_coordinate
    use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
@@ -29,14 +30,18 @@ module mesoslip_contacts_ensemble
       real(wp) :: direction = 1.0_wp
 
       type(contact_queue_type), private :: queue
+      !> Contacts of the breaks in the schedule
+      integer, private :: listed(most_events) = 0
    contains
       procedure :: initialize
       procedure :: offer
       procedure :: respond
+      procedure :: plan
+      procedure :: settle
       procedure :: shift_origin
       procedure :: exchange
       procedure :: rebuild
-      procedure, private :: break_due, face, farthest_behind
+      procedure, private :: break_due, attach_due, face, farthest_behind
    end type contact_ensemble_type
 
 contains
@@ -127,20 +132,85 @@ contains
       !> Where the slider was, and where it is
       type(pose_type), intent(in) :: before, after
 
+      call self%break_due(after%displacement, after%time)
+      call self%attach_due(after)
+      self%detached_count = real(self%waiting, wp)
+   end subroutine respond
+
+   !> Write a schedule of what comes next: the breaks at the front of the queue, as far as they are
+   !> sorted, and about as many attachments.
+   subroutine plan(self, pose, most, schedule)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Greatest number of breaks, and of attachments
+      integer, intent(in) :: most
+      !> The schedule; at its end if there is none
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: number, event
+
+      schedule%is_over = .true.
+      if (self%track%columns > 0 .or. pose%sense * self%direction < 0.0_wp) return
+      call self%queue%preview(self%record, min(most, most_events), self%listed, &
+         & schedule%break_coordinate, number)
+      if (number == 0) return
+      do event = 1, number
+         schedule%break_origin(event) = self%record(row_origin, self%listed(event))
+         schedule%break_stiffness(event) = self%record(row_stiffness, self%listed(event))
+         schedule%break_drag(event) = drag_of(self%parameters, schedule%break_stiffness(event))
+      end do
+      schedule%breaks = number
+      schedule%broken = 0
+      schedule%moments = 0
+      schedule%direction = self%direction
+      schedule%behind = self%behind
+      call self%list_attachments(min(most, most_events, 2 * number + 4), pose%sense, schedule)
+      schedule%is_over = .false.
+   end subroutine plan
+
+   !> Keep the books of a schedule.
+   subroutine settle(self, schedule, pose)
+      !> The ensemble
+      class(contact_ensemble_type), intent(inout) :: self
+      !> The schedule, as far as the slider came
+      type(schedule_type), intent(in) :: schedule
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      integer :: event, contact(most_events)
+
+      call self%let_go_listed(self%listed(:schedule%broken), schedule)
+      if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
+      call self%take_hold_listed(schedule, contact)
+      do event = 1, schedule%attached
+         call self%queue%insert(contact(event), &
+            & ahead_coordinate(self%record(:, contact(event)), self%direction))
+      end do
+      self%behind = schedule%behind
+      ! What broke a moment ago and attaches at once was not in the schedule.
+      if (schedule%is_over) call self%attach_due(pose)
+      self%detached_count = real(self%waiting, wp)
+   end subroutine settle
+
+   !> Attach all contacts that are due, in the order in which they broke.
+   subroutine attach_due(self, pose)
+      class(contact_ensemble_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
       integer :: contact
       real(wp) :: origin, limit, back_force
 
-      call self%break_due(after%displacement, after%time)
-      back_force = after%sense * self%parameters%back_force_ratio * self%parameters%static_force
-      do while (self%next_attachment <= after%time)
-         call self%take_hold(after%displacement, back_force, 0.0_wp, contact)
+      back_force = pose%sense * self%parameters%back_force_ratio * self%parameters%static_force
+      do while (self%next_attachment <= pose%time)
+         call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
          origin = self%record(row_origin, contact)
          limit = self%record(row_limit, contact)
          call self%queue%insert(contact, self%direction * origin + limit)
          self%behind = max(self%behind, self%direction * origin - limit)
       end do
-      self%detached_count = real(self%waiting, wp)
-   end subroutine respond
+   end subroutine attach_due
 
    !> Break all contacts that are due.
    subroutine break_due(self, displacement, time)

@@ -58,7 +58,10 @@ module mesoslip_contacts_queue
       procedure :: insert
       !> Take the first contact out
       procedure :: pop
-      procedure, private :: advance_front, take_overflow, bucket_of, append
+      !> The first contacts, and taking some of them out
+      procedure :: preview
+      procedure :: remove_previewed
+      procedure, private :: advance_front, take_overflow, bucket_of, append, find_first
    end type contact_queue_type
 
 contains
@@ -183,6 +186,65 @@ contains
       end if
 
       self%count = self%count - 1
+      call self%find_first(record)
+   end subroutine pop
+
+   !> The first contacts, in their order: so many that no other contact has the key of one of them.
+   subroutine preview(self, record, most, contact, key, number)
+      !> The queue
+      class(contact_queue_type), intent(inout) :: self
+      !> Records of all contacts, shape (record_length, number of contacts)
+      real(wp), intent(in), contiguous :: record(:, :)
+      !> Greatest number
+      integer, intent(in) :: most
+      !> Numbers of the contacts
+      integer, intent(out) :: contact(:)
+      !> Coordinates at which they break [m]
+      real(wp), intent(out) :: key(:)
+      !> How many they are: none if it takes a look at all to tell
+      integer, intent(out) :: number
+
+      number = 0
+      if (self%count == 0) return
+      if (self%front_next > self%front_count .and. self%late_count == 0) then
+         call self%advance_front(record)
+      end if
+      number = min(most, self%front_count - self%front_next + 1)
+      associate (front => self%front_key(self%front_next:self%front_count))
+         if (self%late_count > 0) then
+            do while (number > 0)
+               if (front(number) < self%late_key(1)) exit
+               number = number - 1
+            end do
+         end if
+         do while (number > 0 .and. number < size(front))
+            if (front(number) < front(number + 1)) exit
+            number = number - 1
+         end do
+         key(:number) = front(:number)
+      end associate
+      contact(:number) = self%front_contact(self%front_next:self%front_next + number - 1)
+   end subroutine preview
+
+   !> Take the first contacts out, which a preview showed.
+   subroutine remove_previewed(self, record, number)
+      !> The queue
+      class(contact_queue_type), intent(inout) :: self
+      !> Records of all contacts, shape (record_length, number of contacts)
+      real(wp), intent(in), contiguous :: record(:, :)
+      !> How many
+      integer, intent(in) :: number
+
+      self%front_next = self%front_next + number
+      self%count = self%count - number
+      call self%find_first(record)
+   end subroutine remove_previewed
+
+   !> Find the least key.
+   subroutine find_first(self, record)
+      class(contact_queue_type), intent(inout) :: self
+      real(wp), intent(in), contiguous :: record(:, :)
+
       self%first_key = no_key
       if (self%count == 0) return
       if (self%front_next > self%front_count .and. self%late_count == 0) then
@@ -190,7 +252,7 @@ contains
       end if
       if (self%front_next <= self%front_count) self%first_key = self%front_key(self%front_next)
       if (self%late_count > 0) self%first_key = min(self%first_key, self%late_key(1))
-   end subroutine pop
+   end subroutine find_first
 
    !> Number of the bucket of a key.
    pure function bucket_of(self, key) result(bucket)

@@ -9,8 +9,9 @@ module mesoslip_contacts_set
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
    use mesoslip_contacts_avalanche_track, only: avalanche_track_type, new_avalanche_track, &
       & row_generation
-   use mesoslip_numerics_random, only: uniform_pair
+   use mesoslip_numerics_random, only: first_uniforms, uniform_pair
    use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_schedule, only: most_events, schedule_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts, &
       & extent_length
    use mesoslip_contacts_mechanics, only: coupling_scaled, initial_steady, initial_uniform
@@ -19,7 +20,7 @@ module mesoslip_contacts_set
    implicit none
    private
 
-   public :: contact_set_type, exchange_set, law_set, snapshot_set
+   public :: contact_set_type, drag_of, exchange_set, law_set, snapshot_set
    public :: detached_length
 
    !> Numbers kept for a detached contact
@@ -28,6 +29,9 @@ module mesoslip_contacts_set
    integer, parameter :: row_due = 1
    !> Its drag while it is detached [N s/m]
    integer, parameter :: row_drag = 2
+
+   !> Draws that are made together
+   integer, parameter :: draws_together = 32
 
    !> N contacts one by one.
    type, abstract, extends(contacts_type) :: contact_set_type
@@ -45,6 +49,9 @@ module mesoslip_contacts_set
       type(avalanche_track_type) :: track
       !> Number of contacts that are detached, and their first place in the ring
       integer :: waiting = 0, first_detached = 0
+      !> Contacts whose next thresholds are still to be drawn, and their renewals then
+      integer, private :: undrawn_count = 0, undrawn(draws_together) = 0
+      integer(i8), private :: undrawn_renewal(draws_together) = 0_i8
    contains
       procedure :: law => law_set
       procedure :: elastic_energy
@@ -62,7 +69,12 @@ module mesoslip_contacts_set
       procedure, non_overridable :: take_hold
       !> Sum stiffness and offset anew, from the records
       procedure, non_overridable :: bear
-      procedure, non_overridable, private :: draw_next
+      !> Stiffness, breaking stretch and drag of the next contacts to attach, and their times
+      procedure, non_overridable :: list_attachments
+      !> Keep the books of a schedule, but for the order of breaking
+      procedure, non_overridable :: let_go_listed
+      procedure, non_overridable :: take_hold_listed
+      procedure, non_overridable, private :: draw_next, draw_undrawn
       !> Move all origins
       procedure, non_overridable :: shift_records
    end type contact_set_type
@@ -177,10 +189,7 @@ contains
          record(row_renewal) = record(row_renewal) + 1.0_wp
       end associate
 
-      drag = self%parameters%drag
-      if (drag > 0.0_wp .and. self%parameters%coupling == coupling_scaled) then
-         drag = drag * (stiffness / self%parameters%stiffness)**2
-      end if
+      drag = drag_of(self%parameters, stiffness)
       call self%break_loss%add(0.5_wp * stiffness * (displacement - origin)**2)
       call self%stiffness%add(-stiffness)
       call self%offset%add(-stiffness * origin)
@@ -221,6 +230,7 @@ contains
 
       place = self%first_detached + 1
       contact = self%detached_contact(place)
+      if (.not. self%record(row_next, contact) > 0.0_wp) call self%draw_undrawn()
       call born(self%parameters, self%record(row_next, contact), stiffness, limit)
       origin = displacement - force / (stiffness + bond)
 
@@ -246,19 +256,166 @@ contains
       end associate
    end subroutine take_hold
 
-   !> Draw the threshold of a contact at its next birth; so early that nothing waits for it.
+   !> See to it that the threshold of a contact at its next birth is drawn, with those of others.
    subroutine draw_next(self, contact, renewal)
       class(contact_set_type), intent(inout) :: self
       integer, intent(in) :: contact
       !> How often it will have been born again then
       real(wp), intent(in) :: renewal
 
-      real(wp) :: uniform(2)
-
-      call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
-         & int(renewal, i8), 0_i8, uniform)
-      self%record(row_next, contact) = self%parameters%law%quantile(uniform(1))
+      ! No threshold is zero: this one is still to be drawn.
+      self%record(row_next, contact) = 0.0_wp
+      self%undrawn_count = self%undrawn_count + 1
+      self%undrawn(self%undrawn_count) = contact
+      self%undrawn_renewal(self%undrawn_count) = int(renewal, i8)
+      if (self%undrawn_count == draws_together) call self%draw_undrawn()
    end subroutine draw_next
+
+   !> Draw the thresholds that are still to be drawn.
+   subroutine draw_undrawn(self)
+      class(contact_set_type), intent(inout) :: self
+
+      integer :: place
+      real(wp) :: uniform(draws_together), threshold(draws_together)
+
+      associate (count => self%undrawn_count)
+         call first_uniforms(self%parameters%seed, self%parameters%realization, &
+            & int(self%undrawn(:count) - 1, i8), self%undrawn_renewal(:count), uniform(:count))
+         call self%parameters%law%quantiles(uniform(:count), threshold(:count))
+         do place = 1, count
+            self%record(row_next, self%undrawn(place)) = threshold(place)
+         end do
+         count = 0
+      end associate
+   end subroutine draw_undrawn
+
+   !> List the next contacts to attach in a schedule, up to a number.
+   subroutine list_attachments(self, most, sense, schedule)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> Greatest number
+      integer, intent(in) :: most
+      !> Sign of the velocity at which they attach
+      real(wp), intent(in) :: sense
+      !> The schedule
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: number, event, place, contact
+      real(wp) :: threshold(most_events), back_force
+
+      number = 0
+      schedule%attach_time(1) = huge(1.0_wp)
+      if (self%parameters%reattach) then
+         number = min(most, self%waiting)
+         place = self%first_detached
+         do event = 1, number
+            contact = self%detached_contact(place + 1)
+            if (.not. self%record(row_next, contact) > 0.0_wp) call self%draw_undrawn()
+            threshold(event) = self%record(row_next, contact)
+            schedule%attach_time(event) = self%detached(row_due, place + 1)
+            schedule%attach_drag(event) = self%detached(row_drag, place + 1)
+            place = place + 1
+            if (place == self%parameters%count) place = 0
+         end do
+         schedule%attach_time(number + 1) = huge(1.0_wp)
+         if (self%waiting > number) then
+            schedule%attach_time(number + 1) = self%detached(row_due, place + 1)
+         end if
+      end if
+      back_force = sense * self%parameters%back_force_ratio * self%parameters%static_force
+      do event = 1, number
+         call born(self%parameters, threshold(event), schedule%attach_stiffness(event), &
+            & schedule%attach_limit(event))
+         schedule%attach_stretch(event) = back_force / schedule%attach_stiffness(event)
+      end do
+      schedule%attachments = number
+      schedule%attached = 0
+      schedule%delay = self%parameters%delay
+      if (.not. self%parameters%reattach) schedule%delay = huge(1.0_wp)
+      schedule%stiffness = self%stiffness
+      schedule%offset = self%offset
+      schedule%drag = self%drag
+      schedule%detached = self%waiting
+      schedule%pinned = self%parameters%count - self%waiting
+   end subroutine list_attachments
+
+   !> Keep the books of the contacts of a schedule that broke.
+   subroutine let_go_listed(self, contact, schedule)
+      !> The contacts
+      class(contact_set_type), intent(inout) :: self
+      !> Numbers of those that broke, in their order
+      integer, intent(in) :: contact(:)
+      !> The schedule
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event, place
+
+      place = self%first_detached + self%waiting
+      do event = 1, schedule%broken
+         if (place >= self%parameters%count) place = place - self%parameters%count
+         self%record(row_stiffness, contact(event)) = 0.0_wp
+         self%record(row_renewal, contact(event)) = self%record(row_renewal, contact(event)) &
+            & + 1.0_wp
+         call self%break_loss%add(0.5_wp * schedule%break_stiffness(event) &
+            & * (schedule%break_displacement(event) - schedule%break_origin(event))**2)
+         self%detached_contact(place + 1) = contact(event)
+         self%detached(row_due, place + 1) = schedule%break_time(event) + self%parameters%delay
+         self%detached(row_drag, place + 1) = schedule%break_drag(event)
+         place = place + 1
+      end do
+      self%breaks = self%breaks + schedule%broken
+      self%waiting = self%waiting + schedule%broken
+      self%stiffness = schedule%stiffness
+      self%offset = schedule%offset
+      self%drag = schedule%drag
+   end subroutine let_go_listed
+
+   !> Keep the books of the contacts of a schedule that attached.
+   subroutine take_hold_listed(self, schedule, contact)
+      !> The contacts, those that broke having let go
+      class(contact_set_type), intent(inout) :: self
+      !> The schedule
+      type(schedule_type), intent(in) :: schedule
+      !> Numbers of those that attached, in their order
+      integer, intent(out) :: contact(:)
+
+      integer :: event
+
+      do event = 1, schedule%attached
+         contact(event) = self%detached_contact(self%first_detached + 1)
+         self%first_detached = self%first_detached + 1
+         if (self%first_detached == self%parameters%count) self%first_detached = 0
+         associate (record => self%record(:, contact(event)))
+            record(row_origin) = schedule%attach_displacement(event) &
+               & - schedule%attach_stretch(event)
+            record(row_stiffness) = schedule%attach_stiffness(event)
+            record(row_limit) = schedule%attach_limit(event)
+            call self%birth_gain%add(0.5_wp * record(row_stiffness) &
+               & * (schedule%attach_displacement(event) - record(row_origin))**2)
+            call self%draw_next(contact(event), record(row_renewal) + 1.0_wp)
+         end associate
+      end do
+      self%waiting = self%waiting - schedule%attached
+      self%next_attachment = huge(1.0_wp)
+      if (self%waiting > 0 .and. self%parameters%reattach) then
+         self%next_attachment = self%detached(row_due, self%first_detached + 1)
+      end if
+   end subroutine take_hold_listed
+
+   !> Drag of a contact while it is detached.
+   pure function drag_of(parameters, stiffness) result(drag)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Stiffness of the contact [N/m]
+      real(wp), intent(in) :: stiffness
+      !> Drag [N s/m]
+      real(wp) :: drag
+
+      drag = parameters%drag
+      if (drag > 0.0_wp .and. parameters%coupling == coupling_scaled) then
+         drag = drag * (stiffness / parameters%stiffness)**2
+      end if
+   end function drag_of
 
    !> Move all origins.
    subroutine shift_records(self, shift)
@@ -373,6 +530,7 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      if (self%undrawn_count > 0) call self%draw_undrawn()
       call exchange_contacts(self, archive)
       call archive%exchange("record", self%record)
       call archive%exchange("detached", self%detached)

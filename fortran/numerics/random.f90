@@ -8,7 +8,7 @@ module mesoslip_numerics_random
    implicit none
    private
 
-   public :: philox4x32, uniform_pair
+   public :: first_uniforms, philox4x32, uniform_pair
 
    integer(i8), parameter :: mask = int(z'FFFFFFFF', i8)
    integer(i8), parameter :: multiplier_0 = int(z'D2511F53', i8)
@@ -73,6 +73,24 @@ contains
       uniform(1) = unit_real(word(0), word(1))
       uniform(2) = unit_real(word(2), word(3))
    end subroutine uniform_pair
+
+   !> The first deviates of the pairs of several contacts.
+   pure subroutine first_uniforms(seed, realization, contact, renewal, uniform)
+      !> Seed of the run, and number of the realization
+      integer(i8), intent(in) :: seed, realization
+      !> Numbers of the contacts, and how often each has been born before
+      integer(i8), intent(in), contiguous :: contact(:), renewal(:)
+      !> The deviates, shape that of contact
+      real(wp), intent(out), contiguous :: uniform(:)
+
+      integer :: place
+      real(wp) :: pair(2)
+
+      do place = 1, size(contact)
+         call uniform_pair(seed, realization, contact(place), renewal(place), 0_i8, pair)
+         uniform(place) = pair(1)
+      end do
+   end subroutine first_uniforms
 
    !> The 64-bit product of an odd 32-bit word and another, in halves.
    !>

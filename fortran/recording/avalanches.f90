@@ -66,6 +66,9 @@ module mesoslip_recording_avalanches
       procedure :: see_advance
       !> Look at the response of the contacts
       procedure :: see_response
+      !> Whether it has to see each advance, and what to make of those that it did not
+      procedure :: sees_each
+      procedure :: pass_over
       !> Close the present avalanche
       procedure :: close
       !> Put the state into an archive or take it out
@@ -150,6 +153,30 @@ contains
       self%breaks = contacts%breaks
       if (.not. slider%instant) call self%close(slider, contacts, slider%displacement)
    end subroutine see_response
+
+   !> Whether there is more to do than to count the avalanches of a slider with inertia.
+   pure function sees_each(self)
+      !> The recorder
+      class(avalanche_recorder_type), intent(in) :: self
+      !> Whether there is
+      logical :: sees_each
+
+      sees_each = self%parameters%least_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
+         & .or. self%parameters%most_avalanches < huge(1_i8) .or. self%taken < size(self%snapshot_time)
+   end function sees_each
+
+   !> Count avalanches that came to an end unseen.
+   subroutine pass_over(self, number, breaks)
+      !> The recorder
+      class(avalanche_recorder_type), intent(inout) :: self
+      !> Their number
+      integer, intent(in) :: number
+      !> Breaks up to now
+      real(wp), intent(in) :: breaks
+
+      self%avalanches = self%avalanches + number
+      self%breaks = breaks
+   end subroutine pass_over
 
    !> An avalanche begins.
    subroutine begin(self, slider, law)

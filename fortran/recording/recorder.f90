@@ -15,6 +15,7 @@ module mesoslip_recording_recorder
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type, slider_type
+   use mesoslip_watch, only: watch_type
    implicit none
    private
 
@@ -93,6 +94,10 @@ module mesoslip_recording_recorder
       procedure :: drain_slip_trace
       !> Record the last advance of a slider
       procedure :: record
+      !> What to look at in a motion that is recorded here and there only, and what to make of the
+      !> rest
+      procedure :: watch
+      procedure :: pass_over
       !> Close a slip at the end of the run
       procedure :: finish
       !> Put the state into an archive or take it out
@@ -190,6 +195,67 @@ contains
          call self%follow_slip(slider, start_excess, excess, detached, breaks)
       end if
    end subroutine record
+
+   !> The first steps of a slider after which record would do more than take note of the velocity.
+   pure function watch(self, slider)
+      !> The recorder
+      class(recorder_type), intent(in) :: self
+      !> The slider
+      class(slider_type), intent(in) :: slider
+      !> What is of interest
+      type(watch_type) :: watch
+
+      watch%time = self%next_sample
+      if (self%parameters%slip_velocity <= 0.0_wp) return
+
+      watch%reference = slider%drive_velocity
+      watch%sense = self%sense
+      select case (self%phase)
+      case (phase_slow)
+         if (abs(slider%drive_velocity) > 0.0_wp) watch%sense = sign(1.0_wp, slider%drive_velocity)
+         watch%upto = 0.0_wp
+         return
+      case (phase_fast)
+         watch%above = 0.0_wp
+         watch%upto = self%parameters%slip_velocity
+      case default
+         watch%peaks = .true.
+         associate (fast => self%parameters%slip_velocity)
+            if (self%last_excess > fast) then
+               watch%above = fast
+            else if (self%last_excess > 0.0_wp) then
+               watch%above = 0.0_wp
+               watch%upto = fast
+            else if (self%last_excess >= -fast) then
+               watch%above = nearest(-fast, -1.0_wp)
+               watch%upto = 0.0_wp
+            else
+               watch%upto = nearest(-fast, -1.0_wp)
+            end if
+            if (abs(self%last_excess) <= fast) then
+               ! A step or two too early does no harm.
+               watch%time = min(watch%time, self%last_fast + self%parameters%quiet_time &
+                  & - 4.0_wp * spacing(self%last_fast + self%parameters%quiet_time))
+            end if
+         end associate
+      end select
+      watch%time = min(watch%time, self%next_slip_sample)
+   end function watch
+
+   !> Take note of steps of a slider that were of no interest.
+   subroutine pass_over(self, watch)
+      !> The recorder
+      class(recorder_type), intent(inout) :: self
+      !> The watch that was kept
+      type(watch_type), intent(in) :: watch
+
+      if (self%parameters%slip_velocity <= 0.0_wp .or. .not. watch%has_passed) return
+      self%last_excess = watch%excess
+      if (self%phase == phase_slow) self%sense = watch%sense
+      if (self%phase /= phase_slip) return
+      self%peak_velocity = max(self%peak_velocity, watch%fastest)
+      if (abs(watch%excess) > self%parameters%slip_velocity) self%last_fast = watch%passed_time
+   end subroutine pass_over
 
    !> Take the samples of the trace that the last advance of a slider came past.
    subroutine take_samples(self, slider, detached)

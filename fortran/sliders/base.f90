@@ -8,6 +8,8 @@ module mesoslip_sliders_base
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_schedule, only: schedule_type
+   use mesoslip_watch, only: watch_type
    implicit none
    private
 
@@ -60,6 +62,8 @@ module mesoslip_sliders_base
       logical :: under_force = .false.
       !> Whether a run that is put away here goes on to the bit
       logical :: can_pause = .true.
+      !> Whether it may run through a schedule, being looked at here and there only
+      logical :: runs_ahead = .false.
       !> Layers whose displacements can be observed
       integer :: layer_count = 0
       !> Cost of an advance over that of a rigid slider
@@ -73,6 +77,8 @@ module mesoslip_sliders_base
       procedure(start_interface), deferred :: start
       !> Move until the first end of a window, or less far
       procedure(advance_interface), deferred :: advance
+      !> Move through a schedule of changes of the contact force
+      procedure :: run_ahead
       !> The motion at a time of the last advance
       procedure(observe_interface), deferred :: observe
       !> Kinetic energy and that of the drive's spring
@@ -139,6 +145,25 @@ module mesoslip_sliders_base
    end interface
 
 contains
+
+   !> Move through a schedule until it ends, or until a step is of interest.
+   subroutine run_ahead(self, schedule, watch)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+      !> What happens on the way; what is due at the end of a step of interest, or after a turn, has
+      !> not happened yet
+      type(schedule_type), intent(inout) :: schedule
+      !> What to stop at
+      type(watch_type), intent(inout) :: watch
+
+      do
+         call self%advance(schedule%law(), schedule%window(self%time))
+         call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
+         if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
+         call schedule%pass(self%time, self%displacement)
+         if (schedule%is_over .or. watch%steps >= watch%most_steps) return
+      end do
+   end subroutine run_ahead
 
    !> Where the slider is.
    pure function pose(self)

@@ -40,6 +40,7 @@ contains
       allocate (self)
       call parameters%finish(error)
       if (allocated(error)) return
+      self%runs_ahead = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_prescribed
 

@@ -101,6 +101,7 @@ contains
       call parameters%take("damping", self%damping, error)
       call parameters%finish(error)
       if (allocated(error)) return
+      self%runs_ahead = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_rigid
 

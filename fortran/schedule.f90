@@ -1,0 +1,173 @@
+!> What will happen while a motion goes on forward: the next breaks and attachments in their order.
+!>
+!> Contacts write a schedule; a slider runs through it and it notes when and where each event came;
+!> contacts read that afterwards and keep their books for many events at once. It knows nothing
+!> but what each event does to the law of the contact force, so that sliders need not know contacts.
+!>
+!> A schedule is never wrong, only short: it ends before anything that it does not know of, and the
+!> numbers of a run do not depend on its length.
+module mesoslip_schedule
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   implicit none
+   private
+
+   public :: schedule_type, most_events
+
+   !> Breaks, and attachments, in the longest schedule
+   integer, parameter :: most_events = 64
+
+   !> Events to come, and those that came.
+   type :: schedule_type
+      !> Breaks and attachments to come
+      integer :: breaks = 0, attachments = 0
+      !> Those that came, and moments in which contacts broke
+      integer :: broken = 0, attached = 0, moments = 0
+      !> Whether it ends here
+      logical :: is_over = .true.
+
+      !> Direction of motion, +1 or -1
+      real(wp) :: direction = 1.0_wp
+      !> Totals of stiffness and stiffness times origin of the pinned, of drag of the detached
+      type(accumulator_type) :: stiffness, offset, drag
+      !> Contacts that are pinned and detached
+      integer :: pinned = 0, detached = 0
+      !> Greatest coordinate at which a contact breaks on the way back [m]
+      real(wp) :: behind = -huge(1.0_wp)
+      !> Time after which a contact that breaks attaches; huge if it does not [s]
+      real(wp) :: delay = 0.0_wp
+      !> Time at which it ends, longest step [s], and distance from the origin at which it ends [m]
+      real(wp) :: end_time = 0.0_wp, longest_step = 0.0_wp, farthest = 0.0_wp
+
+      !> Of each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
+      !> of the contact when it is detached [N s/m]
+      real(wp) :: break_coordinate(most_events) = 0.0_wp, break_stiffness(most_events) = 0.0_wp, &
+         & break_origin(most_events) = 0.0_wp, break_drag(most_events) = 0.0_wp
+      !> When and where it came [s, m]
+      real(wp) :: break_time(most_events) = 0.0_wp, break_displacement(most_events) = 0.0_wp
+      !> Of each attachment: its time [s], with that of the first one that is not in the schedule;
+      !> stiffness [N/m], stretch at first and at breaking [m] and drag until then [N s/m]
+      real(wp) :: attach_time(most_events + 1) = 0.0_wp, attach_stiffness(most_events) = 0.0_wp, &
+         & attach_stretch(most_events) = 0.0_wp, attach_limit(most_events) = 0.0_wp, &
+         & attach_drag(most_events) = 0.0_wp
+      !> Where it came [m]
+      real(wp) :: attach_displacement(most_events) = 0.0_wp
+   contains
+      !> Contact force until the next event, and where and when that is
+      procedure, non_overridable :: law
+      procedure, non_overridable :: window
+      !> Let what is due at a time and a displacement happen
+      procedure, non_overridable :: pass
+      procedure, non_overridable, private :: break_due, attach_due
+   end type schedule_type
+
+contains
+
+   !> Contact force until the next event.
+   pure function law(self)
+      !> The schedule
+      class(schedule_type), intent(in) :: self
+      !> The law
+      type(interface_law_type) :: law
+
+      law%stiffness = self%stiffness%total()
+      law%offset = self%offset%total()
+      law%drag = self%drag%total()
+   end function law
+
+   !> Where the next event is.
+   pure function window(self, time)
+      !> The schedule, not at its end
+      class(schedule_type), intent(in) :: self
+      !> Time now [s]
+      real(wp), intent(in) :: time
+      !> Displacements and time at which the law ends
+      type(window_type) :: window
+
+      if (self%direction > 0.0_wp) then
+         window%upper = self%break_coordinate(self%broken + 1)
+         window%lower = self%behind
+      else
+         window%upper = -self%behind
+         window%lower = -self%break_coordinate(self%broken + 1)
+      end if
+      window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
+         & time + self%longest_step)
+   end function window
+
+   !> Let what is due happen: first contacts break, then contacts attach.
+   subroutine pass(self, time, displacement)
+      !> The schedule
+      class(schedule_type), intent(inout) :: self
+      !> Time [s] and displacement of the slider [m]
+      real(wp), intent(in) :: time, displacement
+
+      if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
+         call self%break_due(time, displacement)
+      end if
+      if (self%attach_time(self%attached + 1) <= time) call self%attach_due(time, displacement)
+      self%is_over = self%broken == self%breaks .or. time >= self%end_time &
+         & .or. self%attach_time(self%attached + 1) <= time .or. abs(displacement) >= self%farthest
+   end subroutine pass
+
+   !> Contacts break.
+   subroutine break_due(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      integer :: event
+
+      do event = self%broken + 1, self%breaks
+         if (self%break_coordinate(event) > self%direction * displacement) exit
+         self%break_time(event) = time
+         self%break_displacement(event) = displacement
+         call self%stiffness%add(-self%break_stiffness(event))
+         call self%offset%add(-self%break_stiffness(event) * self%break_origin(event))
+         if (self%break_drag(event) > 0.0_wp) call self%drag%add(self%break_drag(event))
+      end do
+      ! Those that break now come after all that wait to attach.
+      if (self%broken == 0) then
+         self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
+            & time + self%delay)
+      end if
+      self%moments = self%moments + 1
+      self%pinned = self%pinned - (event - 1 - self%broken)
+      self%detached = self%detached + (event - 1 - self%broken)
+      self%broken = event - 1
+      ! A sum over no contacts has no rounding errors.
+      if (self%pinned == 0) then
+         self%stiffness = accumulator_type()
+         self%offset = accumulator_type()
+      end if
+   end subroutine break_due
+
+   !> Contacts attach. One that would break before another of the schedule cuts it short.
+   subroutine attach_due(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      real(wp) :: origin, ahead
+      integer :: event
+
+      do event = self%attached + 1, self%attachments
+         if (self%attach_time(event) > time) exit
+         self%attach_displacement(event) = displacement
+         origin = displacement - self%attach_stretch(event)
+         call self%drag%add(-self%attach_drag(event))
+         self%pinned = self%pinned + 1
+         self%detached = self%detached - 1
+         if (self%detached == 0) self%drag = accumulator_type()
+         call self%stiffness%add(self%attach_stiffness(event))
+         call self%offset%add(self%attach_stiffness(event) * origin)
+         self%behind = max(self%behind, self%direction * origin - self%attach_limit(event))
+         ahead = self%direction * origin + self%attach_limit(event)
+         do while (self%breaks > self%broken)
+            if (self%break_coordinate(self%breaks) < ahead) exit
+            self%breaks = self%breaks - 1
+         end do
+      end do
+      self%attached = event - 1
+   end subroutine attach_due
+
+end module mesoslip_schedule

@@ -233,6 +233,7 @@ contains
             if (.not. turns) call self%schedule%pass(self%slider%time, self%slider%displacement)
          end if
          if (turns .or. self%schedule%is_over .or. self%advances >= last) exit
+         if (self%recorder%is_full()) exit
       end do
       call self%contacts%settle(self%schedule, self%slider%pose())
       call self%avalanches%pass_over(self%schedule%moments, self%contacts%breaks)

@@ -22,6 +22,9 @@ module mesoslip_sliders_rigid
    integer, parameter :: few_terms = 6, some_terms = 10, most_terms = 17
    real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 8.0e-2_wp, longest_step = 0.5_wp
 
+   !> Length of a step of few terms in units of a bound on the fastest rate, in the short way.
+   real(wp), parameter :: gliding_step = 3.0e-3_wp
+
    !> For the procedures of motion_series.inc
    integer, parameter :: longest_series = most_terms
    integer :: i
@@ -50,6 +53,9 @@ module mesoslip_sliders_rigid
    type :: system_type
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
       real(wp) :: inverse_mass, stiffness, drag, spring
+      !> Coefficients of the equation of the third order: 2 eta_S + C/M [1/s], (K + K_c)/M
+      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3]
+      real(wp) :: first, second, third
       !> How far the drive is ahead of the slider at the start of a step [m]
       real(wp) :: drive_gap
    end type system_type
@@ -138,10 +144,9 @@ contains
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
 
-      real(wp) :: rate, step, gap
       type(system_type) :: system
       type(motion_rates_type) :: early
-      logical :: ends, is_done
+      logical :: is_done
 
       self%law = law
       self%step_time = self%time
@@ -151,37 +156,15 @@ contains
       system%stiffness = (self%stiffness + law%stiffness) * system%inverse_mass
       system%drag = law%drag * system%inverse_mass
       system%spring = self%stiffness * system%inverse_mass
+      system%first = 2.0_wp * self%damping + system%drag
+      system%second = system%stiffness + system%drag * self%damping
+      system%third = system%stiffness * self%damping
       system%drive_gap = self%drive_displacement - self%displacement &
          & + self%drive_velocity * (self%time - self%drive_time)
-      rate = sqrt(abs(system%stiffness)) + system%drag + 2.0_wp * self%damping
       early = rates(self, system, system%drive_gap)
 
-      call glide(self, system, window, early, rate, is_done)
-      if (is_done) return
-
-      step = window%end_time - self%time
-      ends = step * rate <= longest_step
-      if (.not. ends) step = longest_step / rate
-      ! Most steps end at a break: no need for a series that reaches farther.
-      if (self%velocity > 0.0_wp) then
-         gap = window%upper - self%displacement
-      else
-         gap = self%displacement - window%lower
-      end if
-      if (gap < 0.5_wp * abs(self%velocity) * step) then
-         step = 2.0_wp * gap / abs(self%velocity)
-         ends = .false.
-      end if
-
-      if (.not. step > 0.0_wp) return
-      ! The number of terms is a constant in each call: the compiler makes a copy for each.
-      if (rate * step <= short_step) then
-         call move(self, system, window, early, step, ends, few_terms)
-      else if (rate * step <= middling_step) then
-         call move(self, system, window, early, step, ends, some_terms)
-      else
-         call move(self, system, window, early, step, ends, most_terms)
-      end if
+      call glide(self, system, window, early, is_done)
+      if (.not. is_done) call move_on(self, system, window, early)
    end subroutine step_on
 
    !> The short way: a step that a short series covers and in which the slider keeps its pace.
@@ -189,20 +172,19 @@ contains
    !> With p the time in which the way to the next break would be made at the present velocity, the
    !> series of the displacement is way/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion
    !> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), to rounding
-   !> or nearly so. Other steps, one in ten, are left to move.
-   subroutine glide(self, system, window, early, rate, is_done)
+   !> or nearly so. Other steps, one in ten, are left to move_on.
+   subroutine glide(self, system, window, early, is_done)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
-      !> Fastest rate of the system [1/s]
-      real(wp), intent(in) :: rate
       !> Whether the step was made; if not, nothing has changed but the series
       logical, intent(out) :: is_done
 
-      real(wp) :: target, way, pace, rest, passage, step, change, a_2, a_3, a_4, a_5, inverse_pace
-      logical :: crosses
+      real(wp) :: target, way, pace, rest, passage, longest, step, change
+      real(wp) :: a_2, a_3, a_4, a_5, inverse_pace
+      logical :: crosses, nears
       integer :: term
 
       is_done = .false.
@@ -212,11 +194,20 @@ contains
       rest = window%end_time - self%time
       if (.not. (pace > 0.0_wp .and. way > 0.0_wp .and. rest > 0.0_wp)) return
 
-      if (way < 2.0_wp * pace * rest) then
-         inverse_pace = 1.0_wp / early%velocity
+      nears = way < 2.0_wp * pace * rest
+      inverse_pace = 1.0_wp / early%velocity
+      longest = rest
+      passage = rest
+      if (nears) then
          passage = way * abs(inverse_pace)
-         if (rate * min(passage, rest) > 0.99_wp * short_step) return
-         call expand(self, system, early, few_terms)
+         longest = min(rest, passage)
+      end if
+      ! Twice the sum of squares exceeds the square of the fastest rate.
+      if (longest**2 * (2.0_wp * abs(system%stiffness) &
+         & + 2.0_wp * (system%drag + 2.0_wp * self%damping)**2) > gliding_step**2) return
+
+      call expand(self, system, early, few_terms)
+      if (nears) then
          change = passage * inverse_pace
          a_2 = inverse(2) * self%series(1) * change
          change = change * passage
@@ -235,8 +226,6 @@ contains
          if (.not. crosses) step = rest
       else
          ! Too far from any break to come to it in the time that is left.
-         if (rate * rest > short_step) return
-         call expand(self, system, early, few_terms)
          change = 0.0_wp
          do term = few_terms - 1, 1, -1
             change = (change + abs(self%series(term))) * rest
@@ -268,6 +257,43 @@ contains
       change = (integral(series, few_terms, time) - sign(way, velocity)) / velocity
       better = time - change * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
    end function nearer
+
+   !> Any way: a step as long as a series reaches, or shorter.
+   subroutine move_on(self, system, window, early)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      type(window_type), intent(in) :: window
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+
+      real(wp) :: rate, step, gap
+      logical :: ends
+
+      rate = sqrt(abs(system%stiffness)) + system%drag + 2.0_wp * self%damping
+      step = window%end_time - self%time
+      ends = step * rate <= longest_step
+      if (.not. ends) step = longest_step / rate
+      ! Most steps end at a break: no need for a series that reaches farther.
+      if (self%velocity > 0.0_wp) then
+         gap = window%upper - self%displacement
+      else
+         gap = self%displacement - window%lower
+      end if
+      if (gap < 0.5_wp * abs(self%velocity) * step) then
+         step = 2.0_wp * gap / abs(self%velocity)
+         ends = .false.
+      end if
+
+      if (.not. step > 0.0_wp) return
+      ! The number of terms is a constant in each call: the compiler makes a copy for each.
+      if (rate * step <= short_step) then
+         call move(self, system, window, early, step, ends, few_terms)
+      else if (rate * step <= middling_step) then
+         call move(self, system, window, early, step, ends, some_terms)
+      else
+         call move(self, system, window, early, step, ends, most_terms)
+      end if
+   end subroutine move_on
 
    !> Any way: move for a step, or to the first end of the window or turning point within it.
    subroutine move(self, system, window, early, longest, ends, terms)
@@ -391,21 +417,18 @@ contains
       type(motion_rates_type), intent(in) :: early
       integer, intent(in) :: terms
 
-      real(wp) :: first, second, third, driving
+      real(wp) :: driving
       integer :: term
 
-      first = 2.0_wp * self%damping + system%drag
-      second = system%stiffness + system%drag * self%damping
-      third = system%stiffness * self%damping
       driving = self%damping * system%spring * self%drive_velocity
       self%series(0) = early%velocity
       self%series(1) = early%acceleration
       self%series(2) = 0.5_wp * early%jerk
       do term = 3, terms - 1
-         self%series(term) = inverse(term) * ((driving - third * self%series(term - 3)) &
+         self%series(term) = inverse(term) * ((driving - system%third * self%series(term - 3)) &
             & * (inverse(term - 1) * inverse(term - 2)) &
-            & - (second * inverse(term - 1)) * self%series(term - 2) &
-            & - first * self%series(term - 1))
+            & - (system%second * inverse(term - 1)) * self%series(term - 2) &
+            & - system%first * self%series(term - 1))
          driving = 0.0_wp
       end do
    end subroutine expand

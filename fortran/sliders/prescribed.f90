@@ -5,6 +5,8 @@ module mesoslip_sliders_prescribed
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_schedule, only: schedule_type
+   use mesoslip_watch, only: watch_type
    use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
       & exchange_law
    implicit none
@@ -19,6 +21,7 @@ module mesoslip_sliders_prescribed
    contains
       procedure :: start
       procedure :: advance
+      procedure :: run_ahead
       procedure :: observe
       procedure :: energy
       procedure :: exchange
@@ -65,6 +68,33 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
+      call step_on(self, law, window)
+   end subroutine advance
+
+   !> Move through a schedule until it ends, or until a step is of interest.
+   subroutine run_ahead(self, schedule, watch)
+      !> The slider
+      class(slider_prescribed_type), intent(inout) :: self
+      !> What happens on the way
+      type(schedule_type), intent(inout) :: schedule
+      !> What to stop at
+      type(watch_type), intent(inout) :: watch
+
+      do
+         call step_on(self, schedule%law(), schedule%window(self%time))
+         call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
+         if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
+         call schedule%pass(self%time, self%displacement)
+         if (schedule%is_over .or. watch%steps >= watch%most_steps) return
+      end do
+   end subroutine run_ahead
+
+   !> One step.
+   pure subroutine step_on(self, law, window)
+      type(slider_prescribed_type), intent(inout) :: self
+      type(interface_law_type), intent(in) :: law
+      type(window_type), intent(in) :: window
+
       real(wp) :: limit, start, step, arrival
 
       self%law = law
@@ -89,7 +119,7 @@ contains
       call self%drive_work%add(step * (law%stiffness * (start + 0.5_wp * step) - law%offset &
          & + law%drag * self%velocity))
       call self%drag_loss%add(step * law%drag * self%velocity)
-   end subroutine advance
+   end subroutine step_on
 
    !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)

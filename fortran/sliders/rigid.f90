@@ -10,6 +10,8 @@ module mesoslip_sliders_rigid
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_schedule, only: schedule_type
+   use mesoslip_watch, only: watch_type
    use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
       & exchange_law
    implicit none
@@ -17,10 +19,11 @@ module mesoslip_sliders_rigid
 
    public :: slider_rigid_type, make_slider_rigid
 
-   !> Terms of the series for short, middling and long steps, and the lengths of these in units of
-   !> the fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
-   integer, parameter :: few_terms = 6, some_terms = 10, most_terms = 17
-   real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 8.0e-2_wp, longest_step = 0.5_wp
+   !> Terms of the series for shorter and longer steps, and the lengths of these in units of the
+   !> fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
+   integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, most_terms = 17
+   real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, &
+      & longest_step = 0.8_wp
 
    !> Length of a step of few terms in units of a bound on the fastest rate, in the short way.
    real(wp), parameter :: gliding_step = 3.0e-3_wp
@@ -38,6 +41,9 @@ module mesoslip_sliders_rigid
    real(wp), parameter :: fair_a_2 = 2.0e-2_wp, fair_a_3 = 1.0e-3_wp
 
    !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
+   real(wp), parameter :: point_3(3) = [0.11270166537925831148_wp, 0.5_wp, &
+      & 0.88729833462074168852_wp]
+   real(wp), parameter :: weight_3(3) = [5.0_wp / 18.0_wp, 4.0_wp / 9.0_wp, 5.0_wp / 18.0_wp]
    real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
       & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
    real(wp), parameter :: weight_4(4) = [0.17392742256872692869_wp, 0.32607257743127307131_wp, &
@@ -54,8 +60,8 @@ module mesoslip_sliders_rigid
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
       real(wp) :: inverse_mass, stiffness, drag, spring
       !> Coefficients of the equation of the third order: 2 eta_S + C/M [1/s], (K + K_c)/M
-      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3]
-      real(wp) :: first, second, third
+      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3], and eta_S K/M times the drive's velocity
+      real(wp) :: first, second, third, driving
       !> How far the drive is ahead of the slider at the start of a step [m]
       real(wp) :: drive_gap
    end type system_type
@@ -83,6 +89,7 @@ module mesoslip_sliders_rigid
    contains
       procedure :: start
       procedure :: advance
+      procedure :: run_ahead
       procedure :: observe
       procedure :: energy
       procedure :: exchange
@@ -138,6 +145,24 @@ contains
       call step_on(self, law, window)
    end subroutine advance
 
+   !> Move through a schedule until it ends, or until a step is of interest.
+   subroutine run_ahead(self, schedule, watch)
+      !> The slider
+      class(slider_rigid_type), intent(inout) :: self
+      !> What happens on the way
+      type(schedule_type), intent(inout) :: schedule
+      !> What to stop at
+      type(watch_type), intent(inout) :: watch
+
+      do
+         call step_on(self, schedule%law(), schedule%window(self%time))
+         call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
+         if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
+         call schedule%pass(self%time, self%displacement)
+         if (schedule%is_over .or. watch%steps >= watch%most_steps) return
+      end do
+   end subroutine run_ahead
+
    !> One step: by the short way, which nearly all steps between two events can take, or by any.
    subroutine step_on(self, law, window)
       type(slider_rigid_type), intent(inout) :: self
@@ -159,6 +184,7 @@ contains
       system%first = 2.0_wp * self%damping + system%drag
       system%second = system%stiffness + system%drag * self%damping
       system%third = system%stiffness * self%damping
+      system%driving = self%damping * system%spring * self%drive_velocity
       system%drive_gap = self%drive_displacement - self%displacement &
          & + self%drive_velocity * (self%time - self%drive_time)
       early = rates(self, system, system%drive_gap)
@@ -183,7 +209,7 @@ contains
       logical, intent(out) :: is_done
 
       real(wp) :: target, way, pace, rest, passage, longest, step, change
-      real(wp) :: a_2, a_3, a_4, a_5, inverse_pace
+      real(wp) :: a_2, a_3, a_4, a_5, inverse_pace, series(0:few_terms - 1)
       logical :: crosses, nears
       integer :: term
 
@@ -206,29 +232,29 @@ contains
       if (longest**2 * (2.0_wp * abs(system%stiffness) &
          & + 2.0_wp * (system%drag + 2.0_wp * self%damping)**2) > gliding_step**2) return
 
-      call expand(self, system, early, few_terms)
+      call expand(system, early, few_terms, series)
       if (nears) then
          change = passage * inverse_pace
-         a_2 = inverse(2) * self%series(1) * change
+         a_2 = inverse(2) * series(1) * change
          change = change * passage
-         a_3 = inverse(3) * self%series(2) * change
+         a_3 = inverse(3) * series(2) * change
          change = change * passage
-         a_4 = inverse(4) * self%series(3) * change
-         a_5 = inverse(5) * self%series(4) * (change * passage)
+         a_4 = inverse(4) * series(3) * change
+         a_5 = inverse(5) * series(4) * (change * passage)
          if (abs(a_2) > fair_a_2 .or. abs(a_3) > fair_a_3) return
          step = passage - passage * (a_2 - (2.0_wp * a_2**2 - a_3) &
             & + (a_2 * (5.0_wp * a_2**2 - 5.0_wp * a_3) + a_4) &
             & - (7.0_wp * a_2**2 * (2.0_wp * a_2**2 - 3.0_wp * a_3) + 6.0_wp * a_2 * a_4 &
             & + 3.0_wp * a_3**2 - a_5))
          if (abs(a_2) > most_a_2 .or. abs(a_3) > most_a_3 .or. abs(a_4) > most_a_4 &
-            & .or. abs(a_5) > most_a_5) step = nearer(self%series, way, step)
+            & .or. abs(a_5) > most_a_5) step = nearer(series, way, step)
          crosses = step <= rest
          if (.not. crosses) step = rest
       else
          ! Too far from any break to come to it in the time that is left.
          change = 0.0_wp
          do term = few_terms - 1, 1, -1
-            change = (change + abs(self%series(term))) * rest
+            change = (change + abs(series(term))) * rest
          end do
          if (.not. change < 0.5_wp * pace) return
          crosses = .false.
@@ -237,8 +263,9 @@ contains
 
       is_done = .true.
       self%terms = few_terms
-      call arrive(self, system, window, early, step, crosses, target, .not. crosses, .false., &
-         & few_terms)
+      self%series(:few_terms - 1) = series
+      call arrive(self, few_terms, series, system, window, early, step, crosses, target, &
+         & .not. crosses, .false.)
    end subroutine glide
 
    !> A time of a crossing made exact by one step of Halley's method, the error of which is cubic.
@@ -290,6 +317,8 @@ contains
          call move(self, system, window, early, step, ends, few_terms)
       else if (rate * step <= middling_step) then
          call move(self, system, window, early, step, ends, some_terms)
+      else if (rate * step <= long_step) then
+         call move(self, system, window, early, step, ends, many_terms)
       else
          call move(self, system, window, early, step, ends, most_terms)
       end if
@@ -309,12 +338,13 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, change, reach, target, sense
+      real(wp) :: step, change, reach, target, sense, series(0:most_terms - 1)
       logical :: crosses, turns
       integer :: term
 
-      call expand(self, system, early, terms)
+      call expand(system, early, terms, series)
       self%terms = terms
+      self%series(:terms - 1) = series(:terms - 1)
 
       step = longest
       crosses = .false.
@@ -322,22 +352,25 @@ contains
       target = 0.0_wp
       change = 0.0_wp
       do term = terms - 1, 1, -1
-         change = (change + abs(self%series(term))) * step
+         change = (change + abs(series(term))) * step
       end do
-      reach = (abs(self%series(0)) + change) * step
+      reach = (abs(series(0)) + change) * step
       if (.not. reach < min(window%upper - self%displacement, &
          & self%displacement - window%lower)) then
-         call first_end(self%series, terms, window%upper - self%displacement, &
+         call first_end(series, terms, window%upper - self%displacement, &
             & window%lower - self%displacement, change, step, crosses, turns, sense)
          target = merge(window%upper, window%lower, sense > 0.0_wp)
       end if
-      call arrive(self, system, window, early, step, crosses, target, &
-         & ends .and. .not. (crosses .or. turns) .and. step >= longest, turns, terms)
+      call arrive(self, terms, series(:terms - 1), system, window, early, step, crosses, target, &
+         & ends .and. .not. (crosses .or. turns) .and. step >= longest, turns)
    end subroutine move
 
    !> Come to the end of a step whose series is known.
-   subroutine arrive(self, system, window, early, step, crosses, target, ends, turns, terms)
+   subroutine arrive(self, terms, series, system, window, early, step, crosses, target, ends, turns)
       type(slider_rigid_type), intent(inout) :: self
+      !> Terms of the series, and the series
+      integer, intent(in) :: terms
+      real(wp), intent(in) :: series(0:terms - 1)
       type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
       !> The motion at the start of the step
@@ -349,15 +382,13 @@ contains
       real(wp), intent(in) :: target
       !> Whether it comes to the end of the window's time, or to a turning point
       logical, intent(in) :: ends, turns
-      !> Terms of the series
-      integer, intent(in) :: terms
 
       real(wp) :: drive_gap, way, swept, extension
       type(motion_rates_type) :: late
 
-      way = integral(self%series, terms, step)
-      swept = second_integral(self%series, terms, step)
-      self%velocity = horner(self%series, terms, step)
+      way = integral(series, terms, step)
+      swept = second_integral(series, terms, step)
+      self%velocity = horner(series, terms, step)
       if (turns) self%velocity = 0.0_wp
       if (crosses) then
          self%displacement = target
@@ -410,25 +441,26 @@ contains
    !> Taylor coefficients of the velocity.
    !>
    !> Without its running mean, S40 with S41 is an equation of the third order for the velocity.
-   pure subroutine expand(self, system, early, terms)
-      type(slider_rigid_type), intent(inout) :: self
+   pure subroutine expand(system, early, terms, series)
       type(system_type), intent(in) :: system
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
       integer, intent(in) :: terms
+      !> The coefficients
+      real(wp), intent(out) :: series(0:terms - 1)
 
       real(wp) :: driving
       integer :: term
 
-      driving = self%damping * system%spring * self%drive_velocity
-      self%series(0) = early%velocity
-      self%series(1) = early%acceleration
-      self%series(2) = 0.5_wp * early%jerk
+      driving = system%driving
+      series(0) = early%velocity
+      series(1) = early%acceleration
+      series(2) = 0.5_wp * early%jerk
       do term = 3, terms - 1
-         self%series(term) = inverse(term) * ((driving - system%third * self%series(term - 3)) &
+         series(term) = inverse(term) * ((driving - system%third * series(term - 3)) &
             & * (inverse(term - 1) * inverse(term - 2)) &
-            & - (system%second * inverse(term - 1)) * self%series(term - 2) &
-            & - system%first * self%series(term - 1))
+            & - (system%second * inverse(term - 1)) * series(term - 2) &
+            & - system%first * series(term - 1))
          driving = 0.0_wp
       end do
    end subroutine expand
@@ -456,6 +488,8 @@ contains
             & + early%damper * early%acceleration - late%damper_rate * late%velocity &
             & - late%damper * late%acceleration))
       case (some_terms)
+         call integrate_losses(self, early%damper, step, terms, point_3, weight_3, square, damped)
+      case (many_terms)
          call integrate_losses(self, early%damper, step, terms, point_4, weight_4, square, damped)
       case default
          call integrate_losses(self, early%damper, step, terms, point_6, weight_6, square, damped)
@@ -509,6 +543,8 @@ contains
          call evaluate(self%series, few_terms, step, displacement, motion%velocity)
       case (some_terms)
          call evaluate(self%series, some_terms, step, displacement, motion%velocity)
+      case (many_terms)
+         call evaluate(self%series, many_terms, step, displacement, motion%velocity)
       case default
          call evaluate(self%series, most_terms, step, displacement, motion%velocity)
       end select

@@ -22,11 +22,8 @@ module mesoslip_sliders_rigid
    !> Terms of the series for shorter and longer steps, and the lengths of these in units of the
    !> fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
    integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, most_terms = 17
-   real(wp), parameter :: short_step = 2.0e-3_wp, middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, &
+   real(wp), parameter :: short_step = 3.0e-3_wp, middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, &
       & longest_step = 0.8_wp
-
-   !> Length of a step of few terms in units of a bound on the fastest rate, in the short way.
-   real(wp), parameter :: gliding_step = 3.0e-3_wp
 
    !> For the procedures of motion_series.inc
    integer, parameter :: longest_series = most_terms
@@ -230,7 +227,7 @@ contains
       end if
       ! Twice the sum of squares exceeds the square of the fastest rate.
       if (longest**2 * (2.0_wp * abs(system%stiffness) &
-         & + 2.0_wp * (system%drag + 2.0_wp * self%damping)**2) > gliding_step**2) return
+         & + 2.0_wp * (system%drag + 2.0_wp * self%damping)**2) > short_step**2) return
 
       call expand(system, early, few_terms, series)
       if (nears) then
@@ -264,8 +261,18 @@ contains
       is_done = .true.
       self%terms = few_terms
       self%series(:few_terms - 1) = series
-      call arrive(self, few_terms, series, system, window, early, step, crosses, target, &
-         & .not. crosses, .false.)
+      if (crosses) then
+         way = target - self%displacement
+         self%displacement = target
+         self%time = self%time + step
+      else
+         way = integral(series, few_terms, step)
+         self%displacement = self%displacement + way
+         self%time = window%end_time
+      end if
+      self%velocity = horner(series, few_terms, step)
+      ! A share of (rate times step)**2 of the balance of momentum: four terms do.
+      call balance(self, system, early, step, way, second_integral(series, 4, step), few_terms)
    end subroutine glide
 
    !> A time of a crossing made exact by one step of Halley's method, the error of which is cubic.
@@ -313,9 +320,7 @@ contains
 
       if (.not. step > 0.0_wp) return
       ! The number of terms is a constant in each call: the compiler makes a copy for each.
-      if (rate * step <= short_step) then
-         call move(self, system, window, early, step, ends, few_terms)
-      else if (rate * step <= middling_step) then
+      if (rate * step <= middling_step) then
          call move(self, system, window, early, step, ends, some_terms)
       else if (rate * step <= long_step) then
          call move(self, system, window, early, step, ends, many_terms)
@@ -338,7 +343,7 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, change, reach, target, sense, series(0:most_terms - 1)
+      real(wp) :: step, way, change, reach, target, sense, series(0:most_terms - 1)
       logical :: crosses, turns
       integer :: term
 
@@ -361,45 +366,38 @@ contains
             & window%lower - self%displacement, change, step, crosses, turns, sense)
          target = merge(window%upper, window%lower, sense > 0.0_wp)
       end if
-      call arrive(self, terms, series(:terms - 1), system, window, early, step, crosses, target, &
-         & ends .and. .not. (crosses .or. turns) .and. step >= longest, turns)
-   end subroutine move
-
-   !> Come to the end of a step whose series is known.
-   subroutine arrive(self, terms, series, system, window, early, step, crosses, target, ends, turns)
-      type(slider_rigid_type), intent(inout) :: self
-      !> Terms of the series, and the series
-      integer, intent(in) :: terms
-      real(wp), intent(in) :: series(0:terms - 1)
-      type(system_type), intent(in) :: system
-      type(window_type), intent(in) :: window
-      !> The motion at the start of the step
-      type(motion_rates_type), intent(in) :: early
-      !> Length of the step [s]
-      real(wp), intent(in) :: step
-      !> Whether it comes to an end of the window, and the displacement there [m]
-      logical, intent(in) :: crosses
-      real(wp), intent(in) :: target
-      !> Whether it comes to the end of the window's time, or to a turning point
-      logical, intent(in) :: ends, turns
-
-      real(wp) :: drive_gap, way, swept, extension
-      type(motion_rates_type) :: late
 
       way = integral(series, terms, step)
-      swept = second_integral(series, terms, step)
-      self%velocity = horner(series, terms, step)
-      if (turns) self%velocity = 0.0_wp
       if (crosses) then
          self%displacement = target
       else
          self%displacement = self%displacement + way
       end if
-      if (ends) then
+      if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
          self%time = window%end_time
       else
          self%time = self%time + step
       end if
+      self%velocity = horner(series, terms, step)
+      if (turns) self%velocity = 0.0_wp
+      call balance(self, system, early, step, way, second_integral(series, terms, step), terms)
+   end subroutine move
+
+   !> The mean velocity after a step, and the balance of energy.
+   subroutine balance(self, system, early, step, way, swept, terms)
+      !> The slider, where it is at the end of the step
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+      !> Length of the step [s], way in it [m], and the integral of the way over the time [m s]
+      real(wp), intent(in) :: step, way, swept
+      !> Terms of the series
+      integer, intent(in) :: terms
+
+      real(wp) :: drive_gap, extension
+      type(motion_rates_type) :: late
+
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
 
       extension = step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept
@@ -418,7 +416,7 @@ contains
       self%start_acceleration = early%acceleration
       call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
       call add_losses(self, early, late, step, terms)
-   end subroutine arrive
+   end subroutine balance
 
    !> Velocity and its derivatives, from the equation of motion.
    pure function rates(self, system, drive_gap) result(motion)

@@ -37,8 +37,10 @@ module mesoslip_schedule
       real(wp) :: behind = -huge(1.0_wp)
       !> Time after which a contact that breaks attaches; huge if it does not [s]
       real(wp) :: delay = 0.0_wp
-      !> Time at which it ends, longest step [s], and distance from the origin at which it ends [m]
-      real(wp) :: end_time = 0.0_wp, longest_step = 0.0_wp, farthest = 0.0_wp
+      !> Time at which it ends, and longest step [s]
+      real(wp) :: end_time = 0.0_wp, longest_step = 0.0_wp
+      !> Mean stiffness of a contact [N/m], and what it bears at the displacement at which it ends [N]
+      real(wp) :: mean_stiffness = 0.0_wp, farthest_force = 0.0_wp
 
       !> Of each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
       !> of the contact when it is detached [N s/m]
@@ -108,7 +110,8 @@ contains
       end if
       if (self%attach_time(self%attached + 1) <= time) call self%attach_due(time, displacement)
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
-         & .or. self%attach_time(self%attached + 1) <= time .or. abs(displacement) >= self%farthest
+         & .or. self%attach_time(self%attached + 1) <= time &
+         & .or. abs(displacement) * self%mean_stiffness >= self%farthest_force
    end subroutine pass
 
    !> Contacts break.

@@ -93,7 +93,7 @@ module mesoslip_simulation
       !> Whether all parts are there
       procedure :: is_whole
       procedure, private :: advance, advance_once, run_ahead, change_stage, follow, finish, &
-         & is_broken, slides, longest_step, farthest
+         & is_broken, slides, longest_step
    end type simulation_type
 
 contains
@@ -218,7 +218,8 @@ contains
 
       self%schedule%end_time = self%stage_end(self%stage)
       self%schedule%longest_step = self%longest_step()
-      self%schedule%farthest = self%farthest()
+      self%schedule%mean_stiffness = self%contacts%parameters%stiffness
+      self%schedule%farthest_force = farthest_stretches * self%contacts%parameters%static_force
       before = self%slider%pose()
       do
          watch = self%recorder%watch(self%slider)
@@ -369,22 +370,14 @@ contains
       self%ending = ending
    end subroutine finish
 
-   !> Distance of the slider from the origin of displacements at which this is moved [m].
-   pure function farthest(self) result(distance)
-      class(simulation_type), intent(in) :: self
-      real(wp) :: distance
-
-      distance = farthest_stretches * self%contacts%parameters%static_force &
-         & / self%contacts%parameters%stiffness
-   end function farthest
-
    !> Move the origin of displacements along with the slider.
    subroutine follow(self)
       class(simulation_type), intent(inout) :: self
 
       real(wp) :: grid, shift
 
-      if (abs(self%slider%displacement) < self%farthest()) return
+      if (abs(self%slider%displacement) * self%contacts%parameters%stiffness &
+         & < farthest_stretches * self%contacts%parameters%static_force) return
       ! On a grid of powers of two the origin and the new displacement have no rounding error.
       grid = scale(1.0_wp, &
          & exponent(self%contacts%parameters%static_force / self%contacts%parameters%stiffness))

@@ -13,6 +13,7 @@ program test_simulation
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_parameters_type
+   use mesoslip_schedule, only: most_events
    use mesoslip_simulation, only: ending_drive, energy_length, simulation_type
    use mesoslip_sliders, only: make_slider
    use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
@@ -39,6 +40,11 @@ program test_simulation
    call goes_on("lattice", "quasistatic", solver_series)
    call goes_on("populations", "rigid", solver_series)
    call goes_on("populations", "layered", solver_series)
+   call runs_ahead("rigid", law_gaussian, 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("rigid", law_exponential, 1.0_wp, 5.0e-4_wp)
+   call runs_ahead("rigid", law_exponential, 1.0_wp, 0.0_wp)
+   call runs_ahead("prescribed", law_gaussian, 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("prescribed", law_exponential, 1.0_wp, 1.0e-5_wp)
    call refuses()
    call holds()
    call finish()
@@ -151,6 +157,75 @@ contains
             & "what is recorded is the same: " // name // ", " // trim(tables(table)))
       end do
    end subroutine goes_on
+
+   !> A run is the same to the bit whatever the length of its schedules, none at all included, and
+   !> wherever it is cut, put away and taken up again.
+   subroutine runs_ahead(slider, law, width, delay)
+      character(len=*), intent(in) :: slider
+      integer, intent(in) :: law
+      real(wp), intent(in) :: width, delay
+
+      integer, parameter :: lengths(6) = [1, 2, 7, 32, 64, 64]
+      type(simulation_type) :: whole
+      type(simulation_type), allocatable :: now, next
+      type(error_type), allocatable :: error
+      integer(i8), allocatable :: words(:)
+      integer(i8) :: length
+      integer :: number, segment, table
+      character(len=:), allocatable :: name
+      character(len=10), parameter :: tables(3) = [character(len=10) :: &
+         & "trace", "slip_trace", "slips"]
+
+      call prepare(whole, slider, law, width, delay, 0)
+      call whole%start(initial_steady)
+      call whole%run(forever, any_work, error)
+      do number = 1, size(lengths)
+         name = slider // ", length " // achar(iachar("0") + lengths(number) / 10) &
+            & // achar(iachar("0") + modulo(lengths(number), 10))
+         allocate (now)
+         call prepare(now, slider, law, width, delay, lengths(number))
+         call now%start(initial_steady)
+         if (number < size(lengths)) call now%run(forever, any_work, error)
+         do segment = 1, 100000
+            if (allocated(error) .or. now%ending == ending_drive) exit
+            call now%run(int(1 + segment**3 / 8, i8), any_work, error)
+            call now%save(length, error)
+            allocate (words(length))
+            call now%fetch(words, error)
+            allocate (next)
+            call prepare(next, slider, law, width, delay, modulo(segment, most_events))
+            call next%restore(words, error)
+            deallocate (words)
+            deallocate (now)
+            call move_alloc(next, now)
+         end do
+         call check(.not. allocated(error) .and. now%ending == ending_drive, &
+            & "a run with schedules ends: " // name)
+         call check(all(abs(now%energy_balance() - whole%energy_balance()) <= 0.0_wp) &
+            & .and. now%advances == whole%advances &
+            & .and. now%avalanches%avalanches == whole%avalanches%avalanches, &
+            & "schedules do not change a run: " // name)
+         do table = 1, size(tables)
+            call check(same(now%table(trim(tables(table))), whole%table(trim(tables(table)))), &
+               & "what is recorded is the same: " // name // ", " // trim(tables(table)))
+         end do
+         deallocate (now)
+      end do
+      call check(whole%contacts%breaks > 10 * count, "many contacts break: " // slider)
+   end subroutine runs_ahead
+
+   !> Klein's case with schedules of a length, and nothing recorded that needs each event.
+   subroutine prepare(simulation, slider, law, width, delay, longest)
+      type(simulation_type), intent(out) :: simulation
+      character(len=*), intent(in) :: slider
+      integer, intent(in) :: law, longest
+      real(wp), intent(in) :: width, delay
+
+      call build(simulation, "ensemble", slider, law, width, coupling_scaled, solver_series)
+      simulation%contacts%parameters%delay = delay
+      call simulation%avalanches%open(avalanche_parameters_type(), [real(wp) ::], count)
+      simulation%longest_schedule = longest
+   end subroutine prepare
 
    !> Whether two tables are the same to the bit.
    function same(one, other)

@@ -23,7 +23,7 @@ module mesoslip_sliders_rigid
    !> fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
    integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, most_terms = 17
    real(wp), parameter :: short_step = 3.0e-3_wp, middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, &
-      & longest_step = 0.8_wp
+      & longest_step = 0.5_wp
 
    !> For the procedures of motion_series.inc
    integer, parameter :: longest_series = most_terms

@@ -39,7 +39,7 @@ module mesoslip_schedule
       real(wp) :: delay = 0.0_wp
       !> Time at which it ends, and longest step [s]
       real(wp) :: end_time = 0.0_wp, longest_step = 0.0_wp
-      !> Mean stiffness of a contact [N/m], and what it bears at the displacement at which it ends [N]
+      !> Mean stiffness of a contact [N/m], and its force at the displacement at which it ends [N]
       real(wp) :: mean_stiffness = 0.0_wp, farthest_force = 0.0_wp
 
       !> Of each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag

@@ -162,7 +162,8 @@ contains
       logical :: sees_each
 
       sees_each = self%parameters%least_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
-         & .or. self%parameters%most_avalanches < huge(1_i8) .or. self%taken < size(self%snapshot_time)
+         & .or. self%parameters%most_avalanches < huge(1_i8) &
+         & .or. self%taken < size(self%snapshot_time)
    end function sees_each
 
    !> Count avalanches that came to an end unseen.

@@ -22,8 +22,8 @@ module mesoslip_sliders_rigid
    !> Terms of the series for shorter and longer steps, and the lengths of these in units of the
    !> fastest rate. What the series leaves out is less than 1e-16 of its two leading terms.
    integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, most_terms = 17
-   real(wp), parameter :: short_step = 3.0e-3_wp, middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, &
-      & longest_step = 0.5_wp
+   real(wp), parameter :: short_step = 3.0e-3_wp, middling_step = 3.5e-2_wp, &
+      & long_step = 8.0e-2_wp, longest_step = 0.5_wp
 
    !> For the procedures of motion_series.inc
    integer, parameter :: longest_series = most_terms
@@ -194,8 +194,8 @@ contains
    !>
    !> With p the time in which the way to the next break would be made at the present velocity, the
    !> series of the displacement is way/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion
-   !> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), to rounding
-   !> or nearly so. Other steps, one in ten, are left to move_on.
+   !> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), exact to
+   !> rounding or nearly so. Other steps, one in eight in Klein's case, are left to move_on.
    subroutine glide(self, system, window, early, is_done)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
@@ -289,7 +289,8 @@ contains
 
       velocity = horner(series, few_terms, time)
       change = (integral(series, few_terms, time) - sign(way, velocity)) / velocity
-      better = time - change * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
+      better = time - change &
+         & * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
    end function nearer
 
    !> Any way: a step as long as a series reaches, or shorter.

@@ -1,13 +1,13 @@
 !> Philox 4x32-10 against the known answers published with Random123, and the keying of draws.
 program test_random
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_random, only: philox4x32, uniform_pair
+   use mesoslip_numerics_random, only: first_uniforms, philox4x32, uniform_pair
    use testing, only: check, check_close, finish
    implicit none
 
    integer(i8), parameter :: ones = int(z'FFFFFFFF', i8)
    integer, parameter :: draws = 100000
-   real(wp) :: pair(2), other(2), total, squares
+   real(wp) :: pair(2), other(2), several(2), total, squares
    integer :: draw
 
    call known_answer([0_i8, 0_i8, 0_i8, 0_i8], [0_i8, 0_i8], &
@@ -29,6 +29,11 @@ program test_random
    call check(all(abs(pair - other) > 0.0_wp), "seeds beyond 2**32 are told apart")
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 1_i8, other)
    call check(all(abs(pair - other) > 0.0_wp), "attempts are told apart")
+
+   call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 0_i8, pair)
+   call uniform_pair(7_i8, 2_i8, 9_i8, 4_i8 + 2_i8**33, 0_i8, other)
+   call first_uniforms(7_i8, 2_i8, [5_i8, 9_i8], [3_i8, 4_i8 + 2_i8**33], several)
+   call check(all(abs(several - [pair(1), other(1)]) <= 0.0_wp), "draws of several contacts")
 
    total = 0.0_wp
    squares = 0.0_wp

@@ -10,6 +10,9 @@ program test_slider_rigid
 
    call oscillates()
    call stops_at_crossing()
+   call climbs(1.0e-6_wp)
+   call climbs(2.0e-4_wp)
+   call climbs(8.0e-3_wp)
    call turns_short_of_crossing()
    call stays_at_rest()
    call finish()
@@ -57,6 +60,45 @@ contains
       call check(abs(slider%displacement - window%upper) <= 0.0_wp, "displacement of a crossing")
       call check_close(slider%time, 0.5_wp, 1.0e-13_wp, "time of a crossing")
    end subroutine stops_at_crossing
+
+   !> A ladder of crossings, from rest under a steady drive: each is met to the bit in displacement,
+   !> and its time, from the closed form, and the velocity there to rounding.
+   subroutine climbs(rung)
+      !> Way from one crossing to the next
+      real(wp), intent(in) :: rung
+
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      real(wp) :: off, late, fast
+      integer :: crossing
+
+      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
+      call slider%start(law)
+      call slider%drive(drive_velocity)
+      window%end_time = 10.0_wp
+      off = 0.0_wp
+      late = 0.0_wp
+      fast = 0.0_wp
+      do crossing = 1, int(min(2000.0_wp, 0.5_wp / rung))
+         window%upper = crossing * rung
+         do while (slider%displacement < window%upper)
+            call slider%advance(law, window)
+         end do
+         associate (phase => frequency * slider%time)
+            off = max(off, abs(slider%displacement - window%upper))
+            ! Over the velocity: the time by which a crossing is late.
+            late = max(late, abs(drive_velocity * (slider%time - sin(phase) / frequency) &
+               & - window%upper) / slider%velocity)
+            fast = max(fast, abs(drive_velocity * (1.0_wp - cos(phase)) - slider%velocity))
+         end associate
+      end do
+      call check(off <= 0.0_wp, "displacement of all crossings")
+      call check_close(late, 0.0_wp, 1.0e-13_wp, "time of all crossings")
+      call check_close(fast, 0.0_wp, 1.0e-12_wp, "velocity at all crossings")
+      call check_close(slider%drive_work%total(), slider%energy(), 1.0e-13_wp, &
+         & "energy over all crossings")
+   end subroutine climbs
 
    !> An oscillation of amplitude 1 about 0 stays inside a window slightly wider, and meets one
    !> slightly narrower, on either side.

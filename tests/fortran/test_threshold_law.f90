@@ -28,6 +28,8 @@ program test_threshold_law
       end do
    end do
 
+   call several()
+
    call check_close(inverse_normal(0.975_wp), 1.959963984540054_wp, 1.0e-15_wp, "normal quantile")
    call check_close(inverse_normal(1.0e-20_wp), -9.262340089798408_wp, 1.0e-14_wp, "far quantile")
 
@@ -38,6 +40,21 @@ program test_threshold_law
    call finish()
 
 contains
+
+   !> Quantiles of several probabilities are those of each to the bit, in the tails too.
+   subroutine several()
+      integer, parameter :: number = 1001
+      real(wp) :: probability(number), threshold(number)
+      integer :: place, kind
+
+      probability = [(real(place, wp) / (number + 1), place=1, number)]**3
+      do kind = 1, size(laws)
+         call new_threshold_law(law, laws(kind), 0.3_wp, 0.2_wp, error)
+         call law%quantiles(probability, threshold)
+         call check(all(abs(threshold - law%quantile(probability)) <= 0.0_wp), &
+            & "quantiles of several probabilities: " // names(kind))
+      end do
+   end subroutine several
 
    !> Mean and standard deviation, integrated over the quantiles.
    subroutine moments(law, width, name)

@@ -54,6 +54,8 @@ module mesoslip_contacts_populations
    real(wp), parameter :: widest_spread = 0.35_wp
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: most_attached_part = 0.1_wp
+   !> Part of the contacts that is too small to attach again
+   real(wp), parameter :: negligible_part = 1.0e-30_wp
    !> Part of a step's length below which a slider creeps
    real(wp), parameter :: creeping_part = 0.01_wp
    !> A step may last so many times as long as expected
@@ -354,10 +356,6 @@ contains
             & self%most_attached_at_rest, births)
       end if
       window%end_time = births%end_time
-      ! What is expected holds for about the time the slider is expected to take.
-      if (births%number > 0.0_wp .and. duration < longest_time) then
-         window%end_time = min(window%end_time, pose%time + patience * duration)
-      end if
 
       window%upper = max(self%ahead, pose%displacement)
       window%lower = min(self%behind, pose%displacement)
@@ -619,7 +617,8 @@ contains
          end if
          call self%break_tried()
          if (self%trials > 0) gain = gain + self%trial_work
-         if (self%parameters%reattach .and. self%trial_breaks > 0.0_wp) then
+         if (self%parameters%reattach &
+            & .and. self%trial_breaks > negligible_part * self%parameters%count) then
             if (self%last == size(self%packet, 2)) then
                self%last = self%last - self%first + 1
                self%packet(:, :self%last) = self%packet(:, self%first:)
@@ -680,7 +679,12 @@ contains
          left = self%packet(row_number, place)
          if (place == self%first) left = left * (1.0_wp - self%attached_part)
          call add(left, self%packet(row_mass, place) / self%packet(row_number, place))
-         if (late >= time + duration .or. births%end_time < huge(1.0_wp)) return
+         if (births%end_time < huge(1.0_wp)) return
+         if (late >= time + duration) then
+            ! What is expected holds for about the time the slider is expected to take.
+            births%end_time = max(time + patience * duration, nearest(time, 1.0_wp))
+            return
+         end if
          until = late
       end do
       if (self%parameters%reattach .and. self%parameters%delay < duration &
@@ -689,6 +693,10 @@ contains
          early = time + self%parameters%delay
          late = early + duration
          call add(breaks, self%trial_mass / self%trial_breaks)
+         births%end_time = min(births%end_time, max(time + patience * duration, &
+            & nearest(time, 1.0_wp)))
+      else if (births%number > 0.0_wp) then
+         births%end_time = until
       end if
 
    contains

@@ -5,6 +5,8 @@
 !> it has borne, in either direction. A step of the slider is so short that its populations are
 !> points of a smooth density of origins. Over a step the contact force is a line that
 !> does the work of the true force, which is known in advance, so the steps are of second order.
+!> Work that a step did not do after all, the next ones make up for. The jump of the force between
+!> two lines is the estimate of the error.
 !>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations

@@ -115,11 +115,11 @@ def test_rows_of_the_kernel_become_variables(results):
     """Each row of each table stands in its place, with its realization."""
     tree = layout.build_tree(results)
     for place, one in enumerate(results.realizations):
-        trace = one.rows("trace").array
+        trace = one.rows("trace").read()
         force = tree["spring_force"].values[place]
         np.testing.assert_array_equal(force[: len(trace)], trace[:, 4])
         assert np.isnan(force[len(trace) :]).all()
-        slips, data = one.rows("slips").array, mesoslip.group(tree, "slips")
+        slips, data = one.rows("slips").read(), mesoslip.group(tree, "slips")
         mine = data["realization_index"].values == place
         np.testing.assert_array_equal(data["force_drop"].values[mine], slips[:, 3] - slips[:, 4])
         np.testing.assert_array_equal(data["contacts_broken"].values[mine], slips[:, 6])
@@ -130,17 +130,17 @@ def test_rows_of_the_kernel_become_variables(results):
         }
         for group in tables.keys() & tree.children.keys():
             table, columns = tables[group]
-            data, rows = mesoslip.group(tree, group), one.rows(table).array
+            data, rows = mesoslip.group(tree, group), one.rows(table).read()
             mine = data["realization_index"].values == place
             for name, column in columns.items():
                 np.testing.assert_array_equal(data[name].values[mine], rows[:, column], name)
         if "snapshots" in tree.children:
             stretch = tree["snapshots/stretch"].values
             mine = tree["snapshots/realization_index"].values == place
-            rows = one.rows("snapshots").array
+            rows = one.rows("snapshots").read()
             np.testing.assert_array_equal(stretch[mine].reshape(rows.shape[:2]), rows[..., 0])
         if "layer" in tree.dims:
-            rows = one.rows("layers").array
+            rows = one.rows("layers").read()
             np.testing.assert_array_equal(tree["layer_displacement"].values[place], rows)
 
 
@@ -213,7 +213,7 @@ class Rows:
 tables = {"trace": Rows(1_500_000, 9), "slip_trace": Rows(1_500_000, 10), "slips": Rows(0, 7)}
 one = SimpleNamespace(
     rows=tables.get, number=0, time=1.0, ending="", breaks=1, advances=1, kernel_seconds=1.0,
-    energy=np.ones(8), energy_residual=0.0,
+    energy=np.ones(8), energy_residual=0.0, force_error=0.0,
 )
 config = mesoslip.Config.load(sys.argv[1])
 results = SimpleNamespace(config=config, complete=True, wall_seconds=1.0, realizations=[one])

@@ -314,7 +314,8 @@ def test_killed_runs_go_on(long_run, tmp_path):
     folder = checkpoint_folder(output)
     random = np.random.default_rng(1)
     kills = 0
-    while not output.exists():
+    # It may even be killed between the last renaming and the removal of its checkpoint.
+    while not output.exists() or folder.exists():
         process = start(long_run, output, "--resume", "--checkpoint-interval", "0.05")
         state = folder / "state.npz"
         seen = state.stat().st_ino if state.exists() else 0

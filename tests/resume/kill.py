@@ -72,7 +72,8 @@ def attack(kind: str, kills: int, folder: Path, random: np.random.Generator) -> 
     done = differences = 0
     while done < kills:
         output = folder / "killed.nc"
-        while not output.exists():
+        # It may even be killed between the last renaming and the removal of its checkpoint.
+        while process.returncode != 0 or not output.exists():
             process = start(config, output, "--resume", "--checkpoint-interval", "0.1")
             try:
                 process.wait(float(random.uniform(0.2, 1.0)) * (1.0 + 0.5 * length))

@@ -673,8 +673,8 @@ contains
       self%cost = 1.0_wp + self%count / populations_per_cost
       if (self%offers) then
          self%debt = self%debt - gain
-         ! The jump of the force from the end of a step to the start of the next is what the lines of
-         ! the steps leave open, and of the order of the error of the force.
+         ! The jump of the force from the end of a step to the start of the next: what the lines of
+         ! the steps leave open, of the order of the error of the force.
          self%error_estimate = max(self%error_estimate, abs((self%offered%stiffness &
             & - self%stiffness%total()) * after%displacement &
             & - (self%offered%offset - self%offset%total()) + (self%offered%drag &

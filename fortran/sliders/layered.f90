@@ -44,7 +44,7 @@ module mesoslip_sliders_layered
    real(wp), parameter :: layers_per_cost = 4.0_wp
    !> Steps of CVODE without an event after which it starts anew, so that a run can be put away: as
    !> many as take about a second with very many layers, from fewest to most
-   integer, parameter :: fewest_steps = 50, most_steps = 2000, most_layer_steps = 1000000
+   integer, parameter :: fewest_steps = 200, most_steps = 2000, most_layer_steps = 1000000
    !> Points of the rule by which losses are integrated
    integer, parameter :: points = 12
 

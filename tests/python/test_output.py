@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import platform
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -296,3 +298,21 @@ def test_files_of_earlier_versions_are_read():
     assert "slips" in tree._repr_html_()
     assert tree.isel(realization=0).sel(time=slice(0, 1)).sizes["time"] > 0
     assert len(mesoslip.slips(tree)["waiting_time"]) == len(numbers)
+
+
+def test_what_a_killed_process_left_behind_is_removed(tmp_path):
+    """The part of an output that nobody writes any more, and no other file."""
+    path = tmp_path / "out.nc"
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    node = platform.node()
+    left = tmp_path / f".{node}-{dead.pid}-1.out.nc"
+    others = [
+        tmp_path / f".{node}-{os.getpid()}-1.out.nc",
+        tmp_path / f".elsewhere-{dead.pid}-1.out.nc",
+        tmp_path / f".{node}-{dead.pid}-1.other.nc",
+    ]
+    for one in (left, *others):
+        one.touch()
+    files.check_writable(path)
+    assert sorted(tmp_path.iterdir()) == sorted(others)

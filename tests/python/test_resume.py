@@ -129,6 +129,7 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
     with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
         while not one.finished:
             one.advance(100)
+            checkpoint.visit(one)
             checkpoint.look([one])
             assert sum(rows.waiting_bytes for _, rows in one.waiting) <= 1000
     assert_same(whole("rigid, lattice"), layout.build_tree(Results(config, [one], True, 0.0)))

@@ -28,7 +28,7 @@ def checkout(tmp_path):
     (tmp_path / "mesoslip").chmod(0o755)
     texts = {
         "runs/klein.toml": 'title = "first"\n',
-        "runs/slow.toml": "# The first.\nbase = 'klein.toml'  # beside this file\n[run]\nseed = 1\n",
+        "runs/slow.toml": "# The first.\nbase = 'klein.toml'  # beside it\n[run]\nseed = 1\n",
         "runs/slower.toml": 'base = "slow.toml"\n[run]\nseed = 2\n',
         "runs/elsewhere.toml": 'base = "../mine/own.toml"\n',
         "runs/other.toml": '[sweep]\nbase = "klein.toml"\n',
@@ -41,12 +41,15 @@ def checkout(tmp_path):
     return tmp_path
 
 
-def made(checkout, *targets, jobs=2):
+def made(checkout, *targets):
     """What the program was asked to do by make."""
     done = subprocess.run(
         # Nothing is to be installed here.
-        ["make", f"-j{jobs}", "-s", "-o", ".venv/.installed", "MESOSLIP=./mesoslip"]
-        + [f"PYTHON={sys.executable}", *targets],
+        [
+            *("make", "-j2", "-s", "-o", ".venv/.installed"),
+            *("MESOSLIP=./mesoslip", f"PYTHON={sys.executable}"),
+            *targets,
+        ],
         cwd=checkout,
         capture_output=True,
         text=True,
@@ -120,7 +123,11 @@ def test_what_cannot_be_read_is_left_to_the_program(checkout, text):
 def test_the_runs_of_this_repository():
     """Their chains end with Klein's case, or they stand alone."""
     answer = subprocess.run(
-        [sys.executable, "tools/bases", "runs"], cwd=ROOT, capture_output=True, text=True, check=True
+        [sys.executable, "tools/bases", "runs"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     chains: dict[str, list[str]] = {}
     for line in answer.stdout.splitlines():

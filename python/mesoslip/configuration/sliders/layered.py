@@ -86,9 +86,9 @@ class Cantilever(Table):
 class LayeredSlider(InertialSlider):
     """An elastic block: layers joined by springs, of which the first bears the contacts.
 
-    ``layer_damping`` γ [1/s] acts between neighbours, γ M/N_l times their relative velocity, and not on
-    the spring to the drive, which joins no two layers: one layer is the rigid slider without
-    damping (model section 8).
+    ``layer_damping`` γ [1/s] acts between neighbours, γ M/N_l times their relative velocity, and
+    not on the spring to the drive, which joins no two layers: one layer is the rigid slider
+    without damping (model section 8).
     """
 
     kind: Literal["layered"] = "layered"
@@ -146,6 +146,10 @@ class LayeredSlider(InertialSlider):
             * config.contacts.static_force
             / self.stiffness,
         }
+
+    @property
+    def layer_count(self) -> int:
+        return self.layers
 
     @property
     def extra_traces(self) -> tuple[str, ...]:

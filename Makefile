@@ -79,25 +79,24 @@ lint: $(INSTALLED) ## Check the style of all sources
 clean: ## Remove the environment, what was built, and outputs
 	rm -rf build out $(VENV)
 
-# An output depends on its run, not on the program: a build does not make hours of outputs stale.
-out/%.nc: runs/%.toml | $(INSTALLED)
+# An output depends on its run and on what that is based on, not on the program: a build does not make
+# hours of outputs stale. Expanded a second time, when the name of the output is known.
+.SECONDEXPANSION:
+# Looked up once, and only if an output is asked for.
+chains = $(eval chains := $$(shell $(PYTHON) tools/bases runs))$(chains)
+bases = $(patsubst $(1)>%,%,$(filter $(1)>%,$(chains)))
+
+out/%.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) run $< -o $@
 
-out/%.curve.nc: runs/%.toml | $(INSTALLED)
+out/%.curve.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) curve $< -o $@
 
-out/%.onset.nc: runs/%.toml | $(INSTALLED)
+out/%.onset.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) onset $< -o $@
 
 out/%.png: out/%.nc | $(INSTALLED)
 	$(MESOSLIP) plot $< -o $@
-
-# The runs of the source's figures are variations of Klein's.
-$(FIGURE_OUTPUTS): runs/klein.toml
-out/S19a-me.nc: runs/S19a.toml
-out/S19b-me.nc: runs/S19b.toml
-$(patsubst runs/%.toml,out/%.nc,$(wildcard runs/limit-*.toml)): runs/limit-me.toml
-out/avalanche.nc: runs/S25d.toml
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)

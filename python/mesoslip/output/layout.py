@@ -413,7 +413,7 @@ def _block_rows(results: RunResults, table: str) -> int:
     if table == "snapshots":
         width = 3 * results.config.contacts.count
     elif table == "layers":
-        width = max(1, results.config.slider.layers_recorded(results.config))
+        width = results.config.slider.layer_count
     return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
 
 

@@ -32,7 +32,7 @@ ENDINGS = {
     1: "the drive came to its end",
     2: "as many avalanches as wanted",
     3: "no contact is left to break",
-    4: "contacts break under the force without end",
+    4: "contacts break under the force without end; breaks of this slide are in no avalanche",
 }
 
 # Work of the drive over the energy of all contacts about to break, below which it does not count.

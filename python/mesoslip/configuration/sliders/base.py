@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, Protocol
@@ -19,6 +20,19 @@ class Quantity(NamedTuple):
     value: float
     unit: str
     meaning: str
+
+
+class Oscillator(NamedTuple):
+    """A mass M [kg] on a spring K [N/m], with damping η_S [1/s] relative to its mean velocity."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+    @property
+    def frequency(self) -> float:
+        """Ω_S = √(K/M) [1/s]."""
+        return math.sqrt(self.stiffness / self.mass)
 
 
 class Setting(Protocol):
@@ -85,6 +99,16 @@ class SliderTable(Table):
     def loading_rate(self, config: Setting) -> float | None:  # noqa: ARG002
         """D1 = v_d √(KM)/F_s (S46); None if the drive stands, or without spring or mass."""
         return None
+
+    @property
+    def oscillator(self) -> Oscillator | None:
+        """The slider as one mass on a spring (S40, S41); None if it is not one."""
+        return None
+
+    @property
+    def layer_count(self) -> int:
+        """Number of layers that the slider is made of."""
+        return 1
 
     @property
     def extra_traces(self) -> tuple[str, ...]:

@@ -89,7 +89,12 @@ RESIDUAL_OVER_TOLERANCE = 1e4
 
 
 class LayeredSlider(InertialSlider):
-    """An elastic block: layers joined by springs, of which the first bears the contacts."""
+    """An elastic block: layers joined by springs, of which the first bears the contacts.
+
+    ``layer_damping`` γ [1/s] acts between neighbours, γ M/N_l times their relative velocity, and
+    not on the spring to the drive, which joins no two layers: one layer is the rigid slider
+    without damping (model section 8).
+    """
 
     kind: Literal["layered"] = "layered"
     layers: Annotated[Whole, Field(ge=1, le=100_000)]
@@ -146,6 +151,10 @@ class LayeredSlider(InertialSlider):
             * config.contacts.static_force
             / self.stiffness,
         }
+
+    @property
+    def layer_count(self) -> int:
+        return self.layers
 
     @property
     def extra_traces(self) -> tuple[str, ...]:

@@ -12,10 +12,11 @@
 !>
 !> - the block exceeds the drive's velocity by the slip velocity,
 !> - at least one contact breaks, and
-!> - the force falls by more than twice what it had regained by ringing: by what it was above its least
-!>   minimum in half a period of the setup before. Free ringing only gives back what it had regained.
-!>   Half a period is enough to see it, as contacts only make the block ring faster; what
-!>   takes longer is loading.
+!> - the force falls by more than twice what it had regained by ringing, so that the block travels
+!>   farther beyond what ringing gives back than it rings. Regained is the height above the least
+!>   minimum of the last three quarters of a period of the setup: contacts only make the block ring
+!>   faster, so that ringing takes half a period, with damping a little more; what takes longer is
+!>   loading.
 !>
 !> A slip starts at the maximum. It ends at the least minimum, after which no lower one comes within
 !> half a period, or before the force has regained half its drop and most contacts are pinned. A stage
@@ -53,6 +54,8 @@ module mesoslip_recording_recorder
 
    !> A fall of the force makes a slip if it is more than this many times what ringing regained.
    real(wp), parameter :: least_fall = 2.0_wp
+   !> Time in which ringing comes from a minimum to a maximum, in half periods of the undamped setup
+   real(wp), parameter :: longest_rise = 1.5_wp
    !> What is being followed: nothing, a fall that may come to be a slip, a slip
    integer, parameter :: phase_slow = 0, phase_fall = 1, phase_slip = 2
 
@@ -428,7 +431,7 @@ contains
       call self%minima%add([motion%time, force])
    end subroutine add_minimum
 
-   !> Height of the force above its least minimum within half a period; earlier ones are forgotten.
+   !> Height of the force above its least minimum so long ago as ringing lasts; forget earlier ones.
    function height(self, motion)
       class(recorder_type), intent(inout) :: self
       type(motion_type), intent(in) :: motion
@@ -438,7 +441,8 @@ contains
 
       old = 0
       do while (old < self%minima%count)
-         if (self%minima%row(1, old + 1) >= motion%time - self%parameters%quiet_time) exit
+         if (self%minima%row(1, old + 1) &
+            & >= motion%time - longest_rise * self%parameters%quiet_time) exit
          old = old + 1
       end do
       self%minima%count = self%minima%count - old

@@ -132,8 +132,9 @@ module mesoslip_recording_recorder
       procedure :: finish
       !> Put the state into an archive or take it out
       procedure :: exchange
-      procedure, private :: change_stage, pass_maximum, pass_minimum, begin_fall, drop_fall, follow
-      procedure, private :: close_slip, add_minimum, height, stop_trace
+      procedure, private :: change_stage, pass_maximum, see_minimum
+      procedure, private :: begin_fall, drop_fall, follow, close_slip, stop_trace
+      procedure, private :: add_minimum, height
       procedure, private :: take_samples, take_slip_samples
    end type recorder_type
 
@@ -214,7 +215,7 @@ contains
          if (excess > 0.0_wp) then
             call self%pass_maximum(slider, detached, breaks)
          else
-            call self%pass_minimum(slider, breaks)
+            call self%see_minimum(pace(slider, self%sense), breaks)
          end if
       end if
       if (self%is_tracing) call self%follow(slider, excess, detached)
@@ -250,14 +251,9 @@ contains
       type(motion_type) :: motion
 
       motion = slider%observe(slider%step_time)
-      if (self%phase == phase_slip) then
-         if (self%sense * (motion%elastic_force - self%force_after) < 0.0_wp) then
-            call note_least(self, motion, breaks)
-         end if
-         call self%close_slip()
-      else if (self%phase == phase_fall) then
-         call self%drop_fall()
-      end if
+      if (self%last_excess > 0.0_wp) call self%see_minimum(motion, breaks)
+      if (self%phase == phase_slip) call self%close_slip()
+      if (self%phase == phase_fall) call self%drop_fall()
       call self%stop_trace()
       self%drive_velocity = slider%drive_velocity
       if (abs(slider%drive_velocity) > 0.0_wp) self%sense = sign(1.0_wp, slider%drive_velocity)
@@ -297,15 +293,13 @@ contains
       call self%begin_fall(motion, breaks)
    end subroutine pass_maximum
 
-   !> The slider has become slower than the drive: the force was at a minimum.
-   subroutine pass_minimum(self, slider, breaks)
+   !> A fall of the force is over: it may make a slip.
+   subroutine see_minimum(self, motion, breaks)
       class(recorder_type), intent(inout) :: self
-      class(slider_type), intent(in) :: slider
+      !> The motion where the force is least
+      type(motion_type), intent(in) :: motion
       real(wp), intent(in) :: breaks
 
-      type(motion_type) :: motion
-
-      motion = pace(slider, self%sense)
       call self%add_minimum(motion)
       if (self%phase == phase_slow) return
       if (.not. self%has_least) then
@@ -326,7 +320,7 @@ contains
          self%slip_trace%row(slip_trace_length, self%kept_count + 1:self%slip_trace%count) &
             & = real(self%slip, wp)
       end if
-   end subroutine pass_minimum
+   end subroutine see_minimum
 
    !> The force is lower than it has been since the start of a fall.
    subroutine note_least(self, motion, breaks)

@@ -27,8 +27,10 @@ module mesoslip_sliders_base
       real(wp) :: spring_force = 0.0_wp
       !> Force that the slider exerts on the contacts [N]
       real(wp) :: contact_force = 0.0_wp
-      !> Mean elastic force of a slider of layers [N], and displacement of its base [m]
-      real(wp) :: elastic_force = 0.0_wp, base_displacement = 0.0_wp
+      !> Mean elastic force of a slider of layers [N]
+      real(wp) :: elastic_force = 0.0_wp
+      !> Displacement [m] and velocity [m/s] of its base
+      real(wp) :: base_displacement = 0.0_wp, base_velocity = 0.0_wp
    end type motion_type
 
    !> A slider: what it has in common whatever its kind.
@@ -39,6 +41,8 @@ module mesoslip_sliders_base
       real(wp) :: origin = 0.0_wp
       !> Displacement of the slider [m] and its velocity [m/s]
       real(wp) :: displacement = 0.0_wp, velocity = 0.0_wp
+      !> Velocity of the base, to which that of the slider is relative [m/s]
+      real(wp) :: base_velocity = 0.0_wp
       !> Its acceleration at the end of the last advance, and at its start [m/s2]
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
@@ -213,6 +217,7 @@ contains
       call archive%exchange("origin", self%origin)
       call archive%exchange("displacement", self%displacement)
       call archive%exchange("velocity", self%velocity)
+      call archive%exchange("base_velocity", self%base_velocity)
       call archive%exchange("acceleration", self%acceleration)
       call archive%exchange("start_acceleration", self%start_acceleration)
       call archive%exchange("sense", self%sense)

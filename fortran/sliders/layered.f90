@@ -286,7 +286,8 @@ contains
          self%state(1, 2) = self%state(0, 2)
          self%is_stale = .true.
       end if
-      self%velocity = self%state(1, 2) - self%state(0, 2)
+      self%base_velocity = self%state(0, 2)
+      self%velocity = self%state(1, 2) - self%base_velocity
       if (step < longest) self%is_stale = .true.
       if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
          self%time = window%end_time
@@ -633,7 +634,8 @@ contains
       base = value_of(0, 1)
       last = value_of(layers, 1)
       motion%time = time
-      motion%velocity = value_of(1, 2) - value_of(0, 2)
+      motion%base_velocity = value_of(0, 2)
+      motion%velocity = value_of(1, 2) - motion%base_velocity
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + first - base
       motion%spring_force = self%system%spring * (drive - last)

@@ -22,6 +22,8 @@ COLUMNS = (
     "force_drop",
     "peak_velocity",
     "contacts_broken",
+    "slip_time",
+    "waiting_time",
 )
 
 
@@ -50,7 +52,7 @@ def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
     """
     data = slips(tree)
     result: dict[str, dict[str, float]] = {"slips": {"count": float(data.sizes["slip"])}}
-    for name in (*COLUMNS[3:], "slip_time", "waiting_time"):
+    for name in COLUMNS[3:]:
         values = data[name].values[np.isfinite(data[name].values)]
         if values.size:
             result[name] = {
@@ -63,11 +65,12 @@ def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
 
 
 def rows(tree: xr.DataTree) -> list[dict[str, Any]]:
-    """The catalogue, a dictionary for each slip."""
+    """The catalogue, a dictionary for each slip; no waiting time (None) for a realization's first."""
     data = slips(tree)
+    columns = [data[name].values.tolist() for name in COLUMNS]
     return [
-        {name: data[name].values[number].item() for name in COLUMNS}
-        for number in range(data.sizes["slip"])
+        {name: None if value != value else value for name, value in zip(COLUMNS, row, strict=True)}
+        for row in zip(*columns, strict=True)
     ]
 
 

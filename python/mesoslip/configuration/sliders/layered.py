@@ -133,6 +133,14 @@ class LayeredSlider(InertialSlider):
             for j in range(1, n + 1)
         )
 
+    @property
+    def quiet_time(self) -> float:
+        """Half a period of the setup [s], or of slider and base together where that is longer."""
+        setup = super().quiet_time
+        if self.base is None:
+            return setup
+        return max(setup, math.pi * math.sqrt((self.base.mass + self.mass) / self.base.stiffness))
+
     def kernel_parameters(self, config: Setting) -> dict[str, float]:
         relative = self.solver.relative_tolerance
         base = self.base

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip import ForceCurve, _core
-from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
+from mesoslip.simulation.kernel import named
+from mesoslip.theory.lives import law_parameters
 from oracles import frozen_law, stationary_force
 from scipy import integrate
 
@@ -181,21 +182,13 @@ def trapezoid(config, width, back, steps):
 
 def test_the_order_of_convergence(klein):
     """The error falls with the power of the number of points, until rounding."""
-    contacts = klein(**EQUAL, **dispersion(0.2)).contacts
-    law = (
-        contacts.threshold.code,
-        0.2,
-        COUPLINGS["equal"],
-        0.0,
-        0.0,
-        1,
-        INITIAL_STATES["relaxed"],
-    )
+    law = named(law_parameters(klein(**EQUAL, **dispersion(0.2))))
 
     def force_at_end(points, width):
-        point, *_, force, _, _, _, status, _ = _core.force_curve(
+        point, solution, _, _, status, _ = _core.force_curve(
             *law, 0.0, width, round(1.2 / width), points
         )
+        force = solution[:, :, 2]
         assert status == 0
         polynomial = np.polynomial.Polynomial.fit(point, force[:, -1], points - 1, domain=[0, 1])
         return polynomial(1.0)

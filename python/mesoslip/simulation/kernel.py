@@ -107,11 +107,11 @@ class Kernel:
         self, kind: str, parameters: Mapping[str, float], seed: int, realization: int
     ) -> None:
         """Make the contacts of a kind from named numbers."""
-        self._call(_core.set_contacts, kind, *_named(parameters), seed, realization)
+        self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
     def set_slider(self, kind: str, parameters: Mapping[str, float]) -> None:
         """Make the slider of a kind from named numbers."""
-        self._call(_core.set_slider, kind, *_named(parameters))
+        self._call(_core.set_slider, kind, *named(parameters))
 
     def set_drive(self, stage_end: Array, stage_velocity: Array) -> None:
         """Stages of the drive: when each ends [s], and its velocity [m/s], shape (stages)."""
@@ -194,7 +194,8 @@ class Kernel:
         self._call(_core.restore_simulation, words)
 
 
-def _named(parameters: Mapping[str, float]) -> tuple[Any, Array]:
+def named(parameters: Mapping[str, float]) -> tuple[Any, Array]:
+    """Named numbers as a kernel takes them: names, and values."""
     names = [name.ljust(NAME_LENGTH).encode() for name in parameters]
     # Of two arrays of one length f2py refuses the second if that is 0.
     values = np.zeros(max(1, len(names)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,7 +25,8 @@ from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
-from mesoslip.theory.lives import checked, law_arguments, scales
+from mesoslip.simulation.kernel import checked, named
+from mesoslip.theory.lives import law_parameters, scales
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -110,10 +111,11 @@ def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
     return BPoly(np.linalg.solve(bernstein, values), edges, extrapolate=False)
 
 
-def _solve(arguments: tuple[Any, ...], start: float, width: float, panels: int) -> _Solution:
-    point, breaks, slope, force, stiffness, pinned, mismatch = checked(
-        _core.force_curve(*arguments, start, width, panels, POINTS)
+def _solve(parameters: Mapping[str, float], start: float, width: float, panels: int) -> _Solution:
+    point, solution, pinned, mismatch = checked(
+        _core.force_curve(*named(parameters), start, width, panels, POINTS)
     )
+    breaks, slope, force, stiffness = np.moveaxis(solution, -1, 0)
     edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
     return _Solution(
         edges,
@@ -164,7 +166,7 @@ class ForceCurve:
         self._refine()
 
     def _refine(self) -> None:
-        arguments = law_arguments(self.config, self.newborn_width)
+        parameters = law_parameters(self.config, self.newborn_width)
         length = self.length / self._stretch
         start, width = self._first_panels(length)
         coarse = None
@@ -186,7 +188,7 @@ class ForceCurve:
                         )
                     ]
                 )
-            fine = _solve(arguments, start, width, panels)
+            fine = _solve(parameters, start, width, panels)
             self.kernel_seconds += time.perf_counter() - begin
             if coarse is not None:
                 inside = np.linspace(max(0.0, start), length, 20011)[1:-1]

@@ -19,8 +19,8 @@
 !>   loading.
 !>
 !> A slip starts at the maximum. It ends at the least minimum, after which no lower one comes within
-!> half a period, or before the force has regained half its drop and most contacts are pinned. A stage
-!> of the drive ends it too: the fall that a slower drive starts is none of the block's own.
+!> half a period, or before the force has regained half its drop and most contacts are pinned. A
+!> stage of the drive ends it too: the fall that a slower drive starts is none of the block's own.
 !>
 !> A finer trace goes on until the block has been slow for half a period, or another slip starts.
 module mesoslip_recording_recorder
@@ -288,6 +288,8 @@ contains
          if (.not. is_late &
             & .and. self%sense * (motion%elastic_force - self%force_before) < 0.0_wp) return
          call self%drop_fall()
+      case default
+         continue
       end select
       if (self%is_tracing) call self%take_slip_samples(slider, detached, motion%time)
       call self%begin_fall(motion, breaks)

@@ -32,7 +32,7 @@ def drop_of_mean(tree, start: float, end: float) -> float:
 
 @pytest.mark.parametrize("engine", ["eq", "me"])
 def test_a_stiff_spring_slips_once_in_each_life_of_the_contacts(klein, engine):
-    """The contacts break together each time that the drive has gone their stretch (1 - f_b) f_s/k."""
+    """Contacts break together each time that the drive has gone their stretch (1 - f_b) f_s/k."""
     tree = mesoslip.run(klein(run__engine=engine, run__duration=1.0, **STIFF))
     slips = catalogue(tree)
     life = 0.9 * STATIC_FORCE / 2000 / 1e-7
@@ -42,7 +42,7 @@ def test_a_stiff_spring_slips_once_in_each_life_of_the_contacts(klein, engine):
 
 
 def test_both_engines_have_one_catalogue(klein):
-    """As long as their traces agree, with many contacts in the one and infinitely many in the other."""
+    """As long as their traces agree, of many contacts and of infinitely many."""
     changes = {"run__duration": 0.5, "contacts__count": 100_000, **STIFF}
     finite, infinite = (
         catalogue(mesoslip.run(klein(run__engine=engine, **changes))) for engine in ("eq", "me")

@@ -65,7 +65,7 @@ def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
 
 
 def rows(tree: xr.DataTree) -> list[dict[str, Any]]:
-    """The catalogue, a dictionary for each slip; no waiting time (None) for a realization's first."""
+    """The catalogue, a dictionary for each slip; waiting time None for a realization's first."""
     data = slips(tree)
     columns = [data[name].values.tolist() for name in COLUMNS]
     return [

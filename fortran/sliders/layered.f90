@@ -1,7 +1,7 @@
 !> An elastic slider: layers joined by springs, on an optional base (section 8 of the model, S24).
 !>
-!> Layer 1 bears the contacts; a spring joins layer N_l to the drive. Damping acts between layers, not
-!> on that spring, so that one layer is the rigid slider. Displacement and velocity are those of
+!> Layer 1 bears the contacts; a spring joins layer N_l to the drive. Damping acts between layers,
+!> not on that spring, so that one layer is the rigid slider. Displacement and velocity are those of
 !> layer 1 relative to the base, by which contacts stretch.
 !>
 !> Under a linear law of the contact force the motion is that of a linear system. By default it is

@@ -140,8 +140,8 @@ contains
    subroutine make_contact_lives(self, parameters, error)
       !> The contacts
       type(contact_lives_type), intent(out) :: self
-      !> Codes of law, coupling and initial state; relative width, back force and spread of newborns'
-      !> stretch; whether contacts attach again
+      !> Codes of law, coupling and initial state; relative width, back force and spread of the
+      !> stretch of newborns; whether contacts attach again
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or superfluous, or the law does not exist
       type(error_type), allocatable, intent(out) :: error

@@ -126,6 +126,8 @@ contains
                call check_close(lognormal_above(threshold, law%scale, minimum) &
                   & / lognormal_above(minimum, law%scale, minimum), probability(point), &
                   & 1.0e-11_wp, "closed form of carried: " // name)
+            case default
+               cycle
             end select
          end do
       end do

@@ -239,13 +239,14 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--only", action="append", metavar="NAME", help="such as signals:1:7")
     parser.add_argument("--kept", type=Path, default=ROOT / "out" / "fuzz")
+    parser.add_argument("--no-keep", action="store_true", help="keep nothing, seek no smallest")
     given = parser.parse_args()
     found = fuzz(
         _counts(given.attacks),
         seed=given.seed,
         jobs=given.jobs,
         only=given.only,
-        kept=given.kept.resolve(),
+        kept=None if given.no_keep else given.kept.resolve(),
         tell=partial(print, flush=True),
     )
     return 1 if found else 0

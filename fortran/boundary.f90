@@ -231,7 +231,7 @@ end subroutine advance_simulation
 
 !> How far a simulation has come.
 subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, avalanche_slip, &
-   & advances, avalanches, integrator, status, message)
+   & error_estimate, advances, avalanches, integrator, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
@@ -241,8 +241,8 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    !> Why the run is over, 0 if it is not
    integer, intent(out) :: ending
    !> Time [s], displacement of the slider [m], breaks so far, contacts that are detached, slip in
-   !> avalanches [m]
-   real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip
+   !> avalanches [m], estimated error of the contact force [N]
+   real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip, error_estimate
    !> Advances and avalanches so far; steps, evaluations and failed steps of the integrator
    integer(8), intent(out) :: advances, avalanches, integrator(3)
    integer, intent(out) :: status
@@ -257,6 +257,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    breaks = 0.0d0
    detached = 0.0d0
    avalanche_slip = 0.0d0
+   error_estimate = 0.0d0
    advances = 0
    avalanches = 0
    integrator = 0
@@ -268,6 +269,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
       breaks = simulation%contacts%breaks
       detached = simulation%contacts%detached_count
       avalanche_slip = simulation%avalanches%slip
+      error_estimate = simulation%contacts%error_estimate
       advances = simulation%advances
       avalanches = simulation%avalanches%avalanches
       integrator = simulation%slider%integrator_counts

@@ -11,7 +11,7 @@ module mesoslip_sliders_base
    implicit none
    private
 
-   public :: slider_type, motion_type, exchange_slider, exchange_law, shift_slider
+   public :: slider_type, motion_type, drive_slider, exchange_slider, exchange_law, shift_slider
 
    !> The motion at one time.
    type :: motion_type
@@ -80,7 +80,7 @@ module mesoslip_sliders_base
       !> Where it is
       procedure, non_overridable :: pose
       !> Give the drive another velocity
-      procedure, non_overridable :: drive
+      procedure :: drive => drive_slider
       !> Where the drive is at a time
       procedure, non_overridable :: drive_at
       !> Move the origin of displacements
@@ -151,7 +151,7 @@ contains
    end function pose
 
    !> Give the drive another velocity.
-   subroutine drive(self, velocity)
+   subroutine drive_slider(self, velocity)
       !> The slider
       class(slider_type), intent(inout) :: self
       !> Velocity of the drive [m/s]
@@ -160,7 +160,7 @@ contains
       self%drive_displacement = self%drive_at(self%time)
       self%drive_time = self%time
       self%drive_velocity = velocity
-   end subroutine drive
+   end subroutine drive_slider
 
    !> Where the drive is at a time.
    pure function drive_at(self, time) result(displacement)

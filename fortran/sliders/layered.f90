@@ -42,8 +42,9 @@ module mesoslip_sliders_layered
    integer, parameter :: half_bandwidth = 3
    !> Layers whose series take as long as an advance of a rigid slider
    real(wp), parameter :: layers_per_cost = 4.0_wp
-   !> Steps of CVODE without an event after which it starts anew, so that a run can be put away
-   integer, parameter :: most_steps = 2000
+   !> Steps of CVODE without an event after which it starts anew, so that a run can be put away: as
+   !> many as take about a second with very many layers, from fewest to most
+   integer, parameter :: fewest_steps = 200, most_steps = 2000, most_layer_steps = 1000000
    !> Points of the rule by which losses are integrated
    integer, parameter :: points = 12
 
@@ -297,7 +298,8 @@ contains
       call self%add_work(step)
       if (self%parameters%solver /= solver_series) then
          self%steps = self%steps + 1
-         if (self%steps >= most_steps) self%is_stale = .true.
+         if (self%steps >= max(fewest_steps, min(most_steps, &
+            & most_layer_steps / self%parameters%layers))) self%is_stale = .true.
          ! What CVODE remembers of its last steps cannot be put away: only where it forgets them.
          self%can_pause = self%is_stale
          self%integrator_counts = self%counts_before + int(self%cvode%counts(), i8)

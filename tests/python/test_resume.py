@@ -117,6 +117,7 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
     with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
         while not one.finished:
             one.advance(100)
+            checkpoint.visit(one)
             checkpoint.look([one])
             assert sum(rows.waiting_bytes for _, rows in one.waiting) <= 1000
     assert_same(whole("rigid, lattice"), layout.build_tree(Results(config, [one], True, 0.0)))
@@ -302,7 +303,8 @@ def test_killed_runs_go_on(long_run, tmp_path):
     folder = checkpoint_folder(output)
     random = np.random.default_rng(1)
     kills = 0
-    while not output.exists():
+    # It may even be killed between the last renaming and the removal of its checkpoint.
+    while not output.exists() or folder.exists():
         process = start(long_run, output, "--resume", "--checkpoint-interval", "0.05")
         state = folder / "state.npz"
         seen = state.stat().st_ino if state.exists() else 0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import math
 import os
+import platform
+import re
 import shutil
 import threading
 from collections.abc import Iterable, Iterator
@@ -92,6 +94,7 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
     part = _temporary(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_left_behind(target)
         # A full disk takes an empty file.
         part.write_bytes(bytes(PROBE_BYTES))
     except (OSError, ValueError) as error:
@@ -137,7 +140,26 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
 
 def _temporary(path: Path) -> Path:
     """A name beside a file, with its ending, that no other process or thread has."""
-    return path.with_name(f".{os.getpid()}-{threading.get_ident()}.{path.name}")
+    owner = f"{platform.node()}-{os.getpid()}-{threading.get_ident()}"
+    return path.with_name(f".{owner}.{path.name}")
+
+
+def _remove_left_behind(path: Path) -> None:
+    """Remove parts of a file that processes of this machine left behind, when they were killed."""
+    node = re.escape(platform.node())
+    pattern = re.compile(rf"\.{node}-(\d+)-\d+\.{re.escape(path.name)}")
+    for other in path.parent.iterdir():
+        match = pattern.fullmatch(other.name)
+        if match is None:
+            continue
+        try:
+            os.kill(int(match[1]), 0)
+        except ProcessLookupError:
+            with suppress(OSError):
+                other.unlink(missing_ok=True)
+        except OSError:
+            # Somebody else's, at work.
+            continue
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation import tables
+from mesoslip.simulation.audit import failed_promises
 
 Array = NDArray[Any]
 # What a variable takes from rows of a table, given the places of their realizations.
@@ -73,6 +74,8 @@ class RealizationResults(Protocol):
     def energy(self) -> Array: ...
     @property
     def energy_residual(self) -> float: ...
+    @property
+    def force_error(self) -> float: ...
     @property
     def integrator_counts(self) -> Array: ...
 
@@ -209,6 +212,8 @@ def _root(results: RunResults) -> GroupLayout:
         where = (*at_times, "layer")
         writer.add("layer_displacement", where, table="layers", pick=lambda rows, _: rows)
     totals = ["breaks", "energy_residual", "kernel_seconds"]
+    if config.contact_kind.force_error_bound > 0:
+        totals.append("force_error")
     if config.has_avalanches:
         totals += ["avalanche_count", "avalanche_slip"]
     for name in totals:
@@ -366,6 +371,7 @@ def attributes(results: RunResults) -> dict[str, Any]:
             "ending": "; ".join(sorted({one.ending for one in realizations})),
             "advance_count": sum(one.advances for one in realizations),
             "energy_residual": residual,
+            "audit": "; ".join(failed_promises(config, realizations)) or "passed",
             "wall_seconds": results.wall_seconds,
         }
     )
@@ -407,7 +413,7 @@ def _block_rows(results: RunResults, table: str) -> int:
     if table == "snapshots":
         width = 3 * results.config.contacts.count
     elif table == "layers":
-        width = getattr(results.config.slider, "layers", 1)
+        width = max(1, results.config.slider.layers_recorded(results.config))
     return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
 
 

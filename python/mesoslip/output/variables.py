@@ -73,6 +73,10 @@ ROOT = Group(
     layer=Meaning("1", "number of the layer, 1 at the contacts", np.int64),
     layer_displacement=Meaning("m", "displacement of a layer"),
     breaks=Meaning("1", "breaks of contacts in the run", np.int64, is_fractional=True),
+    force_error=Meaning(
+        "N",
+        "estimated error of the contact force: the greatest jump between two steps",
+    ),
     energy_residual=Meaning(
         "1", "what the energy balance lacks, relative to the work of the drive"
     ),

@@ -34,6 +34,8 @@ class Progress(NamedTuple):
     """Contacts that are detached."""
     avalanche_slip: float
     """Displacement of the slider in avalanches [m]."""
+    force_error: float
+    """Estimated error of the contact force [N]; 0 where contacts are followed one by one."""
     advances: int
     """Advances of the slider, each to an event or less far."""
     avalanches: int

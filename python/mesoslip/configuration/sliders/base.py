@@ -99,6 +99,15 @@ class SliderTable(Table):
         """How the motion is integrated, where there is a choice."""
         return None
 
+    def residual_bound(self, config: Setting) -> float:  # noqa: ARG002
+        """What the energy balance may lack, relative to the work of the drive."""
+        return 0.0
+
+    @property
+    def remedy(self) -> str:
+        """What makes a run keep that promise better."""
+        return ""
+
     def problems(self, config: Setting) -> Complaints:  # noqa: ARG002
         """The combinations that this kind refuses."""
         yield from ()

@@ -139,6 +139,27 @@ def test_a_full_disk_does_not_stop_a_run(tmp_path):
     assert (tmp_path / "state.npz").exists()
 
 
+def test_a_realization_may_end_while_a_checkpoint_is_written(tmp_path, monkeypatch):
+    """Its last rows, of which some are in no file yet, belong to the next checkpoint."""
+    config, told = configuration("rigid"), []
+    one = Realization(config, 0)
+    one.advance(100)
+    with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
+        flush = checkpoint._flush
+
+        def end_after_flush(realizations):
+            flush(realizations)
+            while not one.finished:
+                one.advance(100)
+            checkpoint.visit(one)
+
+        monkeypatch.setattr(checkpoint, "_flush", end_after_flush)
+        assert checkpoint.write([one])
+    results = advanced(config, tmp_path, None, told)
+    assert told == []
+    assert_same(whole("rigid"), layout.build_tree(results))
+
+
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty", "no rows"])
 def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
     config, told = configuration("rigid"), []

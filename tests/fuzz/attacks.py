@@ -14,7 +14,6 @@ import resource
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -22,14 +21,13 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-import mesoslip
 import netCDF4
 import numpy as np
 import tomli_w
 import xarray as xr
 from apart import Command, Told, call, limit_memory
-from conftest import klein_tables
 from configurations import draw, mutate, text
+from conftest import klein_tables
 from invariants import broken, differences, energy_residual, left_over, promised_residual
 from kinds import FAST, KINDS
 from mesoslip import Config
@@ -37,8 +35,6 @@ from mesoslip.output import layout
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results, run_realizations
-
-
 
 # Time that a run has before it is interrupted [s].
 SECONDS = 2.0
@@ -137,6 +133,10 @@ def check_configuration(material: bytes, name: str, folder: Path) -> Report:
         wanted |= {"out.partial.nc", "out.checkpoint"}
         if (folder / "out.partial.nc").exists():
             read(folder / "out.partial.nc")
+        if output.exists():
+            # The interrupt came when all was done.
+            wanted = {"case.toml", "out.nc"}
+            problems += broken(read(output), Config.load(case))
     problems += [f"left over: {one}" for one in left_over(folder, wanted)]
     if report.outcome in {FINISHED, REFUSED}:
         problems += _other_command(case, output, told.status, random, folder)
@@ -150,9 +150,7 @@ def _kind(config: Config) -> str:
     )
 
 
-def _other_segments(
-    config: Config, tree: xr.DataTree, random: Random, folder: Path
-) -> list[str]:
+def _other_segments(config: Config, tree: xr.DataTree, random: Random, folder: Path) -> list[str]:
     """Whether a run that is cut into segments, put away and taken up again, is the same."""
     whole = layout.build_tree(run_realizations(config, workers=random.choice([1, 2])))
     problems = [f"file and memory: {one} differs" for one in differences(tree, whole)]
@@ -243,7 +241,7 @@ QUICK = {"info", "slips", "avalanches"}
 STANDARD = ("rigid", "rigid, lattice", "rigid, me", "layered", "quasistatic, lattice")
 
 
-def prepare(folder: Path) -> None:
+def prepare(folder: Path, with_long: bool) -> None:
     """Write the outputs that are damaged, and the runs that are cut off, into a folder."""
     for number, kind in enumerate(STANDARD):
         tables = klein_tables(**FAST | KINDS[kind])
@@ -254,7 +252,7 @@ def prepare(folder: Path) -> None:
         path = folder / f"{command}.nc"
         status = call([command, folder / "0.toml", "-o", path], folder, 60)
         assert status.status == 0, status.err
-    for name, changes in LONG.items():
+    for name, changes in LONG.items() if with_long else ():
         path = folder / f"{name}.toml"
         path.write_text(tomli_w.dumps(klein_tables(**changes)))
         status = call(["run", path, "-o", folder / f"{name}.nc"], folder, 120)

@@ -157,7 +157,9 @@ def fuzz(
         store.mkdir(parents=True)
         os.environ["FUZZ_STORE"] = str(store)
         if any(not name.startswith(("configurations", "mutations")) for name in names):
-            is_whole, why = result_of(partial(prepare, store), 300.0, folder / "prepare.log")
+            with_long = any(name.startswith(("signals", "disks")) for name in names)
+            function = partial(prepare, store, with_long)
+            is_whole, why = result_of(function, 600.0, folder / "prepare.log")
             if not is_whole:
                 raise RuntimeError(why)
         waiting, running = list(reversed(names)), {}

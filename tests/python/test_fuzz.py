@@ -24,13 +24,13 @@ ANSWER_SECONDS = 3.0
 
 
 def test_attack():
-    """A few cases of each attack, each in a process of its own."""
-    counts = "configurations=12 mutations=60 outputs=12 checkpoints=8 signals=4 disks=6 terminals=4"
+    """A few cases of most attacks, each in a process of its own; make fuzz tries thousands."""
+    counts = "configurations=6 mutations=40 outputs=6 checkpoints=4 terminals=2"
     line = [sys.executable, ROOT / "tests" / "fuzz" / "fuzz.py", *counts.split(), "--jobs", "1"]
     line += ["--seed", "2026", "--no-keep"]
     result = subprocess.run(line, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout[-3000:] + result.stderr[-3000:]
-    assert "60" in result.stdout.splitlines()[1 + 2]
+    assert "mutations" in result.stdout
 
 
 def test_cases_are_made_again_from_their_names():

@@ -1,8 +1,8 @@
 """Attack the program with cases at random, and see what does not hold: ``make fuzz``.
 
-Each case has a name, such as ``configurations:1:17``, from which it can be made again. What is found
-is kept in out/fuzz: the configuration of the case, the smallest one that still shows the same, and
-what did not hold.
+Each case has a name, such as ``configurations:1:17``, from which it can be made again. What is
+found is kept in out/fuzz: the configuration of the case, the smallest one that still shows the
+same, and what did not hold.
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ def smallest(material: bytes, name: str, problem: str, place: Path) -> bytes:
         match = NUMBER.search(line)
         if match and not is_over():
             rounded = f"{float(match[0]):.0e}" if b"." in match[0] or b"e" in match[0] else "1"
-            one = lines[:number] + [line[: match.start()] + rounded.encode()] + lines[number + 1 :]
+            one = lines.copy()
+            one[number] = line[: match.start()] + rounded.encode()
             if one != lines and shows(one):
                 lines = one
     return b"\n".join(lines) + b"\n"

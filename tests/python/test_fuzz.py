@@ -188,7 +188,7 @@ def test_runs_answer(kind, seconds, folder):
 
 @pytest.mark.parametrize("workers", [-1, 0, float("nan"), 1.5, "2", True, np.int64(-1)])
 def test_workers_are_refused(workers):
-    with pytest.raises(mesoslip.ConfigError, match="workers = .*: must be a whole number") as told:
+    with pytest.raises(mesoslip.ConfigError, match=r"workers = .*: must be a whole number") as told:
         mesoslip.run(configuration("rigid"), workers=workers)
     assert "\n" not in str(told.value)
 

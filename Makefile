@@ -30,7 +30,7 @@ export UV_PYTHON_DOWNLOADS := never
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
-.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures bench \
+.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures bench fuzz \
   reference lint clean
 
 help: ## Show the targets
@@ -65,6 +65,11 @@ figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/
 
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py
+
+# Some cases of some attacks: make fuzz FUZZ="signals=20 --seed 7"; one of them: FUZZ="--only signals:7:3".
+FUZZ ?=
+fuzz: $(INSTALLED) ## Attack the program with some thousand cases at random
+	$(VENV)/bin/python tests/fuzz/fuzz.py $(FUZZ)
 
 reference: $(INSTALLED) ## Write the reference outputs of the tests anew, on purpose only
 	$(VENV)/bin/python tests/python/make_reference.py

@@ -261,14 +261,15 @@ class Checkpoint:
         return is_written
 
     def _write_state(self, realizations: Sequence[Realization]) -> None:
+        # Before rows are put into files, as one that ends meanwhile is saved with more of them.
+        with self._lock:
+            saved = {number: one for number, (_, one) in self._saved.items()}
         self._flush([one for one in realizations if one.advances > 0])
         for table, size in self._sizes.items():
             if size:
                 with (self.folder / f"{table}.rows").open("r+b") as file:
                     file.truncate(size)
                     os.fsync(file.fileno())
-        with self._lock:
-            saved = {number: one for number, (_, one) in self._saved.items()}
         arrays: dict[str, Any] = {}
         tables: dict[str, list[tuple[int, ...]]] = {table: [] for table in TABLES}
         for number, one in saved.items():

@@ -14,7 +14,8 @@ INSTALLED := $(VENV)/.installed
 # .git/logs/HEAD, as outputs tell the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* python/meson.build python/f2cmap) \
-  $(wildcard python/mesoslip/*.py python/mesoslip/*/*.py python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
+  $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
+  $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
 # Figures need the outputs of runs, but for S18, and two of other commands.
@@ -26,6 +27,8 @@ FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc out/S19a.onset.nc out/S19b.ons
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export UV_PROJECT_ENVIRONMENT := $(CURDIR)/$(VENV)
 export UV_PYTHON_DOWNLOADS := never
+# Or the first start of each command compiles what it imports.
+export UV_COMPILE_BYTECODE := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -36,6 +39,9 @@ export UV_PYTHON_DOWNLOADS := never
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
+	@printf '\nWhat uses what, from left to right (README, "Develop", tells what to touch to add something):\n'
+	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
+	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build
 	@:

@@ -123,7 +123,7 @@ def test_signals_while_the_output_is_written(number, times, folder):
 @pytest.mark.parametrize("times", [1, 2])
 def test_ctrl_c_before_the_first_event(times, folder):
     """While configuration, checkpoint and kernel are made, as with very many contacts."""
-    case = long_run(folder, contacts__count=3_000_000, contacts__initial="steady")
+    case = long_run(folder, contacts__count=1_000_000, contacts__initial="steady")
     for seconds in (0.05, 0.2, 0.4, 0.8):
         process = Command(["run", case, "-o", "out.nc"], folder)
         time.sleep(seconds)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.output.files import written_whole
 from mesoslip.output.layout import group_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COLUMNS = (
     "realization_index",
@@ -32,6 +34,8 @@ def slips(tree: xr.DataTree) -> xr.Dataset:
 
     The waiting time is that since the start of the slip before; NaN for the first of a realization.
     """
+    import xarray as xr
+
     data = group_of(tree, "slips")
     slip_time = data["end_time"] - data["start_time"]
     waiting = np.diff(data["start_time"].values, prepend=np.nan)

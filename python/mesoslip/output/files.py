@@ -12,15 +12,17 @@ import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import netCDF4
-import xarray as xr
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output import layout, variables
 from mesoslip.output.layout import Entry, GroupLayout, RunResults
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Variables with fewer values are not worth compressing.
 LEAST_COMPRESSED = 1000
@@ -271,6 +273,8 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
     FileError
         If there is no such file, or it is not an output of mesoslip, or it is damaged.
     """
+    import xarray as xr
+
     path = Path(path)
     if path.is_dir():
         raise FileError(f"{path}: is a directory, not an output file")
@@ -306,6 +310,8 @@ def _close(groups: dict[str, xr.Dataset]) -> None:
 
 def _groups(path: Path) -> dict[str, xr.Dataset]:
     """The groups of a file, with little memory for what is read of them."""
+    import xarray as xr
+
     before = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(CHUNK_CACHE)
     try:

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
@@ -24,6 +23,9 @@ from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation import tables
 from mesoslip.simulation.audit import failed_promises
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[Any]
 # What a variable takes from rows of a table, given the places of their realizations.
@@ -465,6 +467,8 @@ def build_tree(results: RunResults) -> xr.DataTree:
         (snapshot, row, column), ``energy`` (realization). What an interrupted run did not come to
         is NaN in the trace.
     """
+    import xarray as xr
+
     layout = describe(results)
     sizes = layout[""].sizes
     arrays: dict[str, dict[str, Array]] = {}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import DTypeLike
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Group(dict[str, Meaning]):
 
     def variable(self, name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
         """A variable of the group with its units and long name."""
+        import xarray as xr
+
         return xr.Variable(dimensions, values, self[name].attributes)
 
 

@@ -14,7 +14,8 @@ INSTALLED := $(VENV)/.installed
 # .git/logs/HEAD, as outputs tell the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* python/meson.build python/f2cmap) \
-  $(wildcard python/mesoslip/*.py python/mesoslip/*/*.py python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
+  $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
+  $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
 # Figures need the outputs of runs, but for S18, and two of other commands.
@@ -26,16 +27,21 @@ FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc out/S19a.onset.nc out/S19b.ons
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export UV_PROJECT_ENVIRONMENT := $(CURDIR)/$(VENV)
 export UV_PYTHON_DOWNLOADS := never
+# Or the first start of each command compiles what it imports.
+export UV_COMPILE_BYTECODE := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
-.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures bench \
+.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures bench fuzz \
   reference lint clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
+	@printf '\nWhat uses what, from left to right (README, "Develop", tells what to touch to add something):\n'
+	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
+	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build
 	@:
@@ -66,6 +72,11 @@ figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py
 
+# Some cases of some attacks: make fuzz FUZZ="signals=20 --seed 7"; one of them: FUZZ="--only signals:7:3".
+FUZZ ?=
+fuzz: $(INSTALLED) ## Attack the program with some thousand cases at random
+	$(VENV)/bin/python tests/fuzz/fuzz.py $(FUZZ)
+
 reference: $(INSTALLED) ## Write the reference outputs of the tests anew, on purpose only
 	$(VENV)/bin/python tests/python/make_reference.py
 
@@ -79,25 +90,24 @@ lint: $(INSTALLED) ## Check the style of all sources
 clean: ## Remove the environment, what was built, and outputs
 	rm -rf build out $(VENV)
 
-# An output depends on its run, not on the program: a build does not make hours of outputs stale.
-out/%.nc: runs/%.toml | $(INSTALLED)
+# An output depends on its run and on what that is based on, not on the program: a build does not make
+# hours of outputs stale. Expanded a second time, when the name of the output is known.
+.SECONDEXPANSION:
+# Looked up once, and only if an output is asked for.
+chains = $(eval chains := $$(shell $(PYTHON) tools/bases runs))$(chains)
+bases = $(patsubst $(1)>%,%,$(filter $(1)>%,$(chains)))
+
+out/%.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) run $< -o $@
 
-out/%.curve.nc: runs/%.toml | $(INSTALLED)
+out/%.curve.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) curve $< -o $@
 
-out/%.onset.nc: runs/%.toml | $(INSTALLED)
+out/%.onset.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) onset $< -o $@
 
 out/%.png: out/%.nc | $(INSTALLED)
 	$(MESOSLIP) plot $< -o $@
-
-# The runs of the source's figures are variations of Klein's.
-$(FIGURE_OUTPUTS): runs/klein.toml
-out/S19a-me.nc: runs/S19a.toml
-out/S19b-me.nc: runs/S19b.toml
-$(patsubst runs/%.toml,out/%.nc,$(wildcard runs/limit-*.toml)): runs/limit-me.toml
-out/avalanche.nc: runs/S25d.toml
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)

@@ -231,7 +231,7 @@ end subroutine advance_simulation
 
 !> How far a simulation has come.
 subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, avalanche_slip, &
-   & advances, avalanches, integrator, status, message)
+   & error_estimate, advances, avalanches, integrator, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
@@ -241,8 +241,8 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    !> Why the run is over, 0 if it is not
    integer, intent(out) :: ending
    !> Time [s], displacement of the slider [m], breaks so far, contacts that are detached, slip in
-   !> avalanches [m]
-   real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip
+   !> avalanches [m], estimated error of the contact force [N]
+   real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip, error_estimate
    !> Advances and avalanches so far; steps, evaluations and failed steps of the integrator
    integer(8), intent(out) :: advances, avalanches, integrator(3)
    integer, intent(out) :: status
@@ -257,6 +257,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    breaks = 0.0d0
    detached = 0.0d0
    avalanche_slip = 0.0d0
+   error_estimate = 0.0d0
    advances = 0
    avalanches = 0
    integrator = 0
@@ -268,6 +269,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
       breaks = simulation%contacts%breaks
       detached = simulation%contacts%detached_count
       avalanche_slip = simulation%avalanches%slip
+      error_estimate = simulation%contacts%error_estimate
       advances = simulation%advances
       avalanches = simulation%avalanches%avalanches
       integrator = simulation%slider%integrator_counts
@@ -458,7 +460,8 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
    & acceptance, status, message)
    !f2py threadsafe
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_numerics_errors, only: error_type, status_invalid
+   use mesoslip_handles, only: report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
    implicit none
    integer, intent(in) :: law
@@ -478,26 +481,22 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
 
    value = 0.0_wp
    acceptance = 0.0_wp
-   status = 0
-   message = ""
    call new_threshold_law(threshold_law, law, relative_width, minimum, error)
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-      return
+   if (.not. allocated(error)) then
+      acceptance = threshold_law%acceptance
+      select case (what)
+      case (1)
+         value = threshold_law%quantile(argument)
+      case (2)
+         value = threshold_law%density(argument)
+      case (3)
+         value = threshold_law%survival(argument)
+      case default
+         call raise(error, status_invalid, &
+            & "a threshold law has thresholds, densities and survival probabilities")
+      end select
    end if
-   acceptance = threshold_law%acceptance
-   select case (what)
-   case (1)
-      value = threshold_law%quantile(argument)
-   case (2)
-      value = threshold_law%density(argument)
-   case (3)
-      value = threshold_law%survival(argument)
-   case default
-      status = status_invalid
-      message = "a threshold law has thresholds, densities and survival probabilities"
-   end select
+   call report(error, status, message)
 end subroutine evaluate_threshold_law
 
 !> Philox 4x32-10, for its tests and for whoever wants the same numbers elsewhere.
@@ -528,57 +527,52 @@ subroutine sundials(version)
 end subroutine sundials
 
 !> Scales of the lives of contacts under a slider that moves forward, dimensionless.
-subroutine contact_scales(law, relative_width, coupling, back_force_ratio, newborn_width, &
-   & reattach, initial, scales, status, message)
+subroutine contact_scales(length, names, values, scales, status, message)
    !f2py threadsafe
-   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_handles, only: report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_theory_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
+   use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    implicit none
-   !> Codes of threshold law, coupling and initial state; whether contacts attach again
-   integer, intent(in) :: law, coupling, initial, reattach
-   real(8), intent(in) :: relative_width, back_force_ratio
-   !> Standard deviation of the stretch of newborn contacts
-   real(8), intent(in) :: newborn_width
+   !> What the contacts are made of, each number by its name
+   integer, intent(in) :: length
+   character(len=32), intent(in) :: names(length)
+   real(8), intent(in) :: values(length)
    !> Shortest, longest and mean life of newborns; their stiffness and force at attaching; shortest
    !> and longest life of a relaxed first generation; mean force of stationary sliding; mean mass
    real(8), intent(out) :: scales(9)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
+   type(parameters_type) :: parameters
    type(contact_lives_type) :: lives
    type(error_type), allocatable :: error
 
-   scales = 0.0_wp
-   status = 0
-   message = ""
-   call new_contact_lives(lives, law, relative_width, coupling, back_force_ratio, newborn_width, &
-      & reattach /= 0, initial, error)
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-      return
+   scales = 0.0d0
+   call new_parameters(parameters, names, values)
+   call make_contact_lives(lives, parameters, error)
+   if (.not. allocated(error)) then
+      scales = [lives%shortest, lives%longest, lives%mean_life, lives%newborn_stiffness, &
+         & lives%newborn_force, lives%first_shortest, lives%first_longest, &
+         & lives%steady_force, lives%mean_mass]
    end if
-   scales = [lives%shortest, lives%longest, lives%mean_life, lives%newborn_stiffness, &
-      & lives%newborn_force, lives%first_shortest, lives%first_longest, &
-      & lives%steady_force, lives%mean_mass]
+   call report(error, status, message)
 end subroutine contact_scales
 
 !> Force curve of the master equation, dimensionless, on panels of the displacement.
-subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_width, &
-   & reattach, initial, start, width, panels, points, point, breaks, slope, force, stiffness, &
+subroutine force_curve(length, names, values, start, width, panels, points, point, solution, &
    & pinned_part, mismatch, status, message)
    !f2py threadsafe
-   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_handles, only: report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_theory_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
+   use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
    implicit none
-   !> Codes of threshold law, coupling and initial state; whether contacts attach again
-   integer, intent(in) :: law, coupling, initial, reattach
-   real(8), intent(in) :: relative_width, back_force_ratio
-   !> Standard deviation of the stretch of newborn contacts
-   real(8), intent(in) :: newborn_width
+   !> What the contacts are made of, each number by its name
+   integer, intent(in) :: length
+   character(len=32), intent(in) :: names(length)
+   real(8), intent(in) :: values(length)
    !> Start of the first panel, at or below 0, and width of the panels
    real(8), intent(in) :: start, width
    !> Number of panels, and of points in each
@@ -586,8 +580,7 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    !> Points within a panel, from 0 to 1
    real(8), intent(out) :: point(points)
    !> Breaks over displacement, slope of the force, force, stiffness of the pinned contacts
-   real(8), intent(out) :: breaks(points, panels), slope(points, panels)
-   real(8), intent(out) :: force(points, panels), stiffness(points, panels)
+   real(8), intent(out) :: solution(points, panels, 4)
    !> Part of the contacts that is pinned, at the edges of the panels
    real(8), intent(out) :: pinned_part(panels + 1)
    !> Largest difference between two ways to the force
@@ -595,40 +588,35 @@ subroutine force_curve(law, relative_width, coupling, back_force_ratio, newborn_
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
+   type(parameters_type) :: parameters
    type(contact_lives_type) :: lives
-   type(renewal_solution_type) :: solution
+   type(renewal_solution_type) :: renewal
    type(error_type), allocatable :: error
 
-   point = 0.0_wp
-   breaks = 0.0_wp
-   slope = 0.0_wp
-   force = 0.0_wp
-   stiffness = 0.0_wp
-   mismatch = 0.0_wp
-   pinned_part = 0.0_wp
-   status = 0
-   message = ""
-   call new_contact_lives(lives, law, relative_width, coupling, back_force_ratio, newborn_width, &
-      & reattach /= 0, initial, error)
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-      return
+   point = 0.0d0
+   solution = 0.0d0
+   mismatch = 0.0d0
+   pinned_part = 0.0d0
+   call new_parameters(parameters, names, values)
+   call make_contact_lives(lives, parameters, error)
+   if (.not. allocated(error)) then
+      call solve_renewal(lives, start, width, panels, points, renewal)
+      point = renewal%point
+      solution(:, :, 1) = renewal%breaks
+      solution(:, :, 2) = renewal%slope
+      solution(:, :, 3) = renewal%force
+      solution(:, :, 4) = renewal%stiffness
+      pinned_part = renewal%pinned
+      mismatch = renewal%mismatch
    end if
-   call solve_renewal(lives, start, width, panels, points, solution)
-   point = solution%point
-   breaks = solution%breaks
-   slope = solution%slope
-   force = solution%force
-   stiffness = solution%stiffness
-   pinned_part = solution%pinned
-   mismatch = solution%mismatch
+   call report(error, status, message)
 end subroutine force_curve
 
 !> Onset of slip, dimensionless, by Eq. S46 or S47.
 subroutine onset(equation, coefficients, damping, drag, end_displacement, interval, tolerance, &
    & capacity, samples, length, ended, status, message)
    !f2py threadsafe
+   use mesoslip_handles, only: report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_theory_onset, only: integrate_onset, onset_type
    implicit none
@@ -651,8 +639,6 @@ subroutine onset(equation, coefficients, damping, drag, end_displacement, interv
    type(error_type), allocatable :: error
    logical :: is_over
 
-   status = 0
-   message = ""
    equations%equation = equation
    equations%D = coefficients
    equations%damping = damping
@@ -660,8 +646,5 @@ subroutine onset(equation, coefficients, damping, drag, end_displacement, interv
    equations%end_displacement = end_displacement
    call integrate_onset(equations, interval, tolerance, samples, length, is_over, error)
    ended = merge(1, 0, is_over .and. .not. allocated(error))
-   if (allocated(error)) then
-      status = error%status
-      message = error%message
-   end if
+   call report(error, status, message)
 end subroutine onset

@@ -366,7 +366,7 @@ contains
       if (ending /= ending_slides) then
          call self%avalanches%close(self%slider, self%contacts, self%slider%displacement)
       end if
-      call self%recorder%finish(self%slider, self%contacts%breaks)
+      call self%recorder%finish()
       self%ending = ending
    end subroutine finish
 

@@ -60,6 +60,8 @@ module mesoslip_contacts_base
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
+      !> Estimated error of the contact force [N]; none where contacts are followed one by one
+      real(wp) :: error_estimate = 0.0_wp
       !> Cost of a response over that of one contact that breaks
       real(wp) :: cost = 1.0_wp
       !> Set when the contacts cannot go on
@@ -264,6 +266,7 @@ contains
       call archive%exchange("breaks", self%breaks)
       call archive%exchange("break_loss", self%break_loss)
       call archive%exchange("birth_gain", self%birth_gain)
+      call archive%exchange("error_estimate", self%error_estimate)
       call archive%exchange("cost", self%cost)
    end subroutine exchange_contacts
 

@@ -5,6 +5,8 @@
 !> it has borne, in either direction. A step of the slider is so short that its populations are
 !> points of a smooth density of origins. Over a step the contact force is a line that
 !> does the work of the true force, which is known in advance, so the steps are of second order.
+!> Work that a step did not do after all, the next ones make up for. The jump of the force between
+!> two lines is the estimate of the error.
 !>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations
@@ -54,6 +56,10 @@ module mesoslip_contacts_populations
    real(wp), parameter :: widest_spread = 0.35_wp
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: most_attached_part = 0.1_wp
+   !> Part of the contacts that is too small to attach again
+   real(wp), parameter :: negligible_part = 1.0e-30_wp
+   !> Part of a step's length below which a slider creeps
+   real(wp), parameter :: creeping_part = 0.01_wp
    !> A step may last so many times as long as expected
    real(wp), parameter :: patience = 1.5_wp
    !> Times beyond which nothing is expected [s]
@@ -67,12 +73,28 @@ module mesoslip_contacts_populations
    !> A gap that counts as none, over the length of a step.
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
+   !> What is expected to attach in a step.
+   type :: expected_births_type
+      !> How many contacts, and their mass
+      real(wp) :: number = 0.0_wp, mass = 0.0_wp
+      !> Sums over them of the time from the start of the step [s], and of its square
+      real(wp) :: moment = 0.0_wp, square = 0.0_wp
+      !> Until when the step may last for it [s]
+      real(wp) :: end_time = huge(1.0_wp)
+   end type expected_births_type
+
    !> Populations of contacts.
    type, extends(contacts_type) :: contact_populations_type
       !> Number of populations
       integer :: count = 0
       !> Length of a step [m]
       real(wp) :: step = 0.0_wp
+
+      !> Work that steps should have done and did not [J]: the next ones make up for it
+      real(wp), private :: debt = 0.0_wp
+      !> The law that was offered for the step, if one was
+      type(interface_law_type), private :: offered
+      logical, private :: offers = .false.
 
       !> First and last packet of detached contacts
       integer, private :: first = 1, last = 0
@@ -98,8 +120,10 @@ module mesoslip_contacts_populations
 
       !> Distance of a mean threshold f_s/k [m]
       real(wp), private :: stretch = 1.0_wp
-      !> Contacts that attach in one step at most
-      real(wp), private :: most_attached = 0.0_wp
+      !> Contacts that attach in one step at most, when the slider moves and when it rests
+      real(wp), private :: most_attached = 0.0_wp, most_attached_at_rest = 0.0_wp
+      !> Breaks in one step of populations that start to break in it, at most
+      real(wp), private :: most_late = 0.0_wp
       !> Mean stiffness of a contact that attaches [N/m], and the energy it gains [J]
       real(wp), private :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
       !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
@@ -119,7 +143,8 @@ module mesoslip_contacts_populations
       procedure :: rebuild
       !> Number of contacts that are pinned
       procedure :: pinned
-      procedure, private :: add_population, bear, try, break_tried, make_room, make_room_for_packets
+      procedure, private :: add_population, bear, try, try_until, break_tried
+      procedure, private :: make_room, make_room_for_packets
       procedure, private :: expect, attach_due
    end type contact_populations_type
 
@@ -149,6 +174,8 @@ contains
       self%most_attached = parameters%count * resolution * most_attached_part
       allocate (self%population(first_places, population_length), source=0.0_wp)
       allocate (self%packet(packet_length, first_places), source=0.0_wp)
+      self%most_attached_at_rest = self%most_attached * min(resolution, most_attached_part)
+      self%most_late = self%most_attached * resolution
 
       exponent = [0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp]
       one_over_stretch = -1.0_wp
@@ -323,14 +350,17 @@ contains
       !> Where it holds
       type(window_type), intent(out) :: window
 
-      real(wp) :: sense, duration, part, births, mass, way, mean_force, slack
-      logical :: breaks
+      real(wp) :: sense, duration, reach, part, way, slack
+      logical :: breaks, rests, creeps
+      type(expected_births_type) :: births
 
       sense = pose%sense
       if (.not. abs(pose%velocity) > 0.0_wp .and. abs(pose%acceleration) > 0.0_wp) then
          sense = sign(1.0_wp, pose%acceleration)
       end if
+      rests = pose%velocity**2 <= creeping_part * sense * pose%acceleration * self%step
       slack = tiny_gap * self%step
+      reach = self%step
       if (sense > 0.0_wp) then
          breaks = self%ahead - pose%displacement <= slack
       else
@@ -339,95 +369,167 @@ contains
       self%trials = 0
       self%trial_breaks = 0.0_wp
       self%trial_mass = 0.0_wp
-      if (breaks) call self%try(pose%displacement + sense * self%step, sense)
+      if (breaks) call self%try(pose%displacement, sense, reach)
       breaks = self%trials > 0
-      duration = time_to_move(pose, sense, self%step)
-      call self%expect(pose%time, duration, births, mass, window%end_time)
-      ! What is expected holds for about the time the slider is expected to take.
-      if (births > 0.0_wp .and. duration < longest_time) then
-         window%end_time = min(window%end_time, pose%time + patience * duration)
+      duration = time_to_move(pose, sense, reach)
+      part = way_made(pose, sense, duration) / reach
+      call self%expect(pose%time, duration, part * self%trial_breaks, self%most_attached, births)
+      creeps = .false.
+      if (births%number > 0.0_wp) then
+         creeps = rests .or. way_made(pose, sense, min(duration, births%end_time - pose%time)) &
+            & < creeping_part * self%step
       end if
+      if (creeps) then
+         ! The slider may turn at any time, and with it the force of what attaches, which cannot be
+         ! known: little may attach until it can.
+         if (rests) duration = sqrt(creeping_part) * duration
+         part = way_made(pose, sense, duration) / reach
+         call self%expect(pose%time, duration, part * self%trial_breaks, &
+            & self%most_attached_at_rest, births)
+      end if
+      window%end_time = births%end_time
 
       window%upper = max(self%ahead, pose%displacement)
       window%lower = min(self%behind, pose%displacement)
-      if (breaks .or. births > 0.0_wp) then
-         window%upper = min(window%upper, pose%displacement + self%step)
-         window%lower = max(window%lower, pose%displacement - self%step)
-      end if
-      if (breaks) then
-         ! Contacts break one way: the step ends where the slider turns round.
+      if (breaks .or. births%number > 0.0_wp) then
+         ! Contacts break one way and attach with a force against it: the step ends where the slider
+         ! turns round.
          if (sense > 0.0_wp) then
-            window%upper = pose%displacement + self%step
+            window%upper = pose%displacement + reach
+            if (.not. breaks) window%upper = min(window%upper, max(self%ahead, pose%displacement))
             window%lower = pose%displacement
             if (.not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
          else
-            window%lower = pose%displacement - self%step
+            window%lower = pose%displacement - reach
+            if (.not. breaks) window%lower = max(window%lower, min(self%behind, pose%displacement))
             window%upper = pose%displacement
             if (.not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
          end if
       end if
 
       ! What an observer sees in the step is its middle; the step may end before all breaks.
-      part = 0.0_wp
-      if (duration < longest_time) then
-         part = (min(window%end_time, pose%time + duration) - pose%time) / duration
-      end if
+      duration = min(duration, births%end_time - pose%time)
+      way = way_made(pose, sense, duration)
+      part = way / reach
       self%detached_count = max(0.0_wp, self%detached_number%total() &
-         & + 0.5_wp * (part * self%trial_breaks - births))
+         & + 0.5_wp * (part * self%trial_breaks - births%number))
       law = self%law()
       law%drag = max(0.0_wp, law%drag &
-         & + 0.5_wp * self%parameters%drag * (part * self%trial_mass - mass))
+         & + 0.5_wp * self%parameters%drag * (part * self%trial_mass - births%mass))
       ! Lines that do the right work in the step, and start from the force there is: it does not
       ! depend on the direction in which the slider goes on.
-      if (breaks) call add_slope(-2.0_wp * self%trial_work / self%step**2)
-      if (births > 0.0_wp) then
-         way = min(self%step, abs(pose%velocity) * min(duration, window%end_time - pose%time))
-         mean_force = births * (0.5_wp * self%parameters%static_force &
-            & * self%parameters%back_force_ratio + self%newborn_stiffness * way / 6.0_wp)
-         if (way > 0.5_wp * self%step) then
-            call add_slope(2.0_wp * mean_force / way)
-         else
-            ! Near a turning point the sign of their force is open.
-            law%offset = law%offset - sense * mean_force * (2.0_wp * way / self%step)
+      if (breaks) call add_line(0.0_wp, -2.0_wp * self%trial_work / reach**2)
+      if (births%number > 0.0_wp) then
+         if (.not. creeps) then
+            call add_births()
+         else if (.not. abs(pose%velocity) + abs(pose%acceleration) > 0.0_wp) then
+            ! While the slider rests the force is what it will be on average.
+            call add_line(sense * 0.5_wp * births%number * self%parameters%static_force &
+               & * self%parameters%back_force_ratio, 0.0_wp)
          end if
       end if
+      if ((breaks .or. births%number > 0.0_wp) .and. .not. rests) then
+         call add_line(sense * self%debt / self%step, 0.0_wp)
+      end if
+      self%offered = law
+      self%offers = .true.
 
    contains
 
-      !> Have the force change with the way that the slider makes in the step.
-      subroutine add_slope(slope)
-         real(wp), intent(in) :: slope
+      !> Add a force and its change with the way that the slider makes in the step.
+      subroutine add_line(force, slope)
+         real(wp), intent(in) :: force, slope
 
          law%stiffness = law%stiffness + slope
-         law%offset = law%offset + slope * pose%displacement
-      end subroutine add_slope
+         law%offset = law%offset + slope * pose%displacement - force
+      end subroutine add_line
+
+      !> Add what the contacts that attach in the step will bear.
+      subroutine add_births()
+         real(wp) :: time, square, place, sum, force
+
+         time = births%moment / births%number
+         square = births%square / births%number
+         place = abs(pose%velocity) * time + 0.5_wp * sense * pose%acceleration * square
+         sum = births%number * self%parameters%static_force * self%parameters%back_force_ratio
+         ! The line is that of contacts which attach evenly on the way; what it starts with makes up
+         ! for the work when the velocity changes in the step.
+         force = sum * 0.5_wp * sense * pose%acceleration * (time * duration - square) / way
+         call add_line(sense * force, (2.0_wp * sum * (1.0_wp - time / duration) &
+            & + self%newborn_stiffness * births%number * (way - place)**2 / way) / way)
+      end subroutine add_births
 
    end subroutine offer
 
-   !> Time in which the slider will move by a distance; huge if it does not.
+   !> Time in which the slider will move by a distance, or turn round; huge if it does not move.
    pure function time_to_move(pose, sense, distance) result(time)
       type(pose_type), intent(in) :: pose
       real(wp), intent(in) :: sense, distance
       real(wp) :: time
 
-      real(wp) :: speed
+      real(wp) :: speed, square
 
       speed = abs(pose%velocity)
-      speed = speed + sqrt(max(0.0_wp, speed**2 + 2.0_wp * sense * pose%acceleration * distance))
+      square = speed**2 + 2.0_wp * sense * pose%acceleration * distance
       time = huge(1.0_wp)
-      if (speed > distance / time) time = 2.0_wp * distance / speed
+      if (square > 0.0_wp) then
+         speed = speed + sqrt(square)
+         if (speed > distance / time) time = 2.0_wp * distance / speed
+      else if (speed > 0.0_wp) then
+         time = speed / abs(pose%acceleration)
+      end if
    end function time_to_move
 
-   !> Find what breaks until the slider comes to a displacement.
-   subroutine try(self, displacement, sense)
+   !> Way that the slider will make in a time, in the direction in which it moves.
+   pure function way_made(pose, sense, time) result(way)
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(in) :: sense, time
+      real(wp) :: way
+
+      way = 0.0_wp
+      if (time < longest_time) then
+         way = time * (abs(pose%velocity) + 0.5_wp * sense * pose%acceleration * time)
+      end if
+   end function way_made
+
+   !> Find what breaks on a way of the slider.
+   !>
+   !> Where many populations start to break together, as they do where the slider turned before, the
+   !> force has a kink: a way ends there.
+   subroutine try(self, start, sense, way)
       class(contact_populations_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement, sense
+      !> Where the way starts [m], and in which direction it goes
+      real(wp), intent(in) :: start, sense
+      !> Its length [m]
+      real(wp), intent(inout) :: way
+
+      real(wp) :: late, onset
+
+      call self%try_until(start, start + sense * way, sense, late, onset)
+      if (late > self%most_late) then
+         way = abs(onset - start)
+         call self%try_until(start, onset, sense, late, onset)
+      end if
+   end subroutine try
+
+   !> Find what breaks until the slider comes to a displacement.
+   subroutine try_until(self, start, displacement, sense, late, onset)
+      class(contact_populations_type), intent(inout) :: self
+      !> Where the slider is, where it comes to [m], and in which direction it goes
+      real(wp), intent(in) :: start, displacement, sense
+      !> Breaks of populations that start to break on the way, and where most of them do so [m]
+      real(wp), intent(out) :: late, onset
 
       real(wp) :: moments(moments_length), loss(moments_length), distance, force, broken, next
+      real(wp) :: most, edge
       integer :: place, row
 
       row = merge(row_ahead, row_behind, sense > 0.0_wp)
       next = huge(1.0_wp)
+      late = 0.0_wp
+      most = 0.0_wp
+      onset = displacement
+      edge = sense * start + tiny_gap * self%step
       self%trials = 0
       if (allocated(self%trial_population)) then
          if (size(self%trial_population) < self%count) then
@@ -466,6 +568,13 @@ contains
          self%trial_mass = self%trial_mass + loss(massive)
          self%trial_work = self%trial_work + 0.5_wp * (loss(stiff) * distance**2 &
             & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 - loss(lost))
+         if (sense * self%population(place, row) > edge) then
+            late = late + loss(number)
+            if (loss(number) > most) then
+               most = loss(number)
+               onset = self%population(place, row)
+            end if
+         end if
       end do
       self%trial_work = self%trial_work * self%parameters%static_force * self%stretch
       self%trial_next = sense * next
@@ -473,7 +582,7 @@ contains
          if (sense > 0.0_wp) self%ahead = self%trial_next
          if (sense < 0.0_wp) self%behind = self%trial_next
       end if
-   end subroutine try
+   end subroutine try_until
 
    !> Break what was found to break.
    subroutine break_tried(self)
@@ -531,30 +640,47 @@ contains
       !> Where the slider was, and where it is
       type(pose_type), intent(in) :: before, after
 
-      real(wp) :: sense
+      real(wp) :: sense, late, onset, way, gain
       logical :: reaches
 
-      sense = sign(1.0_wp, after%displacement - before%displacement)
+      way = after%displacement - before%displacement
+      sense = sign(1.0_wp, way)
       if (sense > 0.0_wp) then
          reaches = after%displacement > self%ahead
       else
          reaches = after%displacement < self%behind
       end if
+      ! The work that the offered law did, beyond that of the contacts which are pinned by now.
+      gain = way * (0.5_wp * (self%offered%stiffness - self%stiffness%total()) &
+         & * (after%displacement + before%displacement) &
+         & - (self%offered%offset - self%offset%total()))
       if (reaches) then
          if (self%trials == 0 .or. abs(self%trial_end - after%displacement) > 0.0_wp) then
-            call self%try(after%displacement, sense)
+            call self%try_until(before%displacement, after%displacement, sense, late, onset)
          end if
          call self%break_tried()
-         if (self%parameters%reattach .and. self%trial_breaks > 0.0_wp) then
+         if (self%trials > 0) gain = gain + self%trial_work
+         if (self%parameters%reattach &
+            & .and. self%trial_breaks > negligible_part * self%parameters%count) then
             if (self%last == size(self%packet, 2)) call self%make_room_for_packets()
             self%last = self%last + 1
             self%packet(:, self%last) = [before%time, after%time, self%trial_breaks, &
                & self%trial_mass]
          end if
       end if
-      if (self%first <= self%last) call self%attach_due(before, after)
+      if (self%first <= self%last) call self%attach_due(before, after, gain)
       self%detached_count = self%detached_number%total()
       self%cost = 1.0_wp + self%count / populations_per_cost
+      if (self%offers) then
+         self%debt = self%debt - gain
+         ! The jump of the force from the end of a step to the start of the next: what the lines of
+         ! the steps leave open, of the order of the error of the force.
+         self%error_estimate = max(self%error_estimate, abs((self%offered%stiffness &
+            & - self%stiffness%total()) * after%displacement &
+            & - (self%offered%offset - self%offset%total()) + (self%offered%drag &
+            & - self%parameters%drag * self%detached_mass%total()) * after%velocity))
+      end if
+      self%offers = .false.
    end subroutine respond
 
    !> Make room for one more packet: where some have attached, or in a larger array.
@@ -587,61 +713,90 @@ contains
       if (place == self%first) early = early + self%attached_part * (late - early)
    end subroutine due_times
 
-   !> How many contacts will attach in a step, and until when it may last for it.
-   subroutine expect(self, time, duration, births, mass, end_time)
+   !> What will attach in a step, and until when it may last for it.
+   subroutine expect(self, time, duration, breaks, most, births)
       class(contact_populations_type), intent(in) :: self
-      !> When the step starts, and how long it will last if nothing ends it
+      !> When the step starts, and how long it will last if nothing ends it [s]
       real(wp), intent(in) :: time, duration
-      !> Contacts that will attach in the step, their mass, and the end of the step
-      real(wp), intent(out) :: births, mass, end_time
+      !> Contacts that break in the step
+      real(wp), intent(in) :: breaks
+      !> Contacts that may attach in one step
+      real(wp), intent(in) :: most
+      !> What is expected
+      type(expected_births_type), intent(out) :: births
 
-      real(wp) :: early, late, until, left, more
+      real(wp) :: early, late, until, left
       integer :: place
 
-      births = 0.0_wp
-      mass = 0.0_wp
-      end_time = huge(1.0_wp)
       until = time
       do place = self%first, self%last
          call due_times(self, place, early, late)
          if (early > until) then
             ! Nothing attaches for a while: the step ends where that changes.
-            end_time = early
-            if (births > 0.0_wp) end_time = until
+            births%end_time = early
+            if (births%number > 0.0_wp) births%end_time = until
             return
          end if
          left = self%packet(row_number, place)
          if (place == self%first) left = left * (1.0_wp - self%attached_part)
-         until = min(late, time + duration)
-         more = left
-         if (until < late) more = left * max(0.0_wp, until - early) / (late - early)
-         if (births + more > self%most_attached) then
-            more = self%most_attached - births
-            end_time = max(early + more / left * (late - early), nearest(time, 1.0_wp))
+         call add(left, self%packet(row_mass, place) / self%packet(row_number, place))
+         if (births%end_time < huge(1.0_wp)) return
+         if (late >= time + duration) then
+            ! What is expected holds for about the time the slider is expected to take.
+            births%end_time = max(time + patience * duration, nearest(time, 1.0_wp))
+            return
          end if
-         births = births + more
-         mass = mass + more * self%packet(row_mass, place) / self%packet(row_number, place)
-         if (until < late .or. end_time < huge(1.0_wp)) return
+         until = late
       end do
       if (self%parameters%reattach .and. self%parameters%delay < duration &
-         & .and. self%trial_breaks > 0.0_wp) then
+         & .and. breaks > 0.0_wp) then
          ! What breaks in this step starts to attach in it.
-         more = self%trial_breaks * (1.0_wp - self%parameters%delay / duration)
-         if (births + more > self%most_attached) then
-            more = self%most_attached - births
-            end_time = time + self%parameters%delay + more / self%trial_breaks * duration
-         end if
-         births = births + more
-         mass = mass + more * self%trial_mass / self%trial_breaks
+         early = time + self%parameters%delay
+         late = early + duration
+         call add(breaks, self%trial_mass / self%trial_breaks)
+         births%end_time = min(births%end_time, max(time + patience * duration, &
+            & nearest(time, 1.0_wp)))
+      else if (births%number > 0.0_wp) then
+         births%end_time = until
       end if
+
+   contains
+
+      !> Add contacts that attach evenly from early to late.
+      subroutine add(count, mass)
+         !> How many, and their mean mass
+         real(wp), intent(in) :: count, mass
+
+         real(wp) :: more, middle, length
+
+         length = late - early
+         more = count
+         if (late > time + duration) then
+            length = max(0.0_wp, time + duration - early)
+            more = count * length / (late - early)
+         end if
+         if (births%number + more > most) then
+            if (more > 0.0_wp) length = length * (most - births%number) / more
+            more = most - births%number
+            births%end_time = max(early + length, nearest(time, 1.0_wp))
+         end if
+         middle = max(0.0_wp, early + 0.5_wp * length - time)
+         births%number = births%number + more
+         births%mass = births%mass + more * mass
+         births%moment = births%moment + more * middle
+         births%square = births%square + more * (middle**2 + length**2 / 12.0_wp)
+      end subroutine add
+
    end subroutine expect
 
    !> Attach all contacts that are due, as one population where they do on average.
-   subroutine attach_due(self, before, after)
+   subroutine attach_due(self, before, after, gain)
       class(contact_populations_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
+      !> Work [J], less what the new contacts take up until the slider is where it is
+      real(wp), intent(inout) :: gain
 
-      real(wp) :: early, late, until, part, part_before, births, moment, more
+      real(wp) :: early, late, until, part, part_before, births, moment, more, origin, force, way
 
       births = 0.0_wp
       moment = 0.0_wp
@@ -672,11 +827,15 @@ contains
 
       call self%detached_number%add(-births)
       call self%birth_gain%add(births * self%newborn_energy)
-      call self%add_population(moment / births, &
-         & after%sense * self%parameters%back_force_ratio, births, 1, 0.0_wp, after%displacement)
+      origin = moment / births
+      force = after%sense * self%parameters%back_force_ratio
+      way = after%displacement - origin
+      gain = gain - births * way * (force * self%parameters%static_force &
+         & + 0.5_wp * self%newborn_stiffness * way)
       call self%stiffness%add(self%newborn_stiffness * births)
-      call self%offset%add(self%newborn_stiffness * moment - self%parameters%static_force * births &
-         & * after%sense * self%parameters%back_force_ratio)
+      call self%offset%add(self%newborn_stiffness * moment &
+         & - self%parameters%static_force * births * force)
+      call self%add_population(origin, force, births, 1, 0.0_wp, after%displacement)
    end subroutine attach_due
 
    !> Where the slider was at a time of its last motion, by Hermite's interpolation [m].
@@ -769,6 +928,7 @@ contains
       call archive%exchange("behind", self%behind)
       call archive%exchange("stiffness", self%stiffness)
       call archive%exchange("offset", self%offset)
+      call archive%exchange("debt", self%debt)
    end subroutine exchange
 
    !> Nothing is derived from the state: all of it is in the archive.

@@ -14,6 +14,7 @@ module mesoslip_contacts_set
    use mesoslip_schedule, only: most_events, schedule_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts, &
       & extent_length
+   use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
    use mesoslip_contacts_mechanics, only: coupling_scaled, initial_steady, initial_uniform
    use mesoslip_contacts_record, only: record_length, row_limit, row_next, row_origin, &
       & row_renewal, row_stiffness
@@ -120,24 +121,19 @@ contains
       integer, intent(in) :: state
 
       integer :: contact
-      integer(i8) :: attempt
-      real(wp) :: uniform(2), threshold, largest, stiffness, limit, back, stretch
+      real(wp) :: uniform(2), threshold, stiffness, limit, back, stretch
+      type(carried_law_type) :: carried
 
-      largest = self%parameters%law%quantile(2.0_wp**(-53))
+      if (state == initial_steady) call new_carried_law(carried, self%parameters%law, &
+         & self%parameters%coupling, self%parameters%back_force_ratio)
       do contact = 1, self%parameters%count
-         attempt = 0
-         do
-            call uniform_pair(self%parameters%seed, self%parameters%realization, &
-               & int(contact - 1, i8), 0_i8, attempt, uniform)
+         call uniform_pair(self%parameters%seed, self%parameters%realization, &
+            & int(contact - 1, i8), 0_i8, 0_i8, uniform)
+         if (state == initial_steady) then
+            threshold = carried%quantile(uniform(1))
+         else
             threshold = self%parameters%law%quantile(uniform(1))
-            ! Thresholds of sliding contacts are weighted by how far the contact is carried.
-            if (state /= initial_steady) exit
-            call uniform_pair(self%parameters%seed, self%parameters%realization, &
-               & int(contact - 1, i8), 0_i8, attempt + 1, uniform)
-            if (uniform(1) * carried(self%parameters, largest) &
-               & <= carried(self%parameters, threshold)) exit
-            attempt = attempt + 2
-         end do
+         end if
 
          call born(self%parameters, threshold, stiffness, limit)
          select case (state)
@@ -554,17 +550,5 @@ contains
       if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
       limit = threshold * parameters%static_force / stiffness
    end subroutine born
-
-   !> How far the slider carries a contact from attaching to breaking.
-   pure function carried(parameters, threshold) result(distance)
-      type(contact_parameters_type), intent(in) :: parameters
-      real(wp), intent(in) :: threshold
-      real(wp) :: distance
-
-      real(wp) :: stiffness, limit
-
-      call born(parameters, threshold, stiffness, limit)
-      distance = limit - parameters%back_force_ratio * parameters%static_force / stiffness
-   end function carried
 
 end module mesoslip_contacts_set

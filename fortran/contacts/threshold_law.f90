@@ -233,7 +233,7 @@ contains
       case (law_weibull)
          if (threshold > 0.0_wp) survival = exp(-(threshold / self%scale)**self%shape)
       case (law_exponential)
-         survival = min(1.0_wp, exp(-(threshold - self%location) / self%scale))
+         survival = exp(-max(0.0_wp, (threshold - self%location) / self%scale))
       case default
          return
       end select

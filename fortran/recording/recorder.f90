@@ -5,11 +5,24 @@
 !> The spring force of a slip is the mean elastic force of a slider of layers, K (X_d - X_1): the
 !> force at the drive has the waves in the slider as well.
 !>
-!> A slip starts where the spring force is greatest, that is where the slider becomes faster than
-!> the drive, if it goes on to exceed the drive's velocity by the slip velocity. It ends where the
-!> spring force is least, before the slider has been slow again for half a period of the setup.
-!> While the slider is still ringing, a new slip starts if the spring force has regained half its
-!> drop and most contacts are pinned.
+!> A slip is a time in which contacts break and the block travels by more than it rings.
+!>
+!> While the block is faster than the drive, the spring force falls, from a maximum to a minimum. Of
+!> a slip is such a fall, or several that lead lower and lower, if
+!>
+!> - the block exceeds the drive's velocity by the slip velocity,
+!> - at least one contact breaks, and
+!> - the force falls by more than twice what it had regained by ringing, so that the block travels
+!>   farther beyond what ringing gives back than it rings. Regained is the height above the least
+!>   minimum of the last three quarters of a period of the setup: contacts only make the block ring
+!>   faster, so that ringing takes half a period, with damping a little more; what takes longer is
+!>   loading.
+!>
+!> A slip starts at the maximum. It ends at the least minimum, after which no lower one comes within
+!> half a period, or before the force has regained half its drop and most contacts are pinned. A
+!> stage of the drive ends it too: the fall that a slower drive starts is none of the block's own.
+!>
+!> A finer trace goes on until the block has been slow for half a period, or another slip starts.
 module mesoslip_recording_recorder
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
@@ -34,11 +47,18 @@ module mesoslip_recording_recorder
    integer, parameter :: most_samples_in_step = 1000
    !> Samples of either trace, and slips, that wait before the run pauses to have them taken away
    integer, parameter :: many_samples = 20000, many_slips = 2000
+   !> Minima for which there is room at first
+   integer, parameter :: many_minima = 16
 
    !> A part of an interval that counts as nothing.
    real(wp), parameter :: tiny_part = 1.0e-6_wp
 
-   integer, parameter :: phase_slow = 0, phase_fast = 1, phase_slip = 2
+   !> A fall of the force makes a slip if it is more than this many times what ringing regained.
+   real(wp), parameter :: least_fall = 2.0_wp
+   !> Time in which ringing comes from a minimum to a maximum, in half periods of the undamped setup
+   real(wp), parameter :: longest_rise = 1.5_wp
+   !> What is being followed: nothing, a fall that may come to be a slip, a slip
+   integer, parameter :: phase_slow = 0, phase_fall = 1, phase_slip = 2
 
    !> What to record.
    type :: recorder_parameters_type
@@ -48,7 +68,7 @@ module mesoslip_recording_recorder
       real(wp) :: slip_interval = 0.0_wp
       !> Velocity above the drive's that makes a slip [m/s]; zero for no slips
       real(wp) :: slip_velocity = 0.0_wp
-      !> Half a period of the setup [s]
+      !> Half a period of the setup, or of what rings more slowly [s]
       real(wp) :: quiet_time = 0.0_wp
       !> Time at which the run ends [s]
       real(wp) :: duration = 0.0_wp
@@ -78,11 +98,26 @@ module mesoslip_recording_recorder
       integer(i8), private :: slip_samples = 0
       !> Time of the next one [s]
       real(wp), private :: next_slip_sample = huge(1.0_wp)
-      real(wp), private :: sense = 1.0_wp, last_excess = 0.0_wp, last_fast = 0.0_wp
-      real(wp), private :: start_time = 0.0_wp, end_time = 0.0_wp, force_before = 0.0_wp
-      real(wp), private :: force_after = 0.0_wp, peak_velocity = 0.0_wp
-      real(wp), private :: breaks_before = 0.0_wp, breaks_after = 0.0_wp
-      logical, private :: has_least = .false.
+      !> Number of the slip whose trace is taken
+      integer(i8), private :: traced = 0
+      !> Whether a finer trace is taken, and whether it has been of a slip
+      logical, private :: is_tracing = .false., has_traced = .false.
+      !> Velocity of the drive in this stage [m/s], and its sign, or the last one
+      real(wp), private :: drive_velocity = 0.0_wp, sense = 1.0_wp
+      !> Velocity of the block above the drive's [m/s], and when it was last fast
+      real(wp), private :: last_excess = 0.0_wp, last_fast = 0.0_wp
+      !> Time, force and breaks at the start of a fall or slip, and at its least force so far
+      real(wp), private :: start_time = 0.0_wp, force_before = 0.0_wp, breaks_before = 0.0_wp
+      real(wp), private :: end_time = 0.0_wp, force_after = 0.0_wp, breaks_after = 0.0_wp
+      !> Force that ringing had regained at its start [N]
+      real(wp), private :: regained = 0.0_wp
+      !> Greatest velocity up to the least force, and since then [m/s]
+      real(wp), private :: peak_velocity = 0.0_wp, later_peak = 0.0_wp
+      !> Whether the block has been fast in the present fall, and a least force is known
+      logical, private :: is_quick = .false., has_least = .false.
+      !> Minima of the force: time and force, times the sense, each above the one before; those
+      !> that a later one went below are not needed any more
+      type(buffer_type), private :: minima
    contains
       !> Make room for what will be recorded
       procedure :: open
@@ -102,7 +137,10 @@ module mesoslip_recording_recorder
       procedure :: finish
       !> Put the state into an archive or take it out
       procedure :: exchange
-      procedure, private :: begin_fast, follow_slip, close_slip, take_samples, take_slip_samples
+      procedure, private :: change_stage, pass_maximum, see_minimum
+      procedure, private :: begin_fall, drop_fall, follow, close_slip, stop_trace
+      procedure, private :: add_minimum, height
+      procedure, private :: take_samples, take_slip_samples
    end type recorder_type
 
 contains
@@ -118,6 +156,7 @@ contains
       call self%trace%open(trace_length, many_samples + most_samples_in_step)
       call self%slip_trace%open(slip_trace_length, many_samples + most_samples_in_step)
       call self%slips%open(slip_length, many_slips)
+      call self%minima%open(2, many_minima)
       call self%layers%open(parameters%layers, many_samples + most_samples_in_step)
    end subroutine open
 
@@ -140,7 +179,7 @@ contains
       integer :: number
 
       number = self%slip_trace%count
-      if (self%phase == phase_fast) number = self%kept_count
+      if (self%phase == phase_fall) number = self%kept_count
    end function final_slip_samples
 
    !> Take samples of slip traces away.
@@ -165,38 +204,32 @@ contains
       !> Breaks before and during the advance
       real(wp), intent(in) :: breaks
 
-      real(wp) :: excess, start_excess
+      real(wp) :: excess
+      logical :: turns
 
       if (self%next_sample <= slider%time) call self%take_samples(slider, detached)
       if (self%parameters%slip_velocity <= 0.0_wp) return
 
-      if (self%phase == phase_slow .and. abs(slider%drive_velocity) > 0.0_wp) then
-         self%sense = sign(1.0_wp, slider%drive_velocity)
+      if (abs(slider%drive_velocity - self%drive_velocity) > 0.0_wp .or. slider%time <= 0.0_wp) then
+         call self%change_stage(slider, breaks)
       end if
-      start_excess = self%last_excess
-      excess = self%sense * (slider%velocity - slider%drive_velocity)
+      excess = self%sense * (slider%velocity + slider%base_velocity - slider%drive_velocity)
+      turns = excess > 0.0_wp .neqv. self%last_excess > 0.0_wp
       self%last_excess = excess
-      if (self%phase == phase_slow) then
-         if (excess <= 0.0_wp) return
-         call self%begin_fast(slider, start_excess, breaks)
-      end if
-
-      if (self%next_slip_sample <= slider%time) call self%take_slip_samples(slider, detached)
-      if (self%phase == phase_fast) then
-         if (excess > self%parameters%slip_velocity) then
-            self%phase = phase_slip
-         else if (excess <= 0.0_wp) then
-            self%phase = phase_slow
-            self%slip_trace%count = min(self%slip_trace%count, self%kept_count)
-            return
+      if (turns) then
+         if (excess > 0.0_wp) then
+            call self%pass_maximum(slider, detached, breaks)
+         else
+            call self%see_minimum(pace(slider, self%sense), breaks)
          end if
       end if
-      if (self%phase == phase_slip) then
-         call self%follow_slip(slider, start_excess, excess, detached, breaks)
-      end if
+      if (self%is_tracing) call self%follow(slider, excess, detached)
    end subroutine record
 
-   !> The first steps of a slider after which record would do more than take note of the velocity.
+   !> The first step of a slider after which record would do more than take note of the velocity.
+   !>
+   !> It is that where the excess over the drive's velocity leaves the interval between 0 and the slip
+   !> velocity in which it is, or something is due.
    pure function watch(self, slider)
       !> The recorder
       class(recorder_type), intent(in) :: self
@@ -205,41 +238,42 @@ contains
       !> What is of interest
       type(watch_type) :: watch
 
+      real(wp) :: fast
+
       watch%time = self%next_sample
       if (self%parameters%slip_velocity <= 0.0_wp) return
+      if (abs(slider%drive_velocity - self%drive_velocity) > 0.0_wp .or. slider%time <= 0.0_wp) then
+         ! The start of a stage is of interest in itself.
+         watch%time = -huge(1.0_wp)
+         return
+      end if
 
       watch%reference = slider%drive_velocity
       watch%sense = self%sense
-      select case (self%phase)
-      case (phase_slow)
-         if (abs(slider%drive_velocity) > 0.0_wp) watch%sense = sign(1.0_wp, slider%drive_velocity)
-         watch%upto = 0.0_wp
-         return
-      case (phase_fast)
+      if (self%last_excess > 0.0_wp) then
          watch%above = 0.0_wp
-         watch%upto = self%parameters%slip_velocity
-      case default
-         watch%peaks = .true.
-         associate (fast => self%parameters%slip_velocity)
-            if (self%last_excess > fast) then
-               watch%above = fast
-            else if (self%last_excess > 0.0_wp) then
-               watch%above = 0.0_wp
-               watch%upto = fast
-            else if (self%last_excess >= -fast) then
-               watch%above = nearest(-fast, -1.0_wp)
-               watch%upto = 0.0_wp
-            else
-               watch%upto = nearest(-fast, -1.0_wp)
-            end if
-            if (abs(self%last_excess) <= fast) then
-               ! A step or two too early does no harm.
-               watch%time = min(watch%time, self%last_fast + self%parameters%quiet_time &
-                  & - 4.0_wp * spacing(self%last_fast + self%parameters%quiet_time))
-            end if
-         end associate
-      end select
+      else
+         watch%upto = 0.0_wp
+      end if
+      if (.not. self%is_tracing) return
+
       watch%time = min(watch%time, self%next_slip_sample)
+      watch%peaks = self%is_quick
+      fast = self%parameters%slip_velocity
+      if (self%last_excess > fast) then
+         watch%above = fast
+      else if (self%last_excess < -fast) then
+         watch%upto = nearest(-fast, -1.0_wp)
+      else
+         if (self%last_excess > 0.0_wp) then
+            watch%upto = fast
+         else
+            watch%above = nearest(-fast, -1.0_wp)
+         end if
+         ! A step or two too early does no harm.
+         watch%time = min(watch%time, self%last_fast + self%parameters%quiet_time &
+            & - 4.0_wp * spacing(self%last_fast + self%parameters%quiet_time))
+      end if
    end function watch
 
    !> Take note of steps of a slider that were of no interest.
@@ -251,10 +285,9 @@ contains
 
       if (self%parameters%slip_velocity <= 0.0_wp .or. .not. watch%has_passed) return
       self%last_excess = watch%excess
-      if (self%phase == phase_slow) self%sense = watch%sense
-      if (self%phase /= phase_slip) return
-      self%peak_velocity = max(self%peak_velocity, watch%fastest)
+      if (.not. self%is_tracing) return
       if (abs(watch%excess) > self%parameters%slip_velocity) self%last_fast = watch%passed_time
+      if (self%is_quick) self%later_peak = max(self%later_peak, watch%fastest)
    end subroutine pass_over
 
    !> Take the samples of the trace that the last advance of a slider came past.
@@ -278,118 +311,246 @@ contains
       end do
    end subroutine take_samples
 
-   !> The slider has become faster than the drive: a slip may start here.
-   subroutine begin_fast(self, slider, start_excess, breaks)
+   !> The drive took another velocity at the start of the last advance, or the run started there.
+   subroutine change_stage(self, slider, breaks)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
-      real(wp), intent(in) :: start_excess
       real(wp), intent(in) :: breaks
 
       type(motion_type) :: motion
 
       motion = slider%observe(slider%step_time)
-      if (start_excess < 0.0_wp) motion = pace(slider)
-      self%phase = phase_fast
+      if (self%last_excess > 0.0_wp) call self%see_minimum(motion, breaks)
+      if (self%phase == phase_slip) call self%close_slip()
+      if (self%phase == phase_fall) call self%drop_fall()
+      call self%stop_trace()
+      self%drive_velocity = slider%drive_velocity
+      if (abs(slider%drive_velocity) > 0.0_wp) self%sense = sign(1.0_wp, slider%drive_velocity)
+      self%last_excess = self%sense &
+         & * (motion%velocity + motion%base_velocity - slider%drive_velocity)
+      ! What a faster drive stretches before the block has its velocity is regained too.
+      self%minima%count = 0
+      call self%add_minimum(motion)
+   end subroutine change_stage
+
+   !> The slider has become faster than the drive: the force was at a maximum.
+   subroutine pass_maximum(self, slider, detached, breaks)
+      class(recorder_type), intent(inout) :: self
+      class(slider_type), intent(in) :: slider
+      real(wp), intent(in) :: detached, breaks
+
+      type(motion_type) :: motion
+      logical :: is_late
+
+      motion = pace(slider, self%sense)
+      is_late = motion%time > self%end_time + self%parameters%quiet_time
+      select case (self%phase)
+      case (phase_slip)
+         if (.not. is_late) then
+            if (self%sense * (motion%elastic_force - self%force_after) &
+               & < 0.5_wp * self%sense * (self%force_before - self%force_after) &
+               & .or. 2.0_wp * detached >= self%parameters%contacts) return
+         end if
+         call self%close_slip()
+      case (phase_fall)
+         ! Falls that lead lower and lower are one.
+         if (.not. is_late &
+            & .and. self%sense * (motion%elastic_force - self%force_before) < 0.0_wp) return
+         call self%drop_fall()
+      case default
+         continue
+      end select
+      if (self%is_tracing) call self%take_slip_samples(slider, detached, motion%time)
+      call self%begin_fall(motion, breaks)
+   end subroutine pass_maximum
+
+   !> A fall of the force is over: it may make a slip.
+   subroutine see_minimum(self, motion, breaks)
+      class(recorder_type), intent(inout) :: self
+      !> The motion where the force is least
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: breaks
+
+      call self%add_minimum(motion)
+      if (self%phase == phase_slow) return
+      if (.not. self%has_least) then
+         call note_least(self, motion, breaks)
+      else if (self%sense * (motion%elastic_force - self%force_after) < 0.0_wp) then
+         call note_least(self, motion, breaks)
+      end if
+      if (self%phase == phase_slip) return
+
+      if (.not. self%is_quick) then
+         call self%drop_fall()
+         if (.not. self%has_traced) call self%stop_trace()
+      else if (self%breaks_after - self%breaks_before >= 1.0_wp .and. self%sense &
+         & * (self%force_before - self%force_after) > least_fall * self%regained) then
+         self%phase = phase_slip
+         self%traced = self%slip
+         self%has_traced = .true.
+         self%slip_trace%row(slip_trace_length, self%kept_count + 1:self%slip_trace%count) &
+            & = real(self%slip, wp)
+      end if
+   end subroutine see_minimum
+
+   !> The force is lower than it has been since the start of a fall.
+   subroutine note_least(self, motion, breaks)
+      type(recorder_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: breaks
+
+      self%has_least = .true.
+      self%end_time = motion%time
+      self%force_after = motion%elastic_force
+      self%breaks_after = breaks
+      self%peak_velocity = max(self%peak_velocity, self%later_peak)
+   end subroutine note_least
+
+   !> A fall of the force starts: it may come to be a slip.
+   subroutine begin_fall(self, motion, breaks)
+      class(recorder_type), intent(inout) :: self
+      !> The motion where the force is greatest
+      type(motion_type), intent(in) :: motion
+      real(wp), intent(in) :: breaks
+
+      self%phase = phase_fall
       self%start_time = motion%time
+      self%end_time = motion%time
       self%force_before = motion%elastic_force
+      self%force_after = motion%elastic_force
       self%breaks_before = breaks
+      self%regained = self%height(motion)
       self%peak_velocity = 0.0_wp
+      self%later_peak = 0.0_wp
+      self%is_quick = .false.
       self%has_least = .false.
+      if (.not. self%is_tracing) then
+         self%is_tracing = .true.
+         self%traced = self%slip
+         self%last_fast = motion%time
+      end if
       self%slip_samples = 0
       self%next_slip_sample = huge(1.0_wp)
       if (self%parameters%slip_interval > 0.0_wp) self%next_slip_sample = self%start_time
       self%kept_count = self%slip_trace%count
-   end subroutine begin_fast
+   end subroutine begin_fall
 
-   !> Follow a slip through the last advance of a slider.
-   subroutine follow_slip(self, slider, start_excess, excess, detached, breaks)
+   !> A fall of the force has come to no slip; its samples are those of the slip before, if any.
+   subroutine drop_fall(self)
+      class(recorder_type), intent(inout) :: self
+
+      self%phase = phase_slow
+      if (.not. self%has_traced) then
+         self%slip_trace%count = min(self%slip_trace%count, self%kept_count)
+      end if
+   end subroutine drop_fall
+
+   !> Follow a fall, a slip or the ringing after it through the last advance of a slider.
+   subroutine follow(self, slider, excess, detached)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
-      real(wp), intent(in) :: start_excess, excess
-      real(wp), intent(in) :: detached
-      real(wp), intent(in) :: breaks
+      real(wp), intent(in) :: excess, detached
 
-      type(motion_type) :: motion
-
-      self%peak_velocity = max(self%peak_velocity, self%sense * slider%velocity)
-      if (self%sense * slider%start_acceleration > 0.0_wp &
-         & .and. self%sense * slider%acceleration < 0.0_wp) then
-         self%peak_velocity = max(self%peak_velocity, self%sense * fastest(slider, self%sense))
+      if (self%next_slip_sample <= slider%time) then
+         call self%take_slip_samples(slider, detached, slider%time)
       end if
-
       if (abs(excess) > self%parameters%slip_velocity) then
          self%last_fast = slider%time
+         if (excess > 0.0_wp) self%is_quick = .true.
       else if (slider%time - self%last_fast > self%parameters%quiet_time) then
-         call self%close_slip(slider%observe(slider%time), breaks)
-         self%phase = phase_slow
+         if (self%phase == phase_slip) call self%close_slip()
+         if (self%phase == phase_fall .and. excess <= 0.0_wp) call self%drop_fall()
+         if (self%phase == phase_slow) call self%stop_trace()
          return
       end if
-
-      if (start_excess > 0.0_wp .and. excess <= 0.0_wp) then
-         motion = pace(slider)
-         if (.not. self%has_least .or. &
-            & self%sense * (motion%elastic_force - self%force_after) < 0.0_wp) then
-            self%has_least = .true.
-            self%end_time = motion%time
-            self%force_after = motion%elastic_force
-            self%breaks_after = breaks
-         end if
-      else if (start_excess <= 0.0_wp .and. excess > 0.0_wp .and. self%has_least) then
-         motion = pace(slider)
-         if (self%sense * (motion%elastic_force - self%force_after) &
-            & >= 0.5_wp * self%sense * (self%force_before - self%force_after) &
-            & .and. 2.0_wp * detached < self%parameters%contacts) then
-            call self%close_slip(motion, breaks)
-            call self%begin_fast(slider, start_excess, breaks)
+      if (self%is_quick) then
+         self%later_peak = max(self%later_peak, self%sense * slider%velocity)
+         if (self%sense * slider%start_acceleration > 0.0_wp &
+            & .and. self%sense * slider%acceleration < 0.0_wp) then
+            self%later_peak = max(self%later_peak, self%sense * fastest(slider, self%sense))
          end if
       end if
-   end subroutine follow_slip
+   end subroutine follow
+
+   !> Take no finer samples until the next fall.
+   subroutine stop_trace(self)
+      class(recorder_type), intent(inout) :: self
+
+      self%is_tracing = .false.
+      self%has_traced = .false.
+      self%next_slip_sample = huge(1.0_wp)
+   end subroutine stop_trace
+
+   !> Remember a minimum of the force.
+   subroutine add_minimum(self, motion)
+      class(recorder_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+
+      real(wp) :: force
+
+      force = self%sense * motion%elastic_force
+      do while (self%minima%count > 0)
+         if (self%minima%row(2, self%minima%count) < force) exit
+         self%minima%count = self%minima%count - 1
+      end do
+      call self%minima%add([motion%time, force])
+   end subroutine add_minimum
+
+   !> Height of the force above its least minimum so long ago as ringing lasts; forget earlier ones.
+   function height(self, motion)
+      class(recorder_type), intent(inout) :: self
+      type(motion_type), intent(in) :: motion
+      real(wp) :: height
+
+      integer :: old, minimum
+
+      old = 0
+      do while (old < self%minima%count)
+         if (self%minima%row(1, old + 1) &
+            & >= motion%time - longest_rise * self%parameters%quiet_time) exit
+         old = old + 1
+      end do
+      self%minima%count = self%minima%count - old
+      do minimum = 1, self%minima%count
+         self%minima%row(:, minimum) = self%minima%row(:, minimum + old)
+      end do
+      height = 0.0_wp
+      if (self%minima%count > 0) then
+         height = self%sense * motion%elastic_force - self%minima%row(2, 1)
+      end if
+   end function height
 
    !> Put a slip into the catalogue.
-   subroutine close_slip(self, motion, breaks)
+   subroutine close_slip(self)
       class(recorder_type), intent(inout) :: self
-      !> Motion at the time of closing, the end of a slip without a least spring force
-      type(motion_type), intent(in) :: motion
-      real(wp), intent(in) :: breaks
 
-      if (.not. self%has_least) then
-         self%end_time = motion%time
-         self%force_after = motion%elastic_force
-         self%breaks_after = breaks
-      end if
       call self%slips%add([real(self%slip, wp), self%start_time, self%end_time, &
          & self%force_before, self%force_after, self%sense * self%peak_velocity, &
          & self%breaks_after - self%breaks_before])
       self%slip = self%slip + 1
       self%kept_count = self%slip_trace%count
+      self%phase = phase_slow
    end subroutine close_slip
 
    !> Close a slip at the end of the run, if its spring force has passed the least.
-   subroutine finish(self, slider, breaks)
+   subroutine finish(self)
       !> The recorder
       class(recorder_type), intent(inout) :: self
-      !> The slider at the end of the run
-      class(slider_type), intent(in) :: slider
-      !> Breaks in the run
-      real(wp), intent(in) :: breaks
 
-      if (self%phase == phase_slip .and. self%has_least) then
-         call self%close_slip(slider%observe(slider%time), breaks)
-      else
-         self%slip_trace%count = min(self%slip_trace%count, self%kept_count)
-      end if
-      self%phase = phase_slow
+      if (self%phase == phase_slip) call self%close_slip()
+      if (self%phase == phase_fall) call self%drop_fall()
+      call self%stop_trace()
    end subroutine finish
 
-   !> Take the finer samples that the last advance of a slider came past.
-   subroutine take_slip_samples(self, slider, detached)
+   !> Take the finer samples up to a time of the last advance of a slider.
+   subroutine take_slip_samples(self, slider, detached, end_time)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
-      real(wp), intent(in) :: detached
+      real(wp), intent(in) :: detached, end_time
 
-      do while (self%next_slip_sample <= slider%time)
+      do while (self%next_slip_sample <= end_time)
          call self%slip_trace%add([sample(slider%observe(self%next_slip_sample), detached), &
-            & real(self%slip, wp)])
+            & real(self%traced, wp)])
          self%slip_samples = self%slip_samples + 1
          self%next_slip_sample = self%start_time &
             & + real(self%slip_samples, wp) * self%parameters%slip_interval
@@ -408,27 +569,39 @@ contains
    end function sample
 
    !> Motion where the velocity passed that of the drive during the last advance.
-   pure function pace(slider) result(motion)
+   pure function pace(slider, sense) result(motion)
       class(slider_type), intent(in) :: slider
+      real(wp), intent(in) :: sense
       type(motion_type) :: motion
 
       integer, parameter :: bisections = 50
-      real(wp) :: early, late, start
+      real(wp) :: early, late
+      logical :: was_faster
       integer :: bisection
 
       early = slider%step_time
       late = slider%time
+      was_faster = .not. is_faster(sense, slider%velocity + slider%base_velocity)
       motion = slider%observe(early)
-      start = motion%velocity - slider%drive_velocity
       do bisection = 1, bisections
          motion = slider%observe(0.5_wp * (early + late))
-         if ((motion%velocity - slider%drive_velocity) * start > 0.0_wp) then
+         if (is_faster(sense, motion%velocity + motion%base_velocity) .eqv. was_faster) then
             early = motion%time
          else
             late = motion%time
          end if
          if (late - early <= spacing(late)) exit
       end do
+
+   contains
+
+      !> Whether a velocity is that of a fall of the force.
+      pure logical function is_faster(sense, velocity)
+         real(wp), intent(in) :: sense, velocity
+
+         is_faster = sense * (velocity - slider%drive_velocity) > 0.0_wp
+      end function is_faster
+
    end function pace
 
    !> Greatest velocity, in a sense, during the last advance, by golden section.
@@ -475,6 +648,11 @@ contains
       call archive%exchange("slip", self%slip)
       call archive%exchange("slip_samples", self%slip_samples)
       call archive%exchange("next_slip_sample", self%next_slip_sample)
+      call archive%exchange("kept_count", self%kept_count)
+      call archive%exchange("traced", self%traced)
+      call archive%exchange("is_tracing", self%is_tracing)
+      call archive%exchange("has_traced", self%has_traced)
+      call archive%exchange("drive_velocity", self%drive_velocity)
       call archive%exchange("sense", self%sense)
       call archive%exchange("last_excess", self%last_excess)
       call archive%exchange("last_fast", self%last_fast)
@@ -482,11 +660,14 @@ contains
       call archive%exchange("end_time", self%end_time)
       call archive%exchange("force_before", self%force_before)
       call archive%exchange("force_after", self%force_after)
-      call archive%exchange("peak_velocity", self%peak_velocity)
       call archive%exchange("breaks_before", self%breaks_before)
       call archive%exchange("breaks_after", self%breaks_after)
+      call archive%exchange("regained", self%regained)
+      call archive%exchange("peak_velocity", self%peak_velocity)
+      call archive%exchange("later_peak", self%later_peak)
+      call archive%exchange("is_quick", self%is_quick)
       call archive%exchange("has_least", self%has_least)
-      call archive%exchange("kept_count", self%kept_count)
+      call self%minima%exchange("minima", archive)
       call self%trace%exchange("trace", archive)
       call self%slip_trace%exchange("slip_trace", archive)
       call self%slips%exchange("slips", archive)

@@ -13,7 +13,7 @@ module mesoslip_sliders_base
    implicit none
    private
 
-   public :: slider_type, motion_type, exchange_slider, exchange_law, shift_slider
+   public :: slider_type, motion_type, drive_slider, exchange_slider, exchange_law, shift_slider
 
    !> The motion at one time.
    type :: motion_type
@@ -29,8 +29,10 @@ module mesoslip_sliders_base
       real(wp) :: spring_force = 0.0_wp
       !> Force that the slider exerts on the contacts [N]
       real(wp) :: contact_force = 0.0_wp
-      !> Mean elastic force of a slider of layers [N], and displacement of its base [m]
-      real(wp) :: elastic_force = 0.0_wp, base_displacement = 0.0_wp
+      !> Mean elastic force of a slider of layers [N]
+      real(wp) :: elastic_force = 0.0_wp
+      !> Displacement [m] and velocity [m/s] of its base
+      real(wp) :: base_displacement = 0.0_wp, base_velocity = 0.0_wp
    end type motion_type
 
    !> A slider: what it has in common whatever its kind.
@@ -41,6 +43,8 @@ module mesoslip_sliders_base
       real(wp) :: origin = 0.0_wp
       !> Displacement of the slider [m] and its velocity [m/s]
       real(wp) :: displacement = 0.0_wp, velocity = 0.0_wp
+      !> Velocity of the base, to which that of the slider is relative [m/s]
+      real(wp) :: base_velocity = 0.0_wp
       !> Its acceleration at the end of the last advance, and at its start [m/s2]
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
@@ -86,7 +90,7 @@ module mesoslip_sliders_base
       !> Where it is
       procedure, non_overridable :: pose
       !> Give the drive another velocity
-      procedure, non_overridable :: drive
+      procedure :: drive => drive_slider
       !> Where the drive is at a time
       procedure, non_overridable :: drive_at
       !> Move the origin of displacements
@@ -176,7 +180,7 @@ contains
    end function pose
 
    !> Give the drive another velocity.
-   subroutine drive(self, velocity)
+   subroutine drive_slider(self, velocity)
       !> The slider
       class(slider_type), intent(inout) :: self
       !> Velocity of the drive [m/s]
@@ -185,7 +189,7 @@ contains
       self%drive_displacement = self%drive_at(self%time)
       self%drive_time = self%time
       self%drive_velocity = velocity
-   end subroutine drive
+   end subroutine drive_slider
 
    !> Where the drive is at a time.
    pure function drive_at(self, time) result(displacement)
@@ -238,6 +242,7 @@ contains
       call archive%exchange("origin", self%origin)
       call archive%exchange("displacement", self%displacement)
       call archive%exchange("velocity", self%velocity)
+      call archive%exchange("base_velocity", self%base_velocity)
       call archive%exchange("acceleration", self%acceleration)
       call archive%exchange("start_acceleration", self%start_acceleration)
       call archive%exchange("sense", self%sense)

@@ -1,7 +1,8 @@
 !> An elastic slider: layers joined by springs, on an optional base (section 8 of the model, S24).
 !>
-!> Layer 1 bears the contacts; a spring joins layer N_l to the drive. Displacement and velocity are
-!> those of layer 1 relative to the base, by which contacts stretch.
+!> Layer 1 bears the contacts; a spring joins layer N_l to the drive. Damping acts between layers,
+!> not on that spring, so that one layer is the rigid slider. Displacement and velocity are those of
+!> layer 1 relative to the base, by which contacts stretch.
 !>
 !> Under a linear law of the contact force the motion is that of a linear system. By default it is
 !> advanced by its Taylor series, exact to rounding, over steps in units of the fastest rate; most
@@ -42,8 +43,9 @@ module mesoslip_sliders_layered
    integer, parameter :: half_bandwidth = 3
    !> Layers whose series take as long as an advance of a rigid slider
    real(wp), parameter :: layers_per_cost = 4.0_wp
-   !> Steps of CVODE without an event after which it starts anew, so that a run can be put away
-   integer, parameter :: most_steps = 2000
+   !> Steps of CVODE without an event after which it starts anew, so that a run can be put away: as
+   !> many as take about a second with very many layers, from fewest to most
+   integer, parameter :: fewest_steps = 200, most_steps = 2000, most_layer_steps = 1000000
    !> Points of the rule by which losses are integrated
    integer, parameter :: points = 12
 
@@ -53,7 +55,7 @@ module mesoslip_sliders_layered
       integer :: layers = 1
       !> Mass [kg] and static stiffness [N/m] of the whole slider
       real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp
-      !> Rate of Kelvin-Voigt damping between layers [1/s]
+      !> Rate of Kelvin-Voigt damping between layers, not on the drive's spring [1/s]
       real(wp) :: damping = 0.0_wp
       !> Mass of the base [kg], 0 for none, stiffness [N/m] and damping rate [1/s] of its support
       real(wp) :: base_mass = 0.0_wp, base_stiffness = 0.0_wp, base_damping = 0.0_wp
@@ -168,7 +170,7 @@ contains
       self%system%parameters = parameters
       self%system%layer_mass = parameters%mass / parameters%layers
       self%system%spring = parameters%stiffness * parameters%layers
-      self%system%dashpot = parameters%damping * self%system%layer_mass
+      if (parameters%layers > 1) self%system%dashpot = parameters%damping * self%system%layer_mass
    end subroutine new_slider_layered
 
    !> Put the slider at rest in balance with the contacts.
@@ -284,7 +286,8 @@ contains
          self%state(1, 2) = self%state(0, 2)
          self%is_stale = .true.
       end if
-      self%velocity = self%state(1, 2) - self%state(0, 2)
+      self%base_velocity = self%state(0, 2)
+      self%velocity = self%state(1, 2) - self%base_velocity
       if (step < longest) self%is_stale = .true.
       if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
          self%time = window%end_time
@@ -297,7 +300,8 @@ contains
       call self%add_work(step)
       if (self%parameters%solver /= solver_series) then
          self%steps = self%steps + 1
-         if (self%steps >= most_steps) self%is_stale = .true.
+         if (self%steps >= max(fewest_steps, min(most_steps, &
+            & most_layer_steps / self%parameters%layers))) self%is_stale = .true.
          ! What CVODE remembers of its last steps cannot be put away: only where it forgets them.
          self%can_pause = self%is_stale
          self%integrator_counts = self%counts_before + int(self%cvode%counts(), i8)
@@ -349,7 +353,7 @@ contains
                & - (displacement(layer) - displacement(layer - 1)))
          end do
       end if
-      acceleration(last) = -spring * displacement(last) - dashpot * velocity(last)
+      acceleration(last) = -spring * displacement(last)
       if (last > 1) then
          acceleration(last) = acceleration(last) &
             & - spring * (displacement(last) - displacement(last - 1)) &
@@ -374,9 +378,8 @@ contains
       integer :: last
 
       last = system%parameters%layers
-      acceleration(last) = acceleration(last) + (system%spring * (system%drive &
-         & + system%drive_velocity * time) + system%dashpot * system%drive_velocity) &
-         & / system%layer_mass
+      acceleration(last) = acceleration(last) + system%spring * (system%drive &
+         & + system%drive_velocity * time) / system%layer_mass
       acceleration(1) = acceleration(1) + system%law%offset / system%layer_mass
       if (system%parameters%base_mass > 0.0_wp) then
          acceleration(0) = acceleration(0) - system%law%offset / system%parameters%base_mass
@@ -528,14 +531,14 @@ contains
       do layer = 0, last
          call add(2 * layer + 1, 2 * layer + 2, 1.0_wp)
       end do
-      do layer = 1, last
-         ! The spring ahead, which joins the last layer to the drive.
+      do layer = 1, last - 1
          call couple(layer, layer, -spring, -dashpot)
-         if (layer < last) call couple(layer, layer + 1, spring, dashpot)
-         if (layer == 1) cycle
-         call couple(layer, layer, -spring, -dashpot)
-         call couple(layer, layer - 1, spring, dashpot)
+         call couple(layer, layer + 1, spring, dashpot)
+         call couple(layer + 1, layer + 1, -spring, -dashpot)
+         call couple(layer + 1, layer, spring, dashpot)
       end do
+      ! The spring to the drive.
+      call couple(last, last, -spring, 0.0_wp)
       associate (law => system%law, parameters => system%parameters)
          call couple(1, 1, -law%stiffness / system%layer_mass, -law%drag / system%layer_mass)
          call couple(1, 0, law%stiffness / system%layer_mass, law%drag / system%layer_mass)
@@ -590,9 +593,7 @@ contains
       end do
       way = way * step
       extension = step * (drive + 0.5_wp * drive_velocity * step) - way
-      call self%drive_work%add(drive_velocity * (self%system%spring * extension &
-         & + self%system%dashpot * (step * drive_velocity - (self%state(last, 1) &
-         & - self%series(last, 1, 0)))))
+      call self%drive_work%add(drive_velocity * self%system%spring * extension)
 
       drag = 0.0_wp
       damped = 0.0_wp
@@ -608,8 +609,7 @@ contains
             velocity = velocity * (self%point(node) * step) + self%series(:, 2, term)
          end do
          damped = damped + step * self%weight(node) * (self%system%dashpot &
-            & * (sum((velocity(2:) - velocity(1:last - 1))**2) &
-            & + (drive_velocity - velocity(last))**2) &
+            & * sum((velocity(2:) - velocity(1:last - 1))**2) &
             & + self%parameters%base_mass * self%parameters%base_damping * velocity(0)**2)
       end do
       call self%damping_loss%add(damped)
@@ -634,11 +634,11 @@ contains
       base = value_of(0, 1)
       last = value_of(layers, 1)
       motion%time = time
-      motion%velocity = value_of(1, 2) - value_of(0, 2)
+      motion%base_velocity = value_of(0, 2)
+      motion%velocity = value_of(1, 2) - motion%base_velocity
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + first - base
-      motion%spring_force = self%system%spring * (drive - last) &
-         & + self%system%dashpot * (self%drive_velocity - value_of(layers, 2))
+      motion%spring_force = self%system%spring * (drive - last)
       motion%elastic_force = self%parameters%stiffness * (drive - first)
       motion%base_displacement = base
       motion%contact_force = self%system%law%stiffness * (first - base) - self%system%law%offset &

@@ -7,7 +7,7 @@ module mesoslip_sliders_prescribed
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_schedule, only: schedule_type
    use mesoslip_watch, only: watch_type
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
+   use mesoslip_sliders_base, only: drive_slider, motion_type, slider_type, exchange_slider, &
       & exchange_law
    implicit none
    private
@@ -19,6 +19,7 @@ module mesoslip_sliders_prescribed
       !> Contact force during the last advance
       type(interface_law_type), private :: law
    contains
+      procedure :: drive
       procedure :: start
       procedure :: advance
       procedure :: run_ahead
@@ -46,6 +47,18 @@ contains
       self%runs_ahead = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_prescribed
+
+   !> Give the drive another velocity: the slider has it at once.
+   subroutine drive(self, velocity)
+      !> The slider
+      class(slider_prescribed_type), intent(inout) :: self
+      !> Velocity of the drive [m/s]
+      real(wp), intent(in) :: velocity
+
+      call drive_slider(self, velocity)
+      self%velocity = velocity
+      if (abs(velocity) > 0.0_wp) self%sense = sign(1.0_wp, velocity)
+   end subroutine drive
 
    !> Put the slider where the drive is, moving with it.
    subroutine start(self, law)

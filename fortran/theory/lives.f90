@@ -4,6 +4,7 @@
 !> from its attaching, a contact of the first generation from the start of the motion.
 module mesoslip_theory_lives
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, &
       & broken_threshold_slope, coupling_equal, initial_relaxed, initial_steady, &
@@ -14,7 +15,7 @@ module mesoslip_theory_lives
    implicit none
    private
 
-   public :: contact_lives_type, new_contact_lives
+   public :: contact_lives_type, new_contact_lives, make_contact_lives
 
    !> Exponents of the partial moments in use, and their places
    real(wp), parameter :: exponents(7) = [0.0_wp, 0.5_wp, 1.0_wp, 1.5_wp, 2.0_wp, -0.5_wp, -1.0_wp]
@@ -134,6 +135,33 @@ contains
       self%newborn_force = state(3)
       if (reattach) self%steady_force = stretching / self%mean_life
    end subroutine new_contact_lives
+
+   !> Set up the lives of contacts from named numbers.
+   subroutine make_contact_lives(self, parameters, error)
+      !> The contacts
+      type(contact_lives_type), intent(out) :: self
+      !> Codes of law, coupling and initial state; relative width, back force and spread of the
+      !> stretch of newborns; whether contacts attach again
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous, or the law does not exist
+      type(error_type), allocatable, intent(out) :: error
+
+      integer :: law, coupling, initial
+      real(wp) :: width, back_force, newborn_width
+      logical :: reattach
+
+      call parameters%take("law", law, error)
+      call parameters%take("relative_width", width, error)
+      call parameters%take("coupling", coupling, error)
+      call parameters%take("back_force_ratio", back_force, error)
+      call parameters%take("newborn_width", newborn_width, error)
+      call parameters%take("reattach", reattach, error)
+      call parameters%take("initial", initial, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      call new_contact_lives(self, law, width, coupling, back_force, newborn_width, reattach, &
+         & initial, error)
+   end subroutine make_contact_lives
 
    !> Integrals of the newborns' state over their lives.
    subroutine integrate_life(self, mean_life, stretching)

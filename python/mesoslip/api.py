@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import xarray as xr
-
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
@@ -19,6 +17,7 @@ from mesoslip.simulation.runner import Results, run_realizations
 from mesoslip.theory.derived import Derived, derived_quantities
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
@@ -148,7 +147,7 @@ def read(path: PathLike) -> xr.DataTree:
 
 
 def _as_tree(output: PathLike | xr.DataTree) -> xr.DataTree:
-    return output if isinstance(output, xr.DataTree) else files.read_run(Path(output))
+    return files.read_run(Path(output)) if isinstance(output, str | os.PathLike) else output
 
 
 def group(output: PathLike | xr.DataTree, name: str) -> xr.Dataset:
@@ -162,7 +161,7 @@ def group(output: PathLike | xr.DataTree, name: str) -> xr.Dataset:
     FileError
         If the output cannot be read or has no such group.
     """
-    tree = output if isinstance(output, xr.DataTree) else files.read(Path(output))
+    tree = files.read(Path(output)) if isinstance(output, str | os.PathLike) else output
     if name not in tree.children:
         there = ", ".join(tree.children) or "none"
         raise FileError(f"the output has no group {name!r}; it has {there}")
@@ -274,7 +273,7 @@ def plot(
     from mesoslip.plots.draw import draw
     from mesoslip.plots.style import save
 
-    if not isinstance(output, xr.DataTree):
+    if isinstance(output, str | os.PathLike):
         with files.opened(Path(output)) as tree:
             return plot(tree, file, view=view, snapshot=snapshot, figure=figure, ax=ax)
     path = None if file is None else Path(file)

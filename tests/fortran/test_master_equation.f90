@@ -20,6 +20,8 @@ program test_master_equation
    use testing, only: check, check_close, finish
    implicit none
 
+   real(wp) :: rough, fine
+
 
    call rules()
    call moments(law_gaussian, 0.3_wp, 0.0_wp)
@@ -28,9 +30,12 @@ program test_master_equation
    call moments(law_uniform, 0.2_wp, 0.1_wp)
    call breaking()
    call renewal()
-   call sliding(coupling_scaled, initial_relaxed)
-   call sliding(coupling_equal, initial_uniform)
-   call sliding(coupling_scaled, initial_steady)
+   call sliding(coupling_scaled, initial_relaxed, 0.1_wp, rough)
+   call sliding(coupling_scaled, initial_relaxed, 0.05_wp, fine)
+   call check(fine < 0.4_wp * rough, "the estimate of the error falls as the error does")
+   call check(fine > 0.0_wp .and. rough < 2.0e-3_wp, "the estimate of the error")
+   call sliding(coupling_equal, initial_uniform, 0.1_wp, rough)
+   call sliding(coupling_scaled, initial_steady, 0.1_wp, rough)
    call finish()
 
 contains
@@ -127,8 +132,11 @@ contains
 
    !> Populations under a slider that goes forth, rests, and comes back: contacts are conserved, and
    !> what they bear and have lost is the work done on them.
-   subroutine sliding(coupling, initial)
+   subroutine sliding(coupling, initial, resolution, estimate)
       integer, intent(in) :: coupling, initial
+      real(wp), intent(in) :: resolution
+      !> Estimate of the error of the force
+      real(wp), intent(out) :: estimate
 
       type(contact_populations_type) :: contacts
       type(contact_parameters_type) :: parameters
@@ -146,7 +154,7 @@ contains
       parameters%delay = 0.1_wp
       parameters%back_force_ratio = 0.1_wp
       parameters%coupling = coupling
-      call new_contact_populations(contacts, parameters, 0.1_wp, error)
+      call new_contact_populations(contacts, parameters, resolution, error)
       call check(.not. allocated(error), "populations")
       call contacts%initialize(initial)
       start = contacts%elastic_energy(0.0_wp)
@@ -177,6 +185,7 @@ contains
       call check_close(contacts%elastic_energy(before%displacement) - start, &
          & work - contacts%break_loss%total() + contacts%birth_gain%total(), 2.0e-3_wp, &
          & "energy of the contacts")
+      estimate = contacts%error_estimate
       start = contacts%elastic_energy(before%displacement)
       call contacts%shift_origin(2.0_wp, before%displacement - 2.0_wp)
       call check_close(contacts%elastic_energy(before%displacement - 2.0_wp), start, 1.0e-12_wp, &

@@ -120,16 +120,19 @@ contains
       integer(i8) :: length
       integer :: segment, table
       character(len=:), allocatable :: name
+      real(wp), parameter :: short(3) = [0.024_wp, 0.03_wp, 0.05_wp]
       character(len=10), parameter :: tables(6) = [character(len=10) :: &
          & "trace", "slip_trace", "slips", "layers", "avalanches", "snapshots"]
 
       name = contacts // ", " // slider // ", solver " // achar(iachar("0") + solver)
       call build(whole, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+      whole%stage_end = short
       call whole%start(initial_relaxed)
       call whole%run(forever, any_work, error)
 
       allocate (now)
       call build(now, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+      now%stage_end = short
       call now%start(initial_relaxed)
       do segment = 1, 100000
          ! Longer and longer, so that all phases of a run are cut, and the test ends.
@@ -140,6 +143,7 @@ contains
          if (.not. allocated(error)) call now%fetch(words, error)
          allocate (next)
          call build(next, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+         next%stage_end = short
          if (.not. allocated(error)) call next%restore(words, error)
          deallocate (words)
          deallocate (now)

@@ -1,5 +1,7 @@
 !> Threshold laws: mean and width, and the three functions of a law against each other.
 program test_threshold_law
+   use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
+   use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal, coupling_scaled
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_contacts_threshold_law, only: inverse_normal, law_exponential, law_gaussian, &
@@ -12,6 +14,7 @@ program test_threshold_law
    character(len=11), parameter :: names(5) = [character(len=11) :: "gaussian", "uniform", &
       & "lognormal", "Weibull", "exponential"]
    real(wp), parameter :: widths(3) = [0.01_wp, 0.1_wp, 0.2_wp]
+   real(wp), parameter :: wide(4) = [1.0e-4_wp, 0.1_wp, 0.55_wp, 1.0_wp]
    type(threshold_law_type) :: law
    type(error_type), allocatable :: error
    integer :: kind, width
@@ -25,6 +28,12 @@ program test_threshold_law
          call new_threshold_law(law, laws(kind), widths(width), 0.8_wp, error)
          call consistency(law, trim(names(kind)) // " above a minimum")
          call check(law%quantile(1.0_wp - 2.0_wp**(-53)) > 0.8_wp, "thresholds exceed the minimum")
+      end do
+      do width = 1, size(wide)
+         if (kind == law_uniform .and. wide(width) > 0.57_wp) cycle
+         if (kind == law_exponential .and. wide(width) > 1.0_wp) cycle
+         call carried(laws(kind), wide(width), 0.0_wp, trim(names(kind)))
+         call carried(laws(kind), wide(width), 0.5_wp, trim(names(kind)) // " above a minimum")
       end do
    end do
 
@@ -96,5 +105,97 @@ contains
          call check_close(law%density(threshold) / slope, 1.0_wp, 1.0e-4_wp, "density: " // name)
       end do
    end subroutine consistency
+
+   !> Thresholds weighted by the distance to breaking: integrals of the law, closed forms, ends.
+   subroutine carried(kind, width, minimum, name)
+      integer, intent(in) :: kind
+      real(wp), intent(in) :: width, minimum
+      character(len=*), intent(in) :: name
+
+      real(wp), parameter :: probability(6) = [1.0_wp - 2.0_wp**(-53), 0.999_wp, 0.7_wp, 0.3_wp, &
+         & 1.0e-3_wp, 2.0_wp**(-53)]
+      integer, parameter :: couplings(2) = [coupling_equal, coupling_scaled]
+      type(threshold_law_type) :: law
+      type(carried_law_type) :: weighted
+      type(error_type), allocatable :: error
+      real(wp) :: threshold, previous, mean, above
+      integer :: coupling, point
+
+      call new_threshold_law(law, kind, width, minimum, error)
+      do coupling = 1, size(couplings)
+         call new_carried_law(weighted, law, couplings(coupling), minimum)
+         mean = distance_above(law, couplings(coupling), minimum, 1.0_wp)
+         previous = 0.0_wp
+         do point = 1, size(probability)
+            threshold = weighted%quantile(probability(point))
+            call check(threshold > max(previous, minimum), "carried thresholds grow: " // name)
+            previous = threshold
+            if (abs(probability(point) - 0.5_wp) > 0.499_wp) cycle
+            above = distance_above(law, couplings(coupling), minimum, law%survival(threshold))
+            call check_close(above / mean, probability(point), 1.0e-4_wp, "carried: " // name)
+            if (couplings(coupling) /= coupling_equal) cycle
+            select case (kind)
+            case (law_gaussian)
+               call check_close(normal_above(threshold, width, minimum) &
+                  & / normal_above(minimum, width, minimum), probability(point), 1.0e-11_wp, &
+                  & "closed form of carried: " // name)
+            case (law_lognormal)
+               call check_close(lognormal_above(threshold, law%scale, minimum) &
+                  & / lognormal_above(minimum, law%scale, minimum), probability(point), &
+                  & 1.0e-11_wp, "closed form of carried: " // name)
+            case default
+               cycle
+            end select
+         end do
+      end do
+   end subroutine carried
+
+   !> Distance to breaking of the contacts that are left with a probability, by a sum over it.
+   function distance_above(law, coupling, minimum, probability) result(distance)
+      type(threshold_law_type), intent(in) :: law
+      integer, intent(in) :: coupling
+      real(wp), intent(in) :: minimum, probability
+      real(wp) :: distance
+
+      integer, parameter :: points = 20000
+      real(wp) :: t
+      integer :: point
+
+      distance = 0.0_wp
+      do point = 1, points
+         ! Denser at the ends, where thresholds are far away or close to zero.
+         t = (point - 0.5_wp) / points
+         distance = distance + 6.0_wp * t * (1.0_wp - t) / points &
+            & * breaking_distance(coupling, minimum, &
+            & law%quantile(probability * t**2 * (3.0_wp - 2.0_wp * t)))
+      end do
+      distance = distance * probability
+   end function distance_above
+
+   !> E[u - minimum; u > threshold] of a normal law.
+   pure function normal_above(threshold, width, minimum) result(distance)
+      real(wp), intent(in) :: threshold, width, minimum
+      real(wp) :: distance
+
+      real(wp) :: z
+
+      z = (threshold - 1.0_wp) / width
+      distance = width * exp(-0.5_wp * z**2) / sqrt(2.0_wp * acos(-1.0_wp)) &
+         & + (1.0_wp - minimum) * 0.5_wp * erfc(z / sqrt(2.0_wp))
+   end function normal_above
+
+   !> E[u - minimum; u > threshold] of a lognormal law.
+   pure function lognormal_above(threshold, sigma, minimum) result(distance)
+      real(wp), intent(in) :: threshold, sigma, minimum
+      real(wp) :: distance
+
+      real(wp) :: z
+
+      distance = 1.0_wp - minimum
+      if (.not. threshold > 0.0_wp) return
+      z = (log(threshold) + 0.5_wp * sigma**2) / sigma
+      distance = 0.5_wp * erfc((z - sigma) / sqrt(2.0_wp)) &
+         & - minimum * 0.5_wp * erfc(z / sqrt(2.0_wp))
+   end function lognormal_above
 
 end program test_threshold_law

@@ -13,6 +13,7 @@ from conftest import klein_tables
 from mesoslip import Config
 from mesoslip.analysis.avalanche_statistics import fit_power_law
 from mesoslip.analysis.avalanches import failures
+from mesoslip.output import files
 from scipy import integrate, special, stats
 
 
@@ -153,12 +154,12 @@ def test_strength_of_a_bundle(bundles):
         assert tree.attrs["ending"] == "no contact is left to break"
 
 
-def test_a_force_beyond_what_sliding_contacts_bear_is_told():
+def test_a_force_beyond_what_sliding_contacts_bear_is_told(command, tmp_path):
     tables = bundle(1000, 1).to_dict()
     tables["contacts"]["reattach"] = True
     tables["run"] = {"duration": 40.0}
     tree = mesoslip.run(Config.from_dict(tables))
-    assert tree.attrs["ending"] == "contacts break under the force without end"
+    assert tree.attrs["ending"].startswith("contacts break under the force without end; breaks")
     assert tree.attrs["complete"] == "true"
     # Rebirth makes the contacts no stronger than in their stationary state, within fluctuations.
     steady = mesoslip.info(Config.from_dict(tables))["F_steady"].value
@@ -167,12 +168,21 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_told():
     # The slide without end is no avalanche; and the force curve needs no spring.
     assert mesoslip.avalanches(tree)["size"].values.max() < 1000 * 1000
     assert np.isfinite(mesoslip.curve(Config.from_dict(tables)).attrs["K_star"])
+    # So sizes do not add up to the breaks, and it is told by how many.
+    summary = mesoslip.avalanche_summary(tree)
+    assert summary["breaks_outside"] > 1000 * 1000
+    assert summary["breaks_outside"] + summary["breaks"] == tree["breaks"].item()
+    assert "breaks_outside" not in mesoslip.avalanche_summary(tree, after=1e-9)
+    path = tmp_path / "slide.nc"
+    files.write(tree, path)
+    assert "of a slide without end" in command("avalanches", path)[1]
 
 
 def test_runs_end_by_avalanches_or_by_the_drive():
     by_count = mesoslip.run(sliding(200.0, 500))
     assert by_count["avalanche_count"].item() == by_count["avalanches"].sizes["avalanche"] == 500
     assert by_count.attrs["ending"] == "as many avalanches as wanted"
+    assert "breaks_outside" not in mesoslip.avalanche_summary(by_count)
     tables = sliding(200.0, 500).to_dict()
     start = by_count["drive_displacement"].values[0, 0]
     tables["run"] = {"drive_displacement": 2e-10}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip import ForceCurve, _core
-from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
+from mesoslip.simulation.kernel import named
+from mesoslip.theory.lives import law_parameters
 from oracles import frozen_law, stationary_force
 from scipy import integrate
 
@@ -181,21 +182,13 @@ def trapezoid(config, width, back, steps):
 
 def test_the_order_of_convergence(klein):
     """The error falls with the power of the number of points, until rounding."""
-    contacts = klein(**EQUAL, **dispersion(0.2)).contacts
-    law = (
-        contacts.threshold.code,
-        0.2,
-        COUPLINGS["equal"],
-        0.0,
-        0.0,
-        1,
-        INITIAL_STATES["relaxed"],
-    )
+    law = named(law_parameters(klein(**EQUAL, **dispersion(0.2))))
 
     def force_at_end(points, width):
-        point, *_, force, _, _, _, status, _ = _core.force_curve(
+        point, solution, _, _, status, _ = _core.force_curve(
             *law, 0.0, width, round(1.2 / width), points
         )
+        force = solution[:, :, 2]
         assert status == 0
         polynomial = np.polynomial.Polynomial.fit(point, force[:, -1], points - 1, domain=[0, 1])
         return polynomial(1.0)
@@ -291,3 +284,64 @@ def test_a_curve_too_long_is_refused(klein):
 
     with pytest.raises(ConfigError, match=r"curve\.length"):
         ForceCurve(klein(curve={"length": 1.0}))
+
+
+@pytest.mark.parametrize("back", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("law", "width"), [("weibull", 2.0), ("weibull", 1.3), ("weibull", 1.0), ("exponential", 1.0)]
+)
+def test_a_force_that_only_rises_has_no_peak_and_no_instability(klein, law, width, back):
+    """Lives the likelier to end the younger they are, equal contacts: ages only grow, K* = 0."""
+    changes = {"contacts__coupling": "equal", "contacts__back_force_ratio": back}
+    curve = ForceCurve(klein(**changes, **dispersion(width, law)))
+    assert not curve.falls
+    assert curve.K_star == (0.0, np.inf)
+    assert curve.stable
+    assert curve.critical_points == ()
+    summary = curve.summary()
+    assert summary["K_star"] == 0.0
+    assert summary["K_star_displacement"] is summary["F_peak"] is summary["X_peak"] is None
+    assert "does not fall" in curve.verdict
+    # The widest law is far from stationary at the end of the curve, and it is said.
+    assert ("longer curve.length" in curve.verdict) == (width > 1.5)
+    assert curve.to_tree().attrs["comment"] == curve.verdict
+
+
+def test_a_stationary_start_has_no_peak(klein):
+    curve = ForceCurve(klein(contacts__initial="steady", **dispersion(0.2)))
+    assert not curve.falls
+    assert curve.K_star[0] == 0.0
+    assert "longer" not in curve.verdict
+
+
+@pytest.mark.parametrize(("length", "is_early"), [(4e-9, True), (8.6e-9, True), (18e-8, False)])
+def test_a_curve_that_ends_early_is_said_to(klein, length, is_early):
+    """Before the peak, and before the steepest fall, near the mean breaking stretch of 9 nm."""
+    curve = ForceCurve(klein(curve__length=length, **EQUAL, **dispersion(0.05)))
+    assert ("longer curve.length" in curve.verdict) == is_early
+
+
+def test_a_weak_fall_is_a_fall(klein):
+    """A law whose hazard grows a little: a fall of 10^-5 F_s, of a curve with 10 digits."""
+    changes = {"contacts__coupling": "equal", "contacts__back_force_ratio": 0.1}
+    curve = ForceCurve(klein(**changes, **dispersion(0.8, "weibull")))
+    assert curve.falls
+    assert 0 < curve.K_star[0] < 0.1
+    assert curve.peak[0] > curve.steady_force
+
+
+def test_verdicts_say_what_they_do_not_mean(klein, command, tmp_path):
+    """K < K* is necessary, not sufficient: K = 200 N/m, delay 0.3 ms slides smoothly after 5 s."""
+    soft = klein(slider__stiffness=200.0, contacts__delay=3e-4)
+    assert "necessary for stick-slip, not sufficient" in ForceCurve(soft).verdict
+    assert "delay" in ForceCurve(soft).verdict
+    stiff = ForceCurve(klein(slider__stiffness=1e6))
+    assert stiff.stable
+    assert "slow sliding" in stiff.verdict
+    assert "follows the drive" in ForceCurve(klein(slider={"kind": "prescribed"})).verdict
+    path = tmp_path / "soft.toml"
+    path.write_text(soft.to_toml())
+    assert "necessary for stick-slip, not sufficient" in command("curve", path)[1]
+    assert "necessary for stick-slip, not sufficient" in command("onset", path)[1]
+    assert "possible, not certain" in command("info", path)[1]
+    assert "unless delay or ageing" in command("info", path, "--set", "slider.stiffness=1e6")[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import platform
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -115,11 +117,11 @@ def test_rows_of_the_kernel_become_variables(results):
     """Each row of each table stands in its place, with its realization."""
     tree = layout.build_tree(results)
     for place, one in enumerate(results.realizations):
-        trace = one.rows("trace").array
+        trace = one.rows("trace").read()
         force = tree["spring_force"].values[place]
         np.testing.assert_array_equal(force[: len(trace)], trace[:, 4])
         assert np.isnan(force[len(trace) :]).all()
-        slips, data = one.rows("slips").array, mesoslip.group(tree, "slips")
+        slips, data = one.rows("slips").read(), mesoslip.group(tree, "slips")
         mine = data["realization_index"].values == place
         np.testing.assert_array_equal(data["force_drop"].values[mine], slips[:, 3] - slips[:, 4])
         np.testing.assert_array_equal(data["contacts_broken"].values[mine], slips[:, 6])
@@ -130,17 +132,17 @@ def test_rows_of_the_kernel_become_variables(results):
         }
         for group in tables.keys() & tree.children.keys():
             table, columns = tables[group]
-            data, rows = mesoslip.group(tree, group), one.rows(table).array
+            data, rows = mesoslip.group(tree, group), one.rows(table).read()
             mine = data["realization_index"].values == place
             for name, column in columns.items():
                 np.testing.assert_array_equal(data[name].values[mine], rows[:, column], name)
         if "snapshots" in tree.children:
             stretch = tree["snapshots/stretch"].values
             mine = tree["snapshots/realization_index"].values == place
-            rows = one.rows("snapshots").array
+            rows = one.rows("snapshots").read()
             np.testing.assert_array_equal(stretch[mine].reshape(rows.shape[:2]), rows[..., 0])
         if "layer" in tree.dims:
-            rows = one.rows("layers").array
+            rows = one.rows("layers").read()
             np.testing.assert_array_equal(tree["layer_displacement"].values[place], rows)
 
 
@@ -213,7 +215,7 @@ class Rows:
 tables = {"trace": Rows(1_500_000, 9), "slip_trace": Rows(1_500_000, 10), "slips": Rows(0, 7)}
 one = SimpleNamespace(
     rows=tables.get, number=0, time=1.0, ending="", breaks=1, advances=1, kernel_seconds=1.0,
-    energy=np.ones(8), energy_residual=0.0,
+    energy=np.ones(8), energy_residual=0.0, force_error=0.0,
 )
 config = mesoslip.Config.load(sys.argv[1])
 results = SimpleNamespace(config=config, complete=True, wall_seconds=1.0, realizations=[one])
@@ -296,3 +298,21 @@ def test_files_of_earlier_versions_are_read():
     assert "slips" in tree._repr_html_()
     assert tree.isel(realization=0).sel(time=slice(0, 1)).sizes["time"] > 0
     assert len(mesoslip.slips(tree)["waiting_time"]) == len(numbers)
+
+
+def test_what_a_killed_process_left_behind_is_removed(tmp_path):
+    """The part of an output that nobody writes any more, and no other file."""
+    path = tmp_path / "out.nc"
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    node = platform.node()
+    left = tmp_path / f".{node}-{dead.pid}-1.out.nc"
+    others = [
+        tmp_path / f".{node}-{os.getpid()}-1.out.nc",
+        tmp_path / f".elsewhere-{dead.pid}-1.out.nc",
+        tmp_path / f".{node}-{dead.pid}-1.other.nc",
+    ]
+    for one in (left, *others):
+        one.touch()
+    files.check_writable(path)
+    assert sorted(tmp_path.iterdir()) == sorted(others)

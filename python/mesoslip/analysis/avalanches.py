@@ -25,6 +25,11 @@ NO_AVALANCHES = (
 SUMMARY = {
     "count": ("1", "avalanches in the catalogue"),
     "breaks": ("1", "breaks of contacts in them"),
+    "breaks_outside": (
+        "1",
+        "breaks of the run in none of them: of a slide without end, an avalanche that the end of "
+        "an interrupted run cut off, or those below output.avalanche_size",
+    ),
     "mean_size": ("1", "mean size"),
     "largest_size": ("1", "largest size"),
     "largest_part": ("1", "largest size over the number of contacts"),
@@ -119,6 +124,10 @@ def statistics(
     config = Config.from_toml(tree.attrs["configuration"])
     sizes = data["size"].values
     result: dict[str, float | None] = {"count": float(sizes.size), "breaks": float(sizes.sum())}
+    is_whole = after == 0 and force_above is None
+    outside = float(tree.to_dataset()["breaks"].values.sum() - sizes.sum())
+    if is_whole and outside > 0:
+        result["breaks_outside"] = outside
     if sizes.size == 0:
         return result
     result["mean_size"] = float(sizes.mean())
@@ -126,7 +135,7 @@ def statistics(
     result["largest_part"] = float(sizes.max() / config.contacts.count)
     result["triggered_share"] = float(1 - sizes.size / sizes.sum())
     directions = {math.copysign(1, one.velocity) for one in config.drive_stages if one.velocity}
-    if "slip" in data and after == 0 and force_above is None and len(directions) == 1:
+    if "slip" in data and is_whole and len(directions) == 1:
         root = tree.to_dataset()
         moved = float(np.abs(root["end_displacement"]).sum())
         if moved > 0:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.output.files import written_whole
 from mesoslip.output.layout import group_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COLUMNS = (
     "realization_index",
@@ -22,6 +24,8 @@ COLUMNS = (
     "force_drop",
     "peak_velocity",
     "contacts_broken",
+    "slip_time",
+    "waiting_time",
 )
 
 
@@ -30,6 +34,8 @@ def slips(tree: xr.DataTree) -> xr.Dataset:
 
     The waiting time is that since the start of the slip before; NaN for the first of a realization.
     """
+    import xarray as xr
+
     data = group_of(tree, "slips")
     slip_time = data["end_time"] - data["start_time"]
     waiting = np.diff(data["start_time"].values, prepend=np.nan)
@@ -50,7 +56,7 @@ def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
     """
     data = slips(tree)
     result: dict[str, dict[str, float]] = {"slips": {"count": float(data.sizes["slip"])}}
-    for name in (*COLUMNS[3:], "slip_time", "waiting_time"):
+    for name in COLUMNS[3:]:
         values = data[name].values[np.isfinite(data[name].values)]
         if values.size:
             result[name] = {
@@ -63,11 +69,12 @@ def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
 
 
 def rows(tree: xr.DataTree) -> list[dict[str, Any]]:
-    """The catalogue, a dictionary for each slip."""
+    """The catalogue, a dictionary for each slip; waiting time None for a realization's first."""
     data = slips(tree)
+    columns = [data[name].values.tolist() for name in COLUMNS]
     return [
-        {name: data[name].values[number].item() for name in COLUMNS}
-        for number in range(data.sizes["slip"])
+        {name: None if value != value else value for name, value in zip(COLUMNS, row, strict=True)}
+        for row in zip(*columns, strict=True)
     ]
 
 

@@ -130,5 +130,7 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
         f"{told['wall_seconds']:.2f} s",
         err=True,
     )
+    if told["audit"] != "passed":
+        typer.echo(f"{path}: warning: {told['audit']}", err=True)
     if told["ending"] != ENDINGS[1]:
         typer.echo(f"{path}: the run ended as follows: {told['ending']}", err=True)

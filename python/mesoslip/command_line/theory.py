@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
     """Show derived quantities."""
     from mesoslip.configuration.config import Config
-    from mesoslip.theory.derived import derived_quantities
+    from mesoslip.theory.derived import derived_quantities, verdict
 
     if Path(config).suffix == ".nc":
         from mesoslip.output import files
@@ -31,6 +31,9 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         return
     for name, one in quantities.items():
         show(name, one.value, one.unit, one.meaning)
+    told = verdict(checked)
+    if told is not None:
+        typer.echo(told)
 
 
 def curve(
@@ -60,6 +63,7 @@ def curve(
     else:
         for name, value in summary.items():
             show(name, value, *SUMMARY[name])
+        typer.echo(force_curve.verdict)
     if force_curve.error > checked.curve.tolerance:
         typer.echo(
             f"the force has {force_curve.digits} digits; more would take too much work, as its "

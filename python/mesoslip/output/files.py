@@ -5,20 +5,24 @@ from __future__ import annotations
 import errno
 import math
 import os
+import platform
+import re
 import shutil
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import netCDF4
-import xarray as xr
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output import layout, variables
 from mesoslip.output.layout import Entry, GroupLayout, RunResults
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Variables with fewer values are not worth compressing.
 LEAST_COMPRESSED = 1000
@@ -92,6 +96,7 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
     part = _temporary(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_left_behind(target)
         # A full disk takes an empty file.
         part.write_bytes(bytes(PROBE_BYTES))
     except (OSError, ValueError) as error:
@@ -137,7 +142,26 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
 
 def _temporary(path: Path) -> Path:
     """A name beside a file, with its ending, that no other process or thread has."""
-    return path.with_name(f".{os.getpid()}-{threading.get_ident()}.{path.name}")
+    owner = f"{platform.node()}-{os.getpid()}-{threading.get_ident()}"
+    return path.with_name(f".{owner}.{path.name}")
+
+
+def _remove_left_behind(path: Path) -> None:
+    """Remove parts of a file that processes of this machine left behind, when they were killed."""
+    node = re.escape(platform.node())
+    pattern = re.compile(rf"\.{node}-(\d+)-\d+\.{re.escape(path.name)}")
+    for other in path.parent.iterdir():
+        match = pattern.fullmatch(other.name)
+        if match is None:
+            continue
+        try:
+            os.kill(int(match[1]), 0)
+        except ProcessLookupError:
+            with suppress(OSError):
+                other.unlink(missing_ok=True)
+        except OSError:
+            # Somebody else's, at work.
+            continue
 
 
 @contextmanager
@@ -249,6 +273,8 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
     FileError
         If there is no such file, or it is not an output of mesoslip, or it is damaged.
     """
+    import xarray as xr
+
     path = Path(path)
     if path.is_dir():
         raise FileError(f"{path}: is a directory, not an output file")
@@ -284,6 +310,8 @@ def _close(groups: dict[str, xr.Dataset]) -> None:
 
 def _groups(path: Path) -> dict[str, xr.Dataset]:
     """The groups of a file, with little memory for what is read of them."""
+    import xarray as xr
+
     before = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(CHUNK_CACHE)
     try:

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
@@ -23,6 +22,10 @@ from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation import tables
+from mesoslip.simulation.audit import failed_promises
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[Any]
 # What a variable takes from rows of a table, given the places of their realizations.
@@ -73,6 +76,8 @@ class RealizationResults(Protocol):
     def energy(self) -> Array: ...
     @property
     def energy_residual(self) -> float: ...
+    @property
+    def force_error(self) -> float: ...
     @property
     def integrator_counts(self) -> Array: ...
 
@@ -209,6 +214,8 @@ def _root(results: RunResults) -> GroupLayout:
         where = (*at_times, "layer")
         writer.add("layer_displacement", where, table="layers", pick=lambda rows, _: rows)
     totals = ["breaks", "energy_residual", "kernel_seconds"]
+    if config.contact_kind.force_error_bound > 0:
+        totals.append("force_error")
     if config.has_avalanches:
         totals += ["avalanche_count", "avalanche_slip"]
     for name in totals:
@@ -366,6 +373,7 @@ def attributes(results: RunResults) -> dict[str, Any]:
             "ending": "; ".join(sorted({one.ending for one in realizations})),
             "advance_count": sum(one.advances for one in realizations),
             "energy_residual": residual,
+            "audit": "; ".join(failed_promises(config, realizations)) or "passed",
             "wall_seconds": results.wall_seconds,
         }
     )
@@ -407,7 +415,7 @@ def _block_rows(results: RunResults, table: str) -> int:
     if table == "snapshots":
         width = 3 * results.config.contacts.count
     elif table == "layers":
-        width = getattr(results.config.slider, "layers", 1)
+        width = results.config.slider.layer_count
     return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
 
 
@@ -459,6 +467,8 @@ def build_tree(results: RunResults) -> xr.DataTree:
         (snapshot, row, column), ``energy`` (realization). What an interrupted run did not come to
         is NaN in the trace.
     """
+    import xarray as xr
+
     layout = describe(results)
     sizes = layout[""].sizes
     arrays: dict[str, dict[str, Array]] = {}

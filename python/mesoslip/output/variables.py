@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import DTypeLike
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Group(dict[str, Meaning]):
 
     def variable(self, name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
         """A variable of the group with its units and long name."""
+        import xarray as xr
+
         return xr.Variable(dimensions, values, self[name].attributes)
 
 
@@ -73,6 +77,10 @@ ROOT = Group(
     layer=Meaning("1", "number of the layer, 1 at the contacts", np.int64),
     layer_displacement=Meaning("m", "displacement of a layer"),
     breaks=Meaning("1", "breaks of contacts in the run", np.int64, is_fractional=True),
+    force_error=Meaning(
+        "N",
+        "estimated error of the contact force: the greatest jump between two steps",
+    ),
     energy_residual=Meaning(
         "1", "what the energy balance lacks, relative to the work of the drive"
     ),

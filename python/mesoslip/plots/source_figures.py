@@ -227,7 +227,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
     for letter, axes, name, title in zip("ab", panels, names, titles, strict=True):
         inset = axes.inset_axes((0.45, 0.62, 0.53, 0.36))
         for tree, style in zip(trees, ("--", "-"), strict=True):
-            count = getattr(configuration(tree).slider, "layers", 1)
+            count = configuration(tree).slider.layer_count
             color = "tab:red" if style == "--" else "black"
             line: dict[str, Any] = {"color": color, "linestyle": style}
             slips = group_of(tree, "slips")

@@ -96,6 +96,7 @@ class Checkpoint:
         self._tell = tell
         self._sizes = dict.fromkeys(TABLES, 0)
         self._saved: dict[int, tuple[int, Saved]] = {}
+        self._grown: dict[int, Realization] = {}
         self._lock = threading.Lock()
         self._epoch = self._written = 0
         self._start = self._last = time.perf_counter()
@@ -114,9 +115,12 @@ class Checkpoint:
     def visit(self, realization: Realization) -> None:
         """Between two segments of a realization: save it if it is wanted, or over."""
         epoch, _ = self._saved.get(realization.number, (-1, None))
+        saved = None
         if epoch < self._epoch or realization.finished:
             saved = realization.save()
-            with self._lock:
+        with self._lock:
+            self._grown[realization.number] = realization
+            if saved is not None:
                 self._saved[realization.number] = (self._epoch, saved)
 
     # What the main thread calls.
@@ -129,9 +133,11 @@ class Checkpoint:
                 self._write(realizations)
         elif 0 < self._interval <= time.perf_counter() - self._last:
             self._epoch += 1
-        waiting = sum(rows.waiting_bytes for one in realizations for _, rows in one.waiting)
+        with self._lock:
+            grown = list(self._grown.values())
+        waiting = sum(rows.waiting_bytes for one in grown for _, rows in one.waiting)
         if waiting > MOST_WAITING and not self._is_failing:
-            self._attempt(lambda: self._flush(realizations))
+            self._attempt(lambda: self._flush(grown))
 
     def write(self, realizations: Sequence[Realization]) -> bool:
         """Write a checkpoint of a run that stands still; whether it was possible."""
@@ -228,6 +234,8 @@ class Checkpoint:
     def _flush(self, realizations: Sequence[Realization]) -> None:
         """Append what waits in memory to the files."""
         for one in realizations:
+            with self._lock:
+                self._grown.pop(one.number, None)
             for table, rows in one.waiting:
                 for number, values in rows.waiting():
                     rows.store(number, self._append(table, values))
@@ -253,14 +261,15 @@ class Checkpoint:
         return is_written
 
     def _write_state(self, realizations: Sequence[Realization]) -> None:
-        self._flush(realizations)
+        # Before rows are put into files, as one that ends meanwhile is saved with more of them.
+        with self._lock:
+            saved = {number: one for number, (_, one) in self._saved.items()}
+        self._flush([one for one in realizations if one.advances > 0])
         for table, size in self._sizes.items():
             if size:
                 with (self.folder / f"{table}.rows").open("r+b") as file:
                     file.truncate(size)
                     os.fsync(file.fileno())
-        with self._lock:
-            saved = {number: one for number, (_, one) in self._saved.items()}
         arrays: dict[str, Any] = {}
         tables: dict[str, list[tuple[int, ...]]] = {table: [] for table in TABLES}
         for number, one in saved.items():

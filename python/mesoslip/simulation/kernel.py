@@ -34,6 +34,8 @@ class Progress(NamedTuple):
     """Contacts that are detached."""
     avalanche_slip: float
     """Displacement of the slider in avalanches [m]."""
+    force_error: float
+    """Estimated error of the contact force [N]; 0 where contacts are followed one by one."""
     advances: int
     """Advances of the slider, each to an event or less far."""
     avalanches: int
@@ -105,11 +107,11 @@ class Kernel:
         self, kind: str, parameters: Mapping[str, float], seed: int, realization: int
     ) -> None:
         """Make the contacts of a kind from named numbers."""
-        self._call(_core.set_contacts, kind, *_named(parameters), seed, realization)
+        self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
     def set_slider(self, kind: str, parameters: Mapping[str, float]) -> None:
         """Make the slider of a kind from named numbers."""
-        self._call(_core.set_slider, kind, *_named(parameters))
+        self._call(_core.set_slider, kind, *named(parameters))
 
     def set_drive(self, stage_end: Array, stage_velocity: Array) -> None:
         """Stages of the drive: when each ends [s], and its velocity [m/s], shape (stages)."""
@@ -192,7 +194,8 @@ class Kernel:
         self._call(_core.restore_simulation, words)
 
 
-def _named(parameters: Mapping[str, float]) -> tuple[Any, Array]:
+def named(parameters: Mapping[str, float]) -> tuple[Any, Array]:
+    """Named numbers as a kernel takes them: names, and values."""
     names = [name.ljust(NAME_LENGTH).encode() for name in parameters]
     # Of two arrays of one length f2py refuses the second if that is 0.
     values = np.zeros(max(1, len(names)))

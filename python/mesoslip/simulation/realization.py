@@ -32,7 +32,7 @@ ENDINGS = {
     1: "the drive came to its end",
     2: "as many avalanches as wanted",
     3: "no contact is left to break",
-    4: "contacts break under the force without end",
+    4: "contacts break under the force without end; breaks of this slide are in no avalanche",
 }
 
 # Work of the drive over the energy of all contacts about to break, below which it does not count.
@@ -103,6 +103,8 @@ class Realization:
         Avalanches so far, and the displacement of the slider in them [m].
     displacement
         Displacement of the slider [m].
+    force_error
+        Estimated error of the contact force [N]; 0 where contacts are followed one by one.
     integrator_counts
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
@@ -119,6 +121,7 @@ class Realization:
         self.avalanche_count = 0
         self.avalanche_slip = 0.0
         self.displacement = 0.0
+        self.force_error = 0.0
         self.integrator_counts = np.zeros(3, dtype=np.int64)
         self._energy: Array | None = None
         self._kernel: Kernel | None = None
@@ -211,6 +214,7 @@ class Realization:
             self.avalanche_count = progress.avalanches
             self.avalanche_slip = progress.avalanche_slip
             self.displacement = progress.displacement
+            self.force_error = progress.force_error
             self.integrator_counts = progress.integrator_counts.copy()
             self.ending = ENDINGS.get(progress.ending, "")
             self._energy = kernel.energy() if self.ending else None
@@ -335,6 +339,7 @@ class Realization:
             "avalanche_count": self.avalanche_count,
             "avalanche_slip": self.avalanche_slip,
             "displacement": self.displacement,
+            "force_error": self.force_error,
             "integrator_counts": [int(count) for count in self.integrator_counts],
             "energy": None if self._energy is None else [float(term) for term in self._energy],
             "columns": {table: rows.columns for table, rows in self._tables.items()},

@@ -8,9 +8,10 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from numbers import Integral
 from typing import TYPE_CHECKING
 
-from mesoslip.errors import RunError
+from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.simulation.realization import Realization
 
 if TYPE_CHECKING:
@@ -52,7 +53,8 @@ def run_realizations(
     config
         What to run.
     workers
-        Realizations that run at the same time; as many as there are processors by default.
+        Realizations that run at the same time, at least 1; as many as there are processors by
+        default.
     progress
         Called now and then, from this thread, with the part of the work that is done.
     stop
@@ -62,14 +64,16 @@ def run_realizations(
 
     Raises
     ------
+    ConfigError
+        If the number of workers is none.
     RunError
         If a realization fails; the checkpoint stays.
     """
+    workers = _checked_workers(workers)
     start = time.perf_counter()
     stop = stop or threading.Event()
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
     before = checkpoint.restore(realizations) if checkpoint is not None else 0.0
-    workers = min(workers or os.cpu_count() or 1, len(realizations))
 
     def finish(realization: Realization) -> None:
         while not (realization.finished or stop.is_set()):
@@ -90,7 +94,7 @@ def run_realizations(
         if checkpoint is not None:
             checkpoint.look(realizations)
 
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(min(workers, len(realizations))) as pool:
         pending = {pool.submit(finish, one) for one in realizations if not one.finished}
         try:
             while pending:
@@ -106,3 +110,19 @@ def run_realizations(
     if checkpoint is not None and not complete:
         checkpoint.write(realizations)
     return Results(config, realizations, complete, before + time.perf_counter() - start)
+
+
+def _checked_workers(workers: int | None) -> int:
+    """The number of workers, as a number of Python's own.
+
+    Raises
+    ------
+    ConfigError
+        If it is no whole number of at least 1.
+    """
+    if workers is None:
+        return os.cpu_count() or 1
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
+        message = "must be a whole number of at least 1; as many as processors without it"
+        raise ConfigError([Problem("", "workers", message, workers)])
+    return int(workers)

@@ -111,22 +111,26 @@ class Rows:
     """The rows of a table of one realization, in pieces.
 
     Pieces are added by the thread of the realization, and put into files by another.
+
+    Attributes
+    ----------
+    columns
+        Numbers in a row.
+    pieces
+        The rows in their order.
+    waiting_bytes
+        Memory of the pieces that are in no file.
     """
 
     def __init__(self, columns: int) -> None:
         self.columns = columns
         self.pieces: list[Array | Stored] = []
+        self.waiting_bytes = 0
         self._lock = threading.Lock()
         self._count = 0
 
     def __len__(self) -> int:
         return self._count
-
-    @property
-    def waiting_bytes(self) -> int:
-        """Memory of the pieces that are in no file."""
-        with self._lock:
-            return sum(one.nbytes for one in self.pieces if isinstance(one, np.ndarray))
 
     def add(self, values: Array | Stored) -> None:
         """Add rows, shape (rows, columns)."""
@@ -135,6 +139,8 @@ class Rows:
         with self._lock:
             self.pieces.append(values)
             self._count += len(values)
+            if isinstance(values, np.ndarray):
+                self.waiting_bytes += values.nbytes
 
     def waiting(self) -> list[tuple[int, Array]]:
         """Pieces that are in no file, with their numbers."""
@@ -148,6 +154,9 @@ class Rows:
     def store(self, number: int, stored: Stored) -> None:
         """A piece is in a file now."""
         with self._lock:
+            piece = self.pieces[number]
+            if isinstance(piece, np.ndarray):
+                self.waiting_bytes -= piece.nbytes
             self.pieces[number] = stored
 
     def blocks(self, most: int) -> Iterator[Array]:

@@ -33,6 +33,23 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
     }
 
 
+def verdict(config: Config) -> str | None:
+    """What the estimate of K* says of the spring, and what it does not; None without a spring."""
+    spring = config.spring_stiffness
+    if not 0 < spring < math.inf:
+        return None
+    estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
+    if spring >= estimate:
+        return (
+            "K is above the estimate of K*: smooth in slow sliding, unless delay or ageing weaken "
+            "faster contacts"
+        )
+    return (
+        "K is below the estimate of K*: stick-slip is possible, not certain. Delay and ageing "
+        "decide whether slips go on; mesoslip curve tells K* itself, a run the rest"
+    )
+
+
 def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
     contacts = config.contacts
     width = contacts.threshold.relative_width
@@ -61,7 +78,7 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "K_star_estimate",
         contacts.stiffness * (1 - contacts.back_force_ratio) / width,
         "N/m",
-        "estimate of K*, above which sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48)",
+        "estimate of K*, above which slow sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48)",
     )
     if config.interaction is not None:
         bond = config.bond_stiffness

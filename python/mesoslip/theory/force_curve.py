@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,8 @@ from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
-from mesoslip.theory.lives import checked, law_arguments, scales
+from mesoslip.simulation.kernel import checked, named
+from mesoslip.theory.lives import law_parameters, scales
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -38,19 +39,27 @@ POINTS = 12
 FIRST_WIDTH = 0.7
 # Multiplications that a finer solution may take, which is about a second.
 MOST_WORK = 2e9
+# A force that falls by less than this part of F_s, or than its error, is not said to fall.
+LEAST_FALL = 1e-11
+# A curve that ends closer to the stationary force than this part of it has come to it.
+ARRIVED = 0.01
 # Panels that fit into memory.
 MOST_PANELS = 4_000_000
 
 
 # Units and meanings of what a curve is summed up in.
 SUMMARY = {
-    "K_star": ("N/m", "greatest -F'(X), K*: sliding is smooth with a stiffer spring"),
+    "K_star": (
+        "N/m",
+        "greatest -F'(X), K*: slow sliding is smooth with a stiffer spring, and may be with a "
+        "softer one; 0 if the force does not fall",
+    ),
     "K_star_displacement": ("m", "where that is"),
     "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
-    "stable": ("1", "whether sliding is smooth with the configured spring"),
+    "stable": ("1", "whether K >= K*, so that slow sliding has no instability"),
     "X_c": ("m", "displacement at which the slider becomes unstable, lowest F'(X) = -K"),
     "F_c": ("N", "force there"),
-    "F_peak": ("N", "greatest force"),
+    "F_peak": ("N", "greatest force; none if the force does not fall"),
     "X_peak": ("m", "where that is"),
     "F_steady": ("N", "force of stationary slow sliding"),
     "D0": ("1", "F(X_c)/F_s"),
@@ -102,10 +111,11 @@ def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
     return BPoly(np.linalg.solve(bernstein, values), edges, extrapolate=False)
 
 
-def _solve(arguments: tuple[Any, ...], start: float, width: float, panels: int) -> _Solution:
-    point, breaks, slope, force, stiffness, pinned, mismatch = checked(
-        _core.force_curve(*arguments, start, width, panels, POINTS)
+def _solve(parameters: Mapping[str, float], start: float, width: float, panels: int) -> _Solution:
+    point, solution, pinned, mismatch = checked(
+        _core.force_curve(*named(parameters), start, width, panels, POINTS)
     )
+    breaks, slope, force, stiffness = np.moveaxis(solution, -1, 0)
     edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
     return _Solution(
         edges,
@@ -156,7 +166,7 @@ class ForceCurve:
         self._refine()
 
     def _refine(self) -> None:
-        arguments = law_arguments(self.config, self.newborn_width)
+        parameters = law_parameters(self.config, self.newborn_width)
         length = self.length / self._stretch
         start, width = self._first_panels(length)
         coarse = None
@@ -178,7 +188,7 @@ class ForceCurve:
                         )
                     ]
                 )
-            fine = _solve(arguments, start, width, panels)
+            fine = _solve(parameters, start, width, panels)
             self.kernel_seconds += time.perf_counter() - begin
             if coarse is not None:
                 inside = np.linspace(max(0.0, start), length, 20011)[1:-1]
@@ -295,14 +305,28 @@ class ForceCurve:
 
     @cached_property
     def K_star(self) -> tuple[float, float]:  # noqa: N802
-        """K* = max(-F'(X)) [N/m] and where it is [m]: sliding is smooth with a stiffer spring."""
+        """K* = max(-F'(X)) [N/m] and where it is [m]: slow sliding is smooth with a stiffer spring.
+
+        A force that does not fall flattens out for ever, so that K* is 0, at infinity. So it is of
+        lives the likelier to end the younger they are: wide laws whose density diverges at 0, or
+        the exponential one (M. Brown, Ann. Probab. 8 (1980) 227: ages grow with the displacement).
+        """
+        if not self.falls:
+            return 0.0, math.inf
         place = int(np.argmin(self.slope(self.samples)))
         displacement, slope = self._extreme(self.slope, place)
         return -slope, displacement
 
     @cached_property
+    def falls(self) -> bool:
+        """Whether the force falls anywhere on the curve, by more than it may be wrong."""
+        force = self.force(self.samples)
+        fall = np.max(np.maximum.accumulate(force) - force) / self._force_unit
+        return bool(fall > max(self.error, LEAST_FALL))
+
+    @cached_property
     def peak(self) -> tuple[float, float]:
-        """Greatest force [N] and where it is [m]."""
+        """Greatest force of the curve [N] and where it is [m]; its end if the force only rises."""
         place = int(np.argmax(self.force(self.samples)))
         displacement, force = self._extreme(lambda x: -self.force(x), place)
         return -force, displacement
@@ -314,8 +338,42 @@ class ForceCurve:
 
     @property
     def stable(self) -> bool:
-        """Whether sliding is smooth everywhere, K ≥ K*."""
+        """Whether K ≥ K*: slow sliding from this start has no instability; see `verdict`."""
         return self._spring >= self.K_star[0]
+
+    @property
+    def verdict(self) -> str:
+        """What the curve says of the configured spring, and what it does not say."""
+        sentences = []
+        if not self.falls:
+            sentences.append("the force does not fall: it has no peak, and K* = 0")
+        if self._ends_early:
+            sentences.append(
+                "the curve ends before the force is stationary, and K* is of no more than the "
+                "curve: choose a longer curve.length"
+            )
+        if math.isinf(self._spring):
+            sentences.append("the slider follows the drive, so it has no instability")
+        elif self.stable:
+            sentences.append(
+                "K >= K*: in slow sliding from this start there is no instability; of fast "
+                "sliding, where delay and ageing weaken the contacts, the curve says nothing"
+            )
+        else:
+            sentences.append(
+                "K < K*: the slider becomes unstable at X_c, where the first slip starts. This is "
+                "necessary for stick-slip, not sufficient: whether slips go on or die away into "
+                "smooth sliding is decided by delay and ageing, which only a run tells"
+            )
+        return "; ".join(sentences)
+
+    @property
+    def _ends_early(self) -> bool:
+        """Whether what the curve does not show may change K*."""
+        if self.falls:
+            return bool(self.K_star[1] > self.samples[-3])
+        end = float(self.force(self.samples[-1]))
+        return end < (1 - ARRIVED) * self.steady_force or not self.config.contacts.reattach
 
     @cached_property
     def critical_points(self) -> tuple[CriticalPoint, ...]:
@@ -323,7 +381,9 @@ class ForceCurve:
         spring = self._spring
         if math.isinf(spring):
             return ()
-        samples = np.unique([*self.samples, self.K_star[1]])
+        samples = self.samples
+        if self.falls:
+            samples = np.unique([*samples, self.K_star[1]])
         excess = self.slope(samples) + spring
         changes = np.flatnonzero(np.diff(np.sign(excess)) != 0)
         scale = self._stretch
@@ -479,6 +539,7 @@ class ForceCurve:
             },
         )
         root.attrs["stable"] = str(self.stable).lower()
+        root.attrs["comment"] = self.verdict
         points = np.array(self.critical_points).reshape(-1, len(CriticalPoint._fields))
         critical = xr.Dataset(
             {
@@ -518,7 +579,8 @@ class ForceCurve:
         """What is to be known of the curve, in SI units; None for what does not exist.
 
         ``X_c`` and ``D0``, ``D2``, ``D3`` belong to the lowest solution of F'(X) = -K, which does
-        not exist if sliding is stable; ``D1`` needs a drive that moves and a slider with a mass.
+        not exist if sliding is stable; ``D1`` needs a drive that moves and a slider with a mass. A
+        force that does not fall has neither ``F_peak`` nor a place of K*, which is 0.
         """
         critical = self.critical_points[0] if self.critical_points else None
         contacts = self.config.contacts
@@ -526,15 +588,15 @@ class ForceCurve:
         stiffness, stiffness_place = self.K_star
         return {
             "K_star": stiffness,
-            "K_star_displacement": stiffness_place,
+            "K_star_displacement": stiffness_place if self.falls else None,
             "K_star_estimate": contacts.stiffness
             * (1 - contacts.back_force_ratio)
             / contacts.threshold.relative_width,
             "stable": self.stable,
             "X_c": critical.displacement if critical else None,
             "F_c": critical.force if critical else None,
-            "F_peak": force,
-            "X_peak": force_place,
+            "F_peak": force if self.falls else None,
+            "X_peak": force_place if self.falls else None,
             "F_steady": self.steady_force,
             "D0": critical.D0 if critical else None,
             "D1": self.config.slider.loading_rate(self.config),

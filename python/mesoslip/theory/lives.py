@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from mesoslip import _core
 from mesoslip.configuration.contacts.tables import COUPLINGS
-from mesoslip.errors import RunError
+from mesoslip.simulation.kernel import checked, named
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -26,35 +26,21 @@ class Scales(NamedTuple):
     mean_mass: float
 
 
-def law_arguments(config: Config, newborn_width: float = 0.0) -> tuple[Any, ...]:
+def law_parameters(config: Config, newborn_width: float = 0.0) -> dict[str, float]:
     """What the kernels of the master equation are told of contacts; ``newborn_width`` in m."""
     contacts = config.contacts
-    return (
-        contacts.threshold.code,
-        contacts.threshold.relative_width,
-        COUPLINGS[contacts.coupling],
-        contacts.back_force_ratio,
-        newborn_width * contacts.stiffness / contacts.static_force,
-        int(contacts.reattach),
-        config.initial_code,
-    )
-
-
-def checked(results: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Results of a kernel without its status and message.
-
-    Raises
-    ------
-    RunError
-        If the kernel failed.
-    """
-    *values, status, message = results
-    if status != 0:
-        raise RunError(message.decode().strip())
-    return tuple(values)
+    return {
+        "law": contacts.threshold.code,
+        "relative_width": contacts.threshold.relative_width,
+        "coupling": COUPLINGS[contacts.coupling],
+        "back_force_ratio": contacts.back_force_ratio,
+        "newborn_width": newborn_width * contacts.stiffness / contacts.static_force,
+        "reattach": int(contacts.reattach),
+        "initial": config.initial_code,
+    }
 
 
 def scales(config: Config, newborn_width: float = 0.0) -> Scales:
     """Scales of a configuration's contacts; ``newborn_width`` in m."""
-    (values,) = checked(_core.contact_scales(*law_arguments(config, newborn_width)))
+    (values,) = checked(_core.contact_scales(*named(law_parameters(config, newborn_width))))
     return Scales(*(float(value) for value in values))

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from mesoslip import _core
-from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
@@ -29,8 +28,8 @@ Array = NDArray[np.float64]
 
 # Units and meanings of what the onset is summed up in.
 SUMMARY = {
-    "stable": ("1", "whether sliding is smooth, so that there is no onset of slip"),
-    "K_star": ("N/m", "spring constant above which it is"),
+    "stable": ("1", "whether K >= K*, so that slow sliding has no onset of slip"),
+    "K_star": ("N/m", "spring constant above which it has none"),
     "X_c": ("m", "displacement at the onset"),
     "D0": ("1", "F(X_c)/F_s"),
     "D1": ("1", "v_d (K M)^(1/2)/F_s"),
@@ -177,11 +176,10 @@ def onset_of_slip(config: Config) -> xr.DataTree:
     RunError
         If an integration fails.
     """
-    slider = config.slider
-    if not isinstance(slider, RigidSlider):
-        raise ConfigError(
-            [Problem("", "slider.kind", "must be rigid for the onset of slip", slider.kind)]
-        )
+    slider = config.slider.oscillator
+    if slider is None:
+        kind = config.slider.kind
+        raise ConfigError([Problem("", "slider.kind", "must be rigid for the onset of slip", kind)])
     curve = ForceCurve(config)
     summary = curve.summary()
     if summary["D1"] is None:
@@ -191,13 +189,13 @@ def onset_of_slip(config: Config) -> xr.DataTree:
     }
     attributes["stable"] = str(curve.stable).lower()
     if not curve.critical_points:
-        attributes["comment"] = "sliding is smooth, as F' is above -K everywhere: there is no onset"
+        attributes["comment"] = f"F' is above -K everywhere: there is no onset; {curve.verdict}"
         return xr.DataTree(xr.Dataset(attrs=attributes))
 
-    omega = slider.omega_s
+    omega = slider.frequency
     critical = curve.critical_points[0]
     coefficients = (critical.D0, float(summary["D1"]), critical.D2, critical.D3)
-    damping = slider.damping_rate / omega
+    damping = slider.damping / omega
     drag = config.contacts.count * config.contacts.contact_drag / slider.mass / omega
     end = end_of_expansion(curve) * slider.stiffness / config.contacts.static_force
     solutions = {
@@ -219,7 +217,8 @@ def onset_of_slip(config: Config) -> xr.DataTree:
             if not drops
             else "; S47 ends at the least spring force"
             + ("" if solutions["melting"].ended else ", but did not come to that")
-        ),
+        )
+        + f"; {curve.verdict}",
     }
     groups = {
         name: xr.DataTree(_dataset(one, asymptote(name, one.time, coefficients, drag)))

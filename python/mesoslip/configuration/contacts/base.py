@@ -47,11 +47,20 @@ class ContactKind(ABC):
         Memory that a realization takes for each contact.
     most_realizations
         How many realizations differ from each other.
+    residual_bound
+        What the energy balance may lack, relative to the work of the drive.
+    force_error_bound
+        What the contact force may be off by over the static force; 0 if it is exact.
+    remedy
+        What makes a run keep these promises better.
     """
 
     kernel_kind: ClassVar[str]
     is_discrete: ClassVar[bool] = True
     most_realizations: ClassVar[int] = 2**31 - 1
+    residual_bound: ClassVar[float] = 1e-9
+    force_error_bound: ClassVar[float] = 0.0
+    remedy: ClassVar[str] = ""
 
     interaction: Interaction | None
 

@@ -21,6 +21,9 @@ class PopulationContacts(ContactKind):
     on_lattice: ClassVar[bool] = False
     bytes_per_contact: ClassVar[int] = 0
     most_realizations: ClassVar[int] = 1
+    residual_bound: ClassVar[float] = 1e-3
+    force_error_bound: ClassVar[float] = 0.02
+    remedy: ClassVar[str] = "a smaller run.resolution helps: the error falls with its square"
 
     @classmethod
     def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:  # noqa: ARG003

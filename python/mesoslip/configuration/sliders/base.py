@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, Protocol
@@ -19,6 +20,19 @@ class Quantity(NamedTuple):
     value: float
     unit: str
     meaning: str
+
+
+class Oscillator(NamedTuple):
+    """A mass M [kg] on a spring K [N/m], with damping η_S [1/s] relative to its mean velocity."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+    @property
+    def frequency(self) -> float:
+        """Ω_S = √(K/M) [1/s]."""
+        return math.sqrt(self.stiffness / self.mass)
 
 
 class Setting(Protocol):
@@ -87,6 +101,16 @@ class SliderTable(Table):
         return None
 
     @property
+    def oscillator(self) -> Oscillator | None:
+        """The slider as one mass on a spring (S40, S41); None if it is not one."""
+        return None
+
+    @property
+    def layer_count(self) -> int:
+        """Number of layers that the slider is made of."""
+        return 1
+
+    @property
     def extra_traces(self) -> tuple[str, ...]:
         """Names of what is traced besides what all sliders have."""
         return ()
@@ -98,6 +122,15 @@ class SliderTable(Table):
     def solver_name(self, config: Setting) -> str | None:  # noqa: ARG002
         """How the motion is integrated, where there is a choice."""
         return None
+
+    def residual_bound(self, config: Setting) -> float:  # noqa: ARG002
+        """What the energy balance may lack, relative to the work of the drive."""
+        return 0.0
+
+    @property
+    def remedy(self) -> str:
+        """What makes a run keep that promise better."""
+        return ""
 
     def problems(self, config: Setting) -> Complaints:  # noqa: ARG002
         """The combinations that this kind refuses."""

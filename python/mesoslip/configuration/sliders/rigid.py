@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from mesoslip.configuration.sliders.base import Quantity, Setting
+from mesoslip.configuration.sliders.base import Oscillator, Quantity, Setting
 from mesoslip.configuration.sliders.inertial import InertialSlider
 from mesoslip.configuration.table import Number, Rate, problem
 
@@ -34,6 +34,10 @@ class RigidSlider(InertialSlider):
 
     def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
         return {"mass": self.mass, "stiffness": self.stiffness, "damping": self.damping_rate}
+
+    @property
+    def oscillator(self) -> Oscillator:
+        return Oscillator(self.mass, self.stiffness, self.damping_rate)
 
     @property
     def damping_quantities(self) -> Iterator[Quantity]:

@@ -1,0 +1,132 @@
+!> Thresholds of the contacts of a sliding interface: a threshold law weighted by how far the slider
+!> carries a contact of this threshold from attaching to breaking.
+!>
+!> Dimensionless as in mesoslip_contacts_mechanics. Thresholds are drawn by inversion of the
+!> weighted law, E[d(u); u > U]/E[d] with d(u) = u - beta for equal contacts and
+!> u^(1/2) - beta u^(-1/2) for scaled ones: one draw consumes one deviate, however wide the law.
+module mesoslip_contacts_carried_law
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal
+   use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
+   use mesoslip_contacts_threshold_law, only: threshold_law_type
+   implicit none
+   private
+
+   public :: carried_law_type, new_carried_law
+
+   !> Iterations of Newton's method and bisection, more than enough for one of them alone
+   integer, parameter :: most_iterations = 200
+   !> Relative change of a threshold below which a solution by interpolation is good enough
+   real(wp), parameter :: enough = 1.0e-8_wp
+   !> Newton's steps from there, by moments that are exact to rounding, and the longest, relative
+   integer, parameter :: exact_steps = 2
+   real(wp), parameter :: farthest = 1.0e-3_wp
+
+   !> Thresholds weighted by the distance to breaking.
+   type :: carried_law_type
+      type(threshold_law_type), private :: law
+      type(partial_moments_type), private :: moments
+      !> One of the coupling_ codes
+      integer, private :: coupling = coupling_equal
+      !> Force at attaching, f_b/f_s
+      real(wp), private :: back_force = 0.0_wp
+      !> Mean of the distance
+      real(wp), private :: mean = 1.0_wp
+   contains
+      !> Threshold that is exceeded with a given probability
+      procedure :: quantile
+      procedure, private :: slope
+   end type carried_law_type
+
+contains
+
+   !> Set up the weighted law.
+   subroutine new_carried_law(self, law, coupling, back_force)
+      !> The weighted law
+      type(carried_law_type), intent(out) :: self
+      !> Law of the thresholds of contacts that attach, all above the force at attaching
+      type(threshold_law_type), intent(in) :: law
+      !> One of the coupling_ codes
+      integer, intent(in) :: coupling
+      !> Force at attaching, f_b/f_s
+      real(wp), intent(in) :: back_force
+
+      self%law = law
+      self%coupling = coupling
+      self%back_force = back_force
+      if (coupling == coupling_equal) then
+         call new_partial_moments(self%moments, law, [1.0_wp, 0.0_wp])
+      else
+         call new_partial_moments(self%moments, law, [0.5_wp, -0.5_wp])
+      end if
+      self%mean = distance_of(self, self%moments%above(0.0_wp))
+   end subroutine new_carried_law
+
+   !> Threshold that is exceeded with a given probability.
+   pure function quantile(self, probability) result(threshold)
+      !> The weighted law
+      class(carried_law_type), intent(in) :: self
+      !> Probability to exceed the threshold, 0 < probability < 1
+      real(wp), intent(in) :: probability
+      !> Relative threshold
+      real(wp) :: threshold
+
+      real(wp) :: lower, upper, least, next, wanted, excess, slope, step, moment(2)
+      integer :: iteration
+
+      wanted = probability * self%mean
+      ! Contacts of a low threshold break soon: there are fewer of them than among newborns.
+      least = self%law%quantile(probability)
+      upper = self%moments%greatest
+      lower = min(least, upper)
+      threshold = lower
+      do iteration = 1, most_iterations
+         call self%moments%interpolate(threshold, moment)
+         excess = distance_of(self, moment) - wanted
+         if (excess > 0.0_wp) then
+            lower = threshold
+         else
+            upper = threshold
+         end if
+         if (upper - lower <= enough * upper) exit
+         ! In the logarithm, of which no law has too many scales.
+         next = sqrt(lower * upper)
+         slope = self%slope(threshold)
+         if (slope > 0.0_wp) then
+            step = excess / (slope * threshold)
+            if (abs(step) <= enough) exit
+            step = threshold * exp(min(1.0_wp, max(-1.0_wp, step)))
+            if (step > lower .and. step < upper) next = step
+         end if
+         threshold = next
+      end do
+      do iteration = 1, exact_steps
+         slope = self%slope(threshold)
+         if (.not. slope > 0.0_wp) exit
+         step = (distance_of(self, self%moments%above(threshold)) - wanted) / slope
+         threshold = threshold + min(farthest * threshold, max(-farthest * threshold, step))
+      end do
+      threshold = max(min(threshold, self%moments%greatest), least)
+   end function quantile
+
+   !> Density of the weighted law times the mean distance.
+   pure function slope(self, threshold)
+      class(carried_law_type), intent(in) :: self
+      real(wp), intent(in) :: threshold
+      real(wp) :: slope
+
+      slope = self%law%density(threshold) &
+         & * breaking_distance(self%coupling, self%back_force, threshold)
+   end function slope
+
+   !> The distance from moments of thresholds.
+   pure function distance_of(self, moment) result(distance)
+      type(carried_law_type), intent(in) :: self
+      !> Moments of the exponents 1 and 0 for equal contacts, 1/2 and -1/2 for scaled ones
+      real(wp), intent(in) :: moment(2)
+      real(wp) :: distance
+
+      distance = moment(1) - self%back_force * moment(2)
+   end function distance_of
+
+end module mesoslip_contacts_carried_law

@@ -1,0 +1,140 @@
+"""What make finds stale: an output after an edit of its run, or of any file that is based on."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+# Stands for mesoslip: it tells what it is asked to do, and does it by touching the output.
+PROGRAM = """#!/bin/sh
+echo "$1 $2"
+while [ "$1" != -o ]; do shift; done
+mkdir -p "$(dirname "$2")"
+touch "$2"
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A checkout with the Makefile, runs of a user and a program; all files are of one age."""
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    shutil.copytree(ROOT / "tools", tmp_path / "tools")
+    (tmp_path / "mesoslip").write_text(PROGRAM)
+    (tmp_path / "mesoslip").chmod(0o755)
+    texts = {
+        "runs/klein.toml": 'title = "first"\n',
+        "runs/slow.toml": "# The first.\nbase = 'klein.toml'  # beside it\n[run]\nseed = 1\n",
+        "runs/slower.toml": 'base = "slow.toml"\n[run]\nseed = 2\n',
+        "runs/elsewhere.toml": 'base = "../mine/own.toml"\n',
+        "runs/other.toml": '[sweep]\nbase = "klein.toml"\n',
+        "mine/own.toml": 'title = "own"\n',
+    }
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+        os.utime(tmp_path / name, (1e9, 1e9))
+    return tmp_path
+
+
+def made(checkout, *targets):
+    """What the program was asked to do by make."""
+    done = subprocess.run(
+        # Nothing is to be installed here.
+        [
+            *("make", "-j2", "-s", "-o", ".venv/.installed"),
+            *("MESOSLIP=./mesoslip", f"PYTHON={sys.executable}"),
+            *targets,
+        ],
+        cwd=checkout,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={name: text for name, text in os.environ.items() if not name.startswith("MAKE")},
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return sorted(line for line in done.stdout.splitlines() if "Nothing" not in line)
+
+
+def edit(checkout, name):
+    """A file becomes newer than all outputs."""
+    for output in (checkout / "out").iterdir():
+        # Pictures are newer than what they show.
+        os.utime(output, (1.1e9 + (output.suffix == ".png"),) * 2)
+    os.utime(checkout / name, (1.2e9, 1.2e9))
+
+
+NAMES = ("klein", "slow", "slower", "elsewhere", "other")
+OUTPUTS = [f"out/{name}.nc" for name in NAMES]
+
+
+@pytest.mark.parametrize(
+    ("edited", "stale"),
+    [
+        ("runs/klein.toml", ("klein", "slow", "slower")),
+        ("runs/slow.toml", ("slow", "slower")),
+        ("runs/slower.toml", ("slower",)),
+        ("mine/own.toml", ("elsewhere",)),
+        ("runs/other.toml", ("other",)),
+    ],
+)
+def test_an_edit_makes_stale_what_is_based_on_it(checkout, edited, stale):
+    assert len(made(checkout, *OUTPUTS)) == len(OUTPUTS)
+    assert made(checkout, *OUTPUTS) == []
+    edit(checkout, edited)
+    assert made(checkout, *OUTPUTS) == sorted(f"run runs/{name}.toml" for name in stale)
+
+
+def test_pictures_curves_and_onsets_follow(checkout):
+    targets = ["out/slower.png", "out/slower.curve.nc", "out/slower.onset.nc"]
+    expected = ["curve runs/slower.toml", "onset runs/slower.toml", "plot out/slower.nc"]
+    assert made(checkout, *targets) == [*expected, "run runs/slower.toml"]
+    assert made(checkout, *targets) == []
+    edit(checkout, "runs/klein.toml")
+    assert made(checkout, *targets) == [*expected, "run runs/slower.toml"]
+
+
+def test_a_changed_chain_counts_at_once(checkout):
+    """Of no list that was made before: a base named now, or a run copied with its old date."""
+    made(checkout, *OUTPUTS)
+    (checkout / "runs/other.toml").write_text('base = "../mine/own.toml"\n')
+    (checkout / "runs/copy.toml").write_text('base = "slow.toml"\n')
+    os.utime(checkout / "runs/other.toml", (1e9, 1e9))
+    os.utime(checkout / "runs/copy.toml", (1e9, 1e9))
+    assert made(checkout, "out/copy.nc", "out/other.nc") == ["run runs/copy.toml"]
+    edit(checkout, "mine/own.toml")
+    assert made(checkout, "out/copy.nc", "out/other.nc") == ["run runs/other.toml"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["not TOML", 'base = "missing.toml"', 'base = "broken.toml"', "base = 3", 'base = "a\\u0000b"'],
+)
+def test_what_cannot_be_read_is_left_to_the_program(checkout, text):
+    (checkout / "runs/broken.toml").write_text(text)
+    assert made(checkout, "out/broken.nc") == ["run runs/broken.toml"]
+
+
+def test_the_runs_of_this_repository():
+    """Their chains end with Klein's case, or they stand alone."""
+    answer = subprocess.run(
+        [sys.executable, "tools/bases", "runs"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    chains: dict[str, list[str]] = {}
+    for line in answer.stdout.splitlines():
+        run, base = line.split(">")
+        chains.setdefault(run, []).append(base)
+    for path in sorted((ROOT / "runs").glob("*.toml")):
+        chain = chains.get(f"runs/{path.name}", [])
+        assert bool(chain) == ("\nbase = " in "\n" + path.read_text())
+        assert not chain or chain[-1] == "runs/klein.toml"
+    assert chains["runs/limit-2.toml"] == ["runs/limit-me.toml", "runs/klein.toml"]

@@ -1,0 +1,123 @@
+"""The house: dependencies point one way, and nobody outside its room asks for a kind."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+FORTRAN = ROOT / "fortran"
+# Each may use those before it; contacts and sliders do not know each other, nor does theory know
+# what moves or is recorded.
+MAY_USE: dict[str, set[str]] = {
+    "numerics": set(),
+    "interface_law": {"numerics"},
+    "contacts": {"numerics", "interface_law"},
+    "sliders": {"numerics", "interface_law"},
+    "recording": {"numerics", "interface_law", "contacts", "sliders"},
+    "theory": {"numerics", "contacts"},
+    "simulation": {"numerics", "interface_law", "contacts", "sliders", "recording"},
+    "handles": {"numerics", "simulation"},
+    "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "simulation", "handles"},
+}
+# The lists of kinds stand beside their folders: what is in a folder does not know them.
+KINDS = {"mesoslip_contacts", "mesoslip_sliders"}
+
+
+def room_of(module: str) -> str:
+    """The folder of a module, or its own name if it stands beside the folders."""
+    name = module.removeprefix("mesoslip_")
+    return next(room for room in MAY_USE if name == room or name.startswith(f"{room}_"))
+
+
+def sources() -> list[Path]:
+    return sorted([*FORTRAN.rglob("*.f90"), *FORTRAN.rglob("*.f90.in")])
+
+
+def used(path: Path) -> set[str]:
+    return set(re.findall(r"^\s*use\s+(mesoslip_\w+)", path.read_text(), re.MULTILINE))
+
+
+def room_of_file(path: Path) -> str:
+    relative = path.relative_to(FORTRAN)
+    return relative.parts[0] if len(relative.parts) > 1 else relative.name.split(".")[0]
+
+
+@pytest.mark.parametrize("path", sources(), ids=lambda path: path.name)
+def test_fortran_uses_what_comes_before(path):
+    room = room_of_file(path)
+    for module in used(path):
+        other = room_of(module)
+        assert other == room or other in MAY_USE[room], f"{path.name} uses {module}"
+        if module in KINDS:
+            assert room in {"boundary"}, f"{path.name} uses the list of kinds {module}"
+
+
+@pytest.mark.parametrize("path", sources(), ids=lambda path: path.name)
+def test_fortran_modules_are_named_after_their_path(path):
+    """Version 7 of SUNDIALS has its own file of a module, chosen by the build."""
+    modules = re.findall(r"^module\s+(\w+)", path.read_text(), re.MULTILINE)
+    relative = path.relative_to(FORTRAN)
+    named = "mesoslip_" + "_".join([*relative.parts[:-1], relative.name.split(".")[0]])
+    for module in modules:
+        if module.startswith("mesoslip_"):
+            assert re.sub(r"_[67]$", "", named) == module
+
+
+def test_bases_do_not_know_their_children():
+    for folder in ("contacts", "sliders"):
+        for module in used(FORTRAN / folder / "base.f90"):
+            extended = FORTRAN.joinpath(*module.removeprefix("mesoslip_").split("_", 1))
+            text = extended.with_suffix(".f90")
+            if text.exists():
+                assert f"extends({folder.rstrip('s')}" not in text.read_text()
+
+
+def test_fortran_states_are_not_saved():
+    """Modules hold no state: simulations on different threads are independent."""
+    for path in sources():
+        text = path.read_text()
+        if not re.search(r"^module", text, re.MULTILINE):
+            continue
+        head = re.split(r"^contains", text, maxsplit=1, flags=re.MULTILINE)[0]
+        blocks = r"^\s*(?:abstract )?(type|interface)\b(?!\s*\().*?^\s*end \1"
+        outside = re.sub(blocks, "", head, flags=re.MULTILINE | re.DOTALL)
+        for line in outside.splitlines():
+            declared = re.match(r"\s*(integer|real|logical|character|type\(|class\()", line)
+            # What counts in a constant array is no state.
+            is_constant = "parameter" in line or line.strip() == "integer :: i"
+            assert not declared or is_constant, f"{path}: {line}"
+        assert not re.search(r"^\s*save\b|,\s*save\b", text, re.MULTILINE), path
+
+
+def test_python_imports_point_one_way():
+    program = Path(sys.executable).with_name("lint-imports")
+    result = subprocess.run(
+        [program, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        r"isinstance\([^)]*(Slider|Contacts)\b",
+        r"\bkind\s*[!=]=\s*[\"'](rigid|layered|prescribed|quasistatic)",
+        r"\bengine\s*[!=]=\s*[\"'](eq|me)",
+    ],
+)
+def test_nobody_asks_for_a_kind(pattern):
+    """Kinds answer what others want to know; only their own rooms know which they are."""
+    package = ROOT / "python" / "mesoslip"
+    asking = [
+        f"{path.relative_to(package)}: {line.strip()}"
+        for path in package.rglob("*.py")
+        if not {"sliders", "contacts"} & set(path.relative_to(package).parts)
+        for line in path.read_text().splitlines()
+        if re.search(pattern, line)
+    ]
+    assert asking == []

@@ -228,8 +228,8 @@ contains
 
    !> The first step of a slider after which record would do more than take note of the velocity.
    !>
-   !> It is where the excess over the velocity of the drive leaves the interval, between 0 and the slip
-   !> velocity, in which it is, or where something is due.
+   !> It is where the excess over the velocity of the drive leaves the interval, between 0 and the
+   !> slip velocity, in which it is, or where something is due.
    pure function watch(self, slider)
       !> The recorder
       class(recorder_type), intent(in) :: self

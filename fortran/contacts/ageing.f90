@@ -36,6 +36,8 @@ module mesoslip_contacts_ageing
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
    !> How much worse the motion is foreseen than it was last time, at most.
    real(wp), parameter :: caution = 4.0_wp
+   !> How much of the jolt of the slider is remembered at its next motion.
+   real(wp), parameter :: memory = 0.99_wp
    !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
    integer, parameter :: most_steps = 8, most_steps_falling = 32
    !> Number of contacts whose thresholds fall that are all near.
@@ -77,8 +79,8 @@ module mesoslip_contacts_ageing
       integer, allocatable, private :: seat(:)
       !> Until where and when no other than the near contacts break by a threshold that falls
       real(wp), private :: scan_place = huge(1.0_wp), scan_time = huge(1.0_wp)
-      !> Time of the last response [s], duration of the last motion, and how much the acceleration
-      !> was another at its end [m/s2]
+      !> Time of the last response [s], duration of the last motion, and by how much lately
+      !> the acceleration was another at the end of a motion [m/s2]
       real(wp), private :: now = 0.0_wp, duration = 0.0_wp, jolt = 0.0_wp
       !> Whether the law stayed as it was in the last response
       logical, private :: calm = .false.
@@ -321,7 +323,7 @@ contains
 
       self%now = after%time
       self%duration = after%time - before%time
-      self%jolt = abs(after%acceleration - before%acceleration)
+      self%jolt = max(abs(after%acceleration - before%acceleration), memory * self%jolt)
       breaks = self%breaks
       self%calm = self%next_attachment > after%time
       call self%break_due(after)

@@ -62,6 +62,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: force_ratio, width, narrowing, minimum
+      type(threshold_law_type) :: all
 
       call parameters%take("ageing", self%kind, error)
       call parameters%take("ageing_time", self%time, error)
@@ -86,7 +87,8 @@ contains
          self%width_lack = 1.0_wp - force_ratio * narrowing
          minimum = (law%minimum - force_ratio * (1.0_wp - narrowing)) / (force_ratio * narrowing)
          if (minimum > law%minimum) then
-            call new_threshold_law(law, law%kind, law%width, minimum, error)
+            all = law
+            call new_threshold_law(law, all%kind, all%width, minimum, error)
          end if
       case (ageing_log)
          call parameters%take("growth", self%growth, error)

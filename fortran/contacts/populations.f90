@@ -612,7 +612,7 @@ contains
 
          time = pose%time
          if (self%ages) time = pose%time &
-            & + min(time_to_move(pose, sense, distance), self%longest_fall)
+            & + min(time_to_move(pose, sense, distance), self%longest_fall, longest_time)
       end function expected_time
 
    end subroutine try

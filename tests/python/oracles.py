@@ -379,3 +379,47 @@ def exact_events(config: Config, scan: float) -> Contacts:
         time = end
         contacts.act(state[0], state[1], time, slack=1e-19)
     return contacts
+
+
+def ageing_force(config: Config, velocity: float) -> float:
+    """Steady contact force at a velocity of contacts that age, without delay [N].
+
+    F/F_s = <int_0^T f dt> / <T> over the law of the thresholds, T being the first time at which the
+    force f of a contact, k v t above the back force, is its threshold.
+    """
+    contacts = config.contacts
+    width = contacts.threshold.relative_width
+    law = frozen_law(contacts.threshold.law, width)
+    back, least = contacts.back_force_ratio, least_configured(config)
+    speed = velocity / contacts.break_stretch
+
+    def passage(u: float) -> float:
+        z = (u - 1) / width
+
+        def gap(time: float) -> float:
+            mean, spread = aged(config, time)
+            return mean + spread * z - back - speed * time
+
+        end = 1.0 / speed
+        while gap(end) > 0:
+            end *= 2
+        # The first of several zeros, if the threshold grows faster than the force for a while.
+        times = np.unique(np.concatenate([np.geomspace(end * 1e-9, end, 400), [0.0]]))
+        signs = gap(times) <= 0
+        place = int(np.argmax(signs))
+        if place == 0:
+            return 0.0
+        return optimize.brentq(gap, times[place - 1], times[place], xtol=1e-300, rtol=1e-14)
+
+    lower, upper = max(least, law.ppf(1e-15)), law.isf(1e-15)
+    point, weight = np.polynomial.legendre.leggauss(20)
+    edges = np.linspace(lower, upper, 81)
+    work = time = 0.0
+    for start, end in zip(edges[:-1], edges[1:], strict=True):
+        for node, share in zip(point, weight, strict=True):
+            u = (start + end) / 2 + (end - start) / 2 * node
+            last = passage(u)
+            chance = share * law.pdf(u)
+            work += chance * (back * last + speed * last**2 / 2)
+            time += chance * last
+    return contacts.static_force * work / time

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, StrictBool, model_validator
 
 from mesoslip.configuration.table import (
@@ -24,6 +26,8 @@ from mesoslip.configuration.table import (
     problem,
 )
 from mesoslip.configuration.threshold_law import LAWS, NARROWEST, ThresholdLaw
+
+Array = NDArray[np.float64]
 
 # Choices, and their codes in the kernels.
 COUPLINGS = {"scaled": 1, "equal": 2}
@@ -120,18 +124,20 @@ class Ageing(Table):
             **{key: getattr(self, key) for key in AGEING_KEYS[self.law]},
         }
 
-    def threshold(self, configured: float, width: float, age: float) -> float:
-        """Threshold at an age of a contact with a configured one, both over the static force."""
+    def threshold(self, configured: ArrayLike, width: float, age: ArrayLike) -> Array:
+        """Thresholds at an age [s] of contacts with configured ones, both over the static force;
+        ``width`` is the relative width of the configured ones."""
+        old, relative_age = np.asarray(configured), np.asarray(age) / self.time
         if self.law == "log":
-            return configured * (1 + (self.growth or 0.0) * math.log1p(age / self.time))
+            return np.asarray(old * (1 + (self.growth or 0.0) * np.log1p(relative_age)))
         ratio, young_width = self.young_force_ratio or 1.0, self.young_relative_width or width
-        young = ratio * (1 + young_width * (configured - 1) / width)
-        return configured + (young - configured) * math.exp(-age / self.time)
+        young = ratio * (1 + young_width * (old - 1) / width)
+        return np.asarray(old + (young - old) * np.exp(-relative_age))
 
     def configured(self, threshold: float, width: float, age: float) -> float:
         """Configured threshold of the contact that has a threshold at an age."""
-        at_zero, at_one = (self.threshold(one, width, age) for one in (0.0, 1.0))
-        return (threshold - at_zero) / (at_one - at_zero)
+        at_zero, at_one = self.threshold([0.0, 1.0], width, age)
+        return float((threshold - at_zero) / (at_one - at_zero))
 
 
 class Contacts(Table):

@@ -96,9 +96,12 @@ module mesoslip_contacts_populations
       !> Whether thresholds change with age, and how
       logical :: ages = .false.
       type(ageing_law_type) :: ageing
-      !> How long a step may last while thresholds fall, if some do [s], and since when all that are
-      !> attached age
-      real(wp), private :: longest_fall = huge(1.0_wp), last_birth = 0.0_wp
+      !> Whether some thresholds fall, and over what part of the time of ageing a step may last then
+      logical, private :: some_fall = .false.
+      real(wp), private :: resolution = 1.0_wp
+      !> Since when all contacts age that are attached [s], and how long this step may last for those
+      !> whose thresholds fall [s]
+      real(wp), private :: last_birth = 0.0_wp, longest_fall = huge(1.0_wp)
 
       !> Number of populations
       integer :: count = 0
@@ -256,9 +259,10 @@ contains
       populations%ageing = ageing
       associate (moments => populations%moments(1))
          if (ageing%falls(moments%least, 1.0_wp) .or. ageing%falls(moments%greatest, 1.0_wp)) then
-            populations%longest_fall = resolution * ageing%time
+            populations%some_fall = .true.
          end if
       end associate
+      populations%resolution = resolution
       call move_alloc(populations, contacts)
    end subroutine make_ageing_populations
 
@@ -454,6 +458,9 @@ contains
       self%trials = 0
       self%trial_breaks = 0.0_wp
       self%trial_mass = 0.0_wp
+      self%longest_fall = huge(1.0_wp)
+      if (self%some_fall) self%longest_fall = time_to_fall(self, pose, &
+         & time_to_move(pose, sense, reach))
       if (breaks) call self%try(pose, sense, reach)
       breaks = self%trials > 0
       duration = time_to_move(pose, sense, reach)
@@ -473,7 +480,7 @@ contains
             & self%most_attached_at_rest, births)
       end if
       window%end_time = births%end_time
-      if (.not. self%ageing%is_old(pose%time - self%last_birth)) then
+      if (self%some_fall) then
          window%end_time = min(window%end_time, pose%time + self%longest_fall)
       end if
 
@@ -567,6 +574,25 @@ contains
          time = speed / abs(pose%acceleration)
       end if
    end function time_to_move
+
+   !> How long a step may last while thresholds fall, so that contacts let go in time that do so at
+   !> rest; while the slider moves its steps are short enough.
+   pure function time_to_fall(self, pose, duration) result(time)
+      class(contact_populations_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> Time in which the slider makes a step [s]
+      real(wp), intent(in) :: duration
+      real(wp) :: time
+
+      real(wp) :: age
+
+      time = huge(1.0_wp)
+      age = pose%time - self%last_birth
+      if (self%ageing%is_old(age)) return
+      time = self%resolution * max(self%ageing%time, age, self%parameters%delay)
+      if (duration < longest_time) time = max(time, creeping_part * duration)
+      time = max(time, nearest(pose%time, huge(1.0_wp)) - pose%time)
+   end function time_to_fall
 
    !> Way that the slider will make in a time, in the direction in which it moves.
    pure function way_made(pose, sense, time) result(way)
@@ -711,7 +737,7 @@ contains
          logical :: falls_at_rest
 
          falls_at_rest = .false.
-         if (self%longest_fall < huge(1.0_wp)) then
+         if (self%some_fall) then
             falls_at_rest = .not. sense * (self%population(population, row) - displacement) > 0.0_wp
          end if
       end function falls_at_rest
@@ -811,7 +837,7 @@ contains
       else
          reaches = after%displacement < self%behind
       end if
-      if (self%longest_fall < huge(1.0_wp) .and. .not. reaches) then
+      if (self%some_fall .and. .not. reaches) then
          ! Where thresholds fall contacts may break at rest.
          if (.not. abs(way) > 0.0_wp) sense = after%sense
          if (sense > 0.0_wp) then

@@ -63,7 +63,7 @@ module mesoslip_contacts_ageing
       type(ageing_law_type) :: ageing
       !> Whether the slider may jump while time stands still, when the law changes
       logical :: jumps = .false.
-      !> Bound on the coordinates at which contacts break on the way back [m]
+      !> Bound on the coordinates at which contacts of the queue break on the way back [m]
       real(wp) :: behind = -huge(1.0_wp)
       !> Direction of motion for which the queue is kept, +1 or -1
       real(wp) :: direction = 1.0_wp
@@ -77,8 +77,10 @@ module mesoslip_contacts_ageing
       type(list_type), private :: lead, falling, near
       !> Where each contact is kept, shape (count)
       integer, allocatable, private :: seat(:)
-      !> Until where and when no other than the near contacts break by a threshold that falls
-      real(wp), private :: scan_place = huge(1.0_wp), scan_time = huge(1.0_wp)
+      !> Coordinates between which [m], and time until which [s], no other contacts whose thresholds
+      !> fall break than those that are near
+      real(wp), private :: scan_upper = huge(1.0_wp), scan_lower = -huge(1.0_wp)
+      real(wp), private :: scan_time = huge(1.0_wp)
       !> Time of the last response [s], duration of the last motion, and by how much lately
       !> the acceleration was another at the end of a motion [m/s2]
       real(wp), private :: now = 0.0_wp, duration = 0.0_wp, jolt = 0.0_wp
@@ -173,19 +175,20 @@ contains
       !> Where it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
-      real(wp) :: upper
+      real(wp) :: upper, lower
 
       law = law_set(self)
       upper = huge(1.0_wp)
+      lower = self%behind
       window%end_time = self%next_attachment
       call self%scan_if_due(pose)
       call self%lead_on(pose, upper)
-      call self%watch_near(pose, upper, window%end_time)
+      call self%watch_near(pose, upper, lower, window%end_time)
       if (self%direction > 0.0_wp) then
          window%upper = upper
-         window%lower = self%behind
+         window%lower = lower
       else
-         window%upper = -self%behind
+         window%upper = -lower
          window%lower = -upper
       end if
    end subroutine offer
@@ -260,38 +263,41 @@ contains
    end function foresee
 
    !> Find until where and when the slider may go before a contact breaks whose threshold falls.
-   subroutine watch_near(self, pose, upper, end_time)
+   subroutine watch_near(self, pose, upper, lower, end_time)
       class(contact_ageing_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
-      !> Coordinate [m], and time [s], until which no contact breaks
-      real(wp), intent(inout) :: upper, end_time
+      !> Coordinates between which [m], and time until which [s], no contact breaks
+      real(wp), intent(inout) :: upper, lower, end_time
 
       integer :: place
 
-      upper = min(upper, self%scan_place)
+      upper = min(upper, self%scan_upper)
+      lower = max(lower, self%scan_lower)
       end_time = min(end_time, self%scan_time)
       do place = 1, self%near%count
          associate (contact => self%near%contact(place))
-            if (ahead_coordinate(self%record(:, contact), self%direction) < upper) then
-               call self%foresee_fall(contact, pose, upper, end_time)
+            if (ahead_coordinate(self%record(:, contact), self%direction) < upper &
+               & .or. behind_coordinate(self%record(:, contact), self%direction) > lower) then
+               call self%foresee_fall(contact, pose, upper, lower, end_time)
             end if
          end associate
       end do
    end subroutine watch_near
 
    !> Where and when a contact is foreseen to break whose threshold falls: before that, it cannot.
-   pure subroutine foresee_fall(self, contact, pose, upper, end_time)
+   pure subroutine foresee_fall(self, contact, pose, upper, lower, end_time)
       class(contact_ageing_type), intent(in) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
-      real(wp), intent(inout) :: upper, end_time
+      real(wp), intent(inout) :: upper, lower, end_time
 
       real(wp) :: age, limit, rate, stretch, speed, step, gap, longest
       integer :: number
 
       age = pose%time - self%life(life_birth, contact)
-      stretch = self%direction * (pose%displacement - self%record(row_origin, contact))
-      speed = max(0.0_wp, self%direction * pose%velocity)
+      stretch = pose%displacement - self%record(row_origin, contact)
+      speed = max(0.0_wp, sign(1.0_wp, stretch) * pose%velocity)
+      stretch = abs(stretch)
       longest = end_time - pose%time
       step = 0.0_wp
       do number = 1, most_steps_falling
@@ -306,10 +312,13 @@ contains
          end if
          if (.not. step < longest) exit
       end do
+      ! A slider that jumps comes closer while time stands still: both have to have room.
+      if (self%jumps .and. .not. speed > 0.0_wp) step = 0.5_wp * step
       if (step < longest) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))
-      upper = min(upper, self%direction * self%record(row_origin, contact) + max(stretch, &
-         & self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
-         & end_time - self%life(life_birth, contact))))
+      limit = max(stretch, self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+         & end_time - self%life(life_birth, contact)))
+      upper = min(upper, self%direction * self%record(row_origin, contact) + limit)
+      lower = max(lower, self%direction * self%record(row_origin, contact) - limit)
    end subroutine foresee_fall
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
@@ -414,30 +423,26 @@ contains
       end do
    end subroutine break_leaders
 
-   !> Break the contacts that are due of those whose thresholds fall.
+   !> Break the contacts that are due of those whose thresholds fall, in either direction.
    subroutine break_near(self, pose)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: bound
+      real(wp) :: stretch, limit
       integer :: place, contact
 
       do place = self%near%count, 1, -1
          contact = self%near%contact(place)
-         associate (limit => self%record(row_limit, contact))
-            if (ahead_coordinate(self%record(:, contact), self%direction) &
-               & > self%direction * pose%displacement + tiny_gap * self%stretch) cycle
-            bound = limit
-            call self%refresh(contact, pose%time)
-            if (self%is_due(contact, pose)) then
-               call self%let_go(contact, pose%displacement, pose%time)
-               call remove(self%near, place)
-               call remove(self%falling, position(self%falling, contact))
-               self%seat(contact) = seat_queue
-            else
-               limit = bound
-            end if
-         end associate
+         stretch = abs(pose%displacement - self%record(row_origin, contact)) &
+            & + tiny_gap * self%stretch
+         if (self%record(row_limit, contact) > stretch) cycle
+         limit = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+            & pose%time - self%life(life_birth, contact))
+         if (limit > stretch) cycle
+         call self%let_go(contact, pose%displacement, pose%time)
+         call remove(self%near, place)
+         call remove(self%falling, position(self%falling, contact))
+         self%seat(contact) = seat_queue
       end do
    end subroutine break_near
 
@@ -458,9 +463,9 @@ contains
          if (self%seat(contact) == seat_queue) then
             call self%queue%insert(contact, &
                & ahead_coordinate(self%record(:, contact), self%direction))
+            self%behind = max(self%behind, &
+               & behind_coordinate(self%record(:, contact), self%direction))
          end if
-         self%behind = max(self%behind, &
-            & behind_coordinate(self%record(:, contact), self%direction))
       end do
    end subroutine attach_due
 
@@ -524,7 +529,8 @@ contains
          call retire(self, self%near%contact(place), pose%time)
       end do
       if (pose%time >= self%scan_time &
-         & .or. self%direction * pose%displacement >= self%scan_place &
+         & .or. self%direction * pose%displacement >= self%scan_upper &
+         & .or. self%direction * pose%displacement <= self%scan_lower &
          & .or. self%near%count > max(few, self%falling%count / 2)) call self%scan(pose)
    end subroutine scan_if_due
 
@@ -543,6 +549,8 @@ contains
       self%seat(contact) = seat_queue
       call self%refresh(contact, time)
       call self%queue%insert(contact, ahead_coordinate(self%record(:, contact), self%direction))
+      self%behind = max(self%behind, &
+         & behind_coordinate(self%record(:, contact), self%direction))
    end subroutine retire
 
    !> Find the contacts near breaking of those whose thresholds fall, and for how long they are.
@@ -556,7 +564,8 @@ contains
       do place = self%falling%count, 1, -1
          call retire(self, self%falling%contact(place), pose%time)
       end do
-      self%scan_place = huge(1.0_wp)
+      self%scan_upper = huge(1.0_wp)
+      self%scan_lower = -huge(1.0_wp)
       self%scan_time = huge(1.0_wp)
       if (self%falling%count > few) then
          fastest = 0.0_wp
@@ -568,7 +577,8 @@ contains
          end do
          ! About as many scans while the slider moves by a stretch as contacts that are near.
          reach = 0.5_wp * self%stretch / sqrt(real(self%falling%count, wp))
-         self%scan_place = self%direction * pose%displacement + reach
+         self%scan_upper = self%direction * pose%displacement + reach
+         self%scan_lower = self%direction * pose%displacement - reach
          if (fastest > 0.0_wp) then
             self%scan_time = max(pose%time + reach / fastest, nearest(pose%time, 1.0_wp))
          end if
@@ -577,9 +587,8 @@ contains
       do place = 1, self%falling%count
          contact = self%falling%contact(place)
          call self%refresh(contact, self%scan_time)
-         self%behind = max(self%behind, &
-            & behind_coordinate(self%record(:, contact), self%direction))
-         if (ahead_coordinate(self%record(:, contact), self%direction) < self%scan_place) then
+         if (ahead_coordinate(self%record(:, contact), self%direction) < self%scan_upper .or. &
+            & behind_coordinate(self%record(:, contact), self%direction) > self%scan_lower) then
             call append(self%near, contact)
          end if
       end do
@@ -595,8 +604,9 @@ contains
       real(wp), intent(in) :: displacement
 
       call self%shift_records(shift)
-      if (self%scan_place < huge(1.0_wp)) then
-         self%scan_place = self%scan_place - self%direction * shift
+      if (self%scan_upper < huge(1.0_wp)) then
+         self%scan_upper = self%scan_upper - self%direction * shift
+         self%scan_lower = self%scan_lower - self%direction * shift
       end if
       call self%rebuild(displacement)
       self%behind = self%farthest_behind()
@@ -621,7 +631,7 @@ contains
       end do
    end subroutine rebuild
 
-   !> Greatest coordinate at which a pinned contact may break on the way back.
+   !> Greatest coordinate at which a contact of the queue may break on the way back.
    pure function farthest_behind(self) result(coordinate)
       class(contact_ageing_type), intent(in) :: self
       real(wp) :: coordinate
@@ -630,6 +640,7 @@ contains
 
       coordinate = -huge(1.0_wp)
       do contact = 1, self%parameters%count
+         if (self%seat(contact) == seat_falling) cycle
          if (self%record(row_stiffness, contact) > 0.0_wp) then
             coordinate = max(coordinate, &
                & behind_coordinate(self%record(:, contact), self%direction))
@@ -675,7 +686,8 @@ contains
       call archive%exchange("falling_count", self%falling%count)
       call archive%exchange("near", self%near%contact)
       call archive%exchange("near_count", self%near%count)
-      call archive%exchange("scan_place", self%scan_place)
+      call archive%exchange("scan_upper", self%scan_upper)
+      call archive%exchange("scan_lower", self%scan_lower)
       call archive%exchange("scan_time", self%scan_time)
       call archive%exchange("now", self%now)
       call archive%exchange("duration", self%duration)

@@ -65,7 +65,12 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, ageing, me": AGEING | {"run__engine": "me"},
     "prescribed, ageing": AGEING | {"slider": {"kind": "prescribed"}},
     "layered, ageing": AGEING | {"slider": LAYERED | {"base": BASE}},
-    "quasistatic, ageing": AGEING | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
+    "quasistatic, ageing": AGEING
+    | {
+        "slider": {"kind": "quasistatic", "stiffness": 97.0},
+        "contacts__count": 200,
+        "contacts__ageing": RELAX | {"young_force_ratio": 0.9, "initial_age": 0.0},
+    },
 }
 
 

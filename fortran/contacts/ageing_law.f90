@@ -1,8 +1,8 @@
 !> How the threshold of a contact changes with its age.
 !>
 !> A contact is born with a deviate of the threshold law, and keeps it: its threshold at the age t is
-!> mean(t) + width(t) times this deviate (model section 9). The deviate is given by the threshold that
-!> is configured, the old one of the law `relax` and that at birth of the law `log`. Thresholds grow
+!> mean(t) + width(t) times this deviate (model section 9). The deviate is given by the threshold
+!> that is configured, the old one of the law `relax` and that at birth of the law `log`. Thresholds grow
 !> with it at any age, so contacts of one age and force break in its order.
 module mesoslip_contacts_ageing_law
    use mesoslip_numerics_kinds, only: wp
@@ -168,8 +168,8 @@ contains
       end if
    end function configured
 
-   !> Whether the threshold falls with age: the young are weaker in the mean, but often wider spread,
-   !> so that the strongest of them become weaker.
+   !> Whether the threshold falls with age: the young are weaker in the mean, but often wider
+   !> spread, so that the strongest of them become weaker.
    pure function falls(self, configured, mean)
       !> The law
       class(ageing_law_type), intent(in) :: self

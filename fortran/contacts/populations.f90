@@ -8,9 +8,9 @@
 !> Work that a step did not do after all, the next ones make up for. The jump of the force between
 !> two lines is the estimate of the error.
 !>
-!> Thresholds may change with the age of a population: what has broken of it is told by the configured
-!> threshold of the last contact that did, as contacts of one age and force break in its order. It is
-!> found anew at the end of each step, from the force and the age.
+!> Thresholds may change with the age of a population: what has broken of it is told by the
+!> configured threshold of the last contact that did, as contacts of one age and force break in its
+!> order. It is found anew at the end of each step, from the force and the age.
 !>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations
@@ -99,8 +99,8 @@ module mesoslip_contacts_populations
       !> Whether some thresholds fall, and over what part of the time of ageing a step may last then
       logical, private :: some_fall = .false.
       real(wp), private :: resolution = 1.0_wp
-      !> Since when all contacts age that are attached [s], and how long this step may last for those
-      !> whose thresholds fall [s]
+      !> Since when all contacts age that are attached [s], and how long this step may last for
+      !> those whose thresholds fall [s]
       real(wp), private :: last_birth = 0.0_wp, longest_fall = huge(1.0_wp)
 
       !> Number of populations
@@ -125,8 +125,8 @@ module mesoslip_contacts_populations
       !> Total stiffness [N/m] and stiffness times origin less force at attaching [N]
       type(accumulator_type), private :: stiffness, offset
 
-      !> What breaks until a displacement and time in a direction: the populations, the thresholds below
-      !> which they will have broken, and what they will be
+      !> What breaks until a displacement and time in a direction: the populations, the thresholds
+      !> below which they will have broken, and what they will be
       real(wp), private :: trial_end = 0.0_wp, trial_time = 0.0_wp, trial_sense = 1.0_wp
       integer, private :: trials = 0
       integer, allocatable, private :: trial_population(:)
@@ -277,8 +277,8 @@ contains
 
       associate (parameters => self%parameters, moments => self%moments(1))
          if (state /= initial_steady .and. state /= initial_uniform) then
-            call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, 0.0_wp, &
-               & -self%ageing%initial_age, 0.0_wp)
+            call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, &
+               & 0.0_wp, -self%ageing%initial_age, 0.0_wp)
          else
             back = 0.0_wp
             if (state == initial_steady) back = parameters%back_force_ratio
@@ -742,9 +742,9 @@ contains
          end if
       end function falls_at_rest
 
-      !> Energy of the contacts of a population that break on the way, beyond that of their configured
-      !> thresholds: twice that of each of them in the mean, if on the way the force at which they
-      !> break is a line over those.
+      !> Energy of the contacts of a population that break on the way, beyond that of their
+      !> configured thresholds: twice that of each of them in the mean, if on the way the force at
+      !> which they break is a line over those.
       pure function more_lost(population, last, last_force) result(energy)
          integer, intent(in) :: population
          !> Threshold below which they will have broken, and the force then
@@ -756,8 +756,8 @@ contains
          energy = 0.0_wp
          first = self%population(population, row_broken)
          if (.not. last > first) return
-         start_force = max(0.0_wp, force + sense * (start - self%population(population, row_origin)) &
-            & / self%stretch)
+         start_force = max(0.0_wp, force + sense &
+            & * (start - self%population(population, row_origin)) / self%stretch)
          start_broken = self%ageing%configured(start_force, &
             & before%time - self%population(population, row_birth))
          part = 0.0_wp

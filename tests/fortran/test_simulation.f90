@@ -235,7 +235,8 @@ contains
       delay = 5.0e-4_wp
       if (slider == "quasistatic") delay = 0.0_wp
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
-         & 0.1_wp, real(merge(coupling_equal, coupling, contacts(:6) == "ageing"), wp), 1.0_wp, real(law, wp), width]
+         & 0.1_wp, real(merge(coupling_equal, coupling, contacts(:6) == "ageing"), wp), 1.0_wp, &
+         & real(law, wp), width]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &

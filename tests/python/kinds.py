@@ -61,7 +61,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},
-    "rigid, ageing, log": AGEING | {"contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03}},
+    "rigid, ageing, log": AGEING
+    | {"contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03}},
     "rigid, ageing, me": AGEING | {"run__engine": "me"},
     "prescribed, ageing": AGEING | {"slider": {"kind": "prescribed"}},
     "layered, ageing": AGEING | {"slider": LAYERED | {"base": BASE}},

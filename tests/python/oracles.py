@@ -5,6 +5,7 @@ None of them shares code with the kernels, but for Philox, which is checked by k
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -415,7 +416,7 @@ def ageing_force(config: Config, velocity: float) -> float:
     point, weight = np.polynomial.legendre.leggauss(20)
     edges = np.linspace(lower, upper, 81)
     work = time = 0.0
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in itertools.pairwise(edges):
         for node, share in zip(point, weight, strict=True):
             u = (start + end) / 2 + (end - start) / 2 * node
             last = passage(u)

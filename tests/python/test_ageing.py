@@ -119,7 +119,7 @@ def test_rigid_with_reversals_converges_to_events(klein, law):
     first = 40
     late = []
     for step in (4e-6, 1e-6):
-        trace, contacts = fixed_step(config, step)
+        _, contacts = fixed_step(config, step)
         assert [one for _, one in contacts.events[:first]] == [one for _, one in events[:first]]
         pairs = zip(contacts.events[:first], events[:first], strict=True)
         late.append(np.max([abs(one[0] - other[0]) for one, other in pairs]))
@@ -169,7 +169,10 @@ def test_a_break_is_where_force_and_threshold_meet(klein, law, velocity):
 
 def test_contacts_that_weaken_break_at_rest(klein):
     """Stretched to between the old and the young threshold they let go in the hold, when due."""
-    stages = [{"duration": 1e-3, "velocity": 1.2 * STRETCH / 1e-3}, {"duration": 1.0, "velocity": 0}]
+    stages = [
+        {"duration": 1e-3, "velocity": 1.2 * STRETCH / 1e-3},
+        {"duration": 1.0, "velocity": 0},
+    ]
     config = klein(
         **PRESCRIBED,
         run__duration=None,
@@ -298,7 +301,9 @@ def test_restart_peak_grows_with_the_logarithm_of_the_hold(klein, engine):
             **PRESCRIBED,
             run__engine=engine,
             run__duration=None,
-            drive={"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]},
+            drive={
+                "stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]
+            },
             output__interval=1e-4,
             contacts__count=4000,
             contacts__initial="steady",
@@ -354,7 +359,7 @@ def test_bad_input_is_one_message(klein, ageing, changes, key, message):
 
 def test_a_curve_is_refused_and_info_tells_of_young_and_old(klein):
     config = klein(contacts__coupling="equal", contacts__ageing=RELAX)
-    with pytest.raises(ConfigError, match="contacts.ageing: has no force curve"):
+    with pytest.raises(ConfigError, match=r"contacts\.ageing: has no force curve"):
         mesoslip.curve(config)
     told = mesoslip.info(config)
     assert told["young_static_force"].value == pytest.approx(0.5 * STATIC)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Panels and points of the rule over the configured thresholds, and how far it goes: what is left out
-# has the probability that a normal deviate is as far.
+# Panels and points of the rule over the configured thresholds, and how far it goes: what is left
+# out has the probability that a normal deviate is as far.
 PANELS, POINTS = 80, 12
 FARTHEST = 8.0
 
@@ -62,7 +62,7 @@ def steady_force(config: Config, velocity: float) -> float:
 
 
 def mean_life(config: Config, velocity: float) -> float:
-    """Mean displacement from attaching to breaking at a velocity, v <T> [m]; at 0 that of the old."""
+    """Mean displacement from attaching to breaking, v <T> [m]; at velocity 0 that of the old."""
     weight, threshold = _thresholds(config)
     stretch = config.contacts.break_stretch
     if velocity == 0:

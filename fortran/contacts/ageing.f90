@@ -3,8 +3,8 @@
 !> A contact breaks at the first time at which its force is its threshold, while both move. What a
 !> slider is offered is a window in displacement and time in which that happens to none:
 !>
-!> - a threshold that grows is never below what it is now, so contacts are queued by where they break
-!>   with a threshold of some time ago. Those whose place in the queue comes into reach lead: they
+!> - a threshold that grows is never below what it is now, so contacts are queued by where they
+!>   break with a threshold of some time ago. Those whose place in the queue comes into reach lead: they
 !>   have their thresholds of now, and where they break is foreseen from the motion of the slider,
 !>   by Newton's method, and held back by what is not known of this motion. A slider that comes to
 !>   where a leader was to break finds it there, or a little ahead of it and foresees again;
@@ -46,7 +46,7 @@ module mesoslip_contacts_ageing
    !> Where a contact is kept: in the queue, among the leaders, among those that fall
    integer, parameter :: seat_queue = 0, seat_lead = 1, seat_falling = 2
 
-   !> Numbers of the life of a contact: when it was born [s], and its configured breaking stretch [m]
+   !> Numbers of the life of a contact: when it was born [s], its configured breaking stretch [m]
    integer, parameter :: life_length = 2
    integer, parameter :: life_birth = 1, life_limit = 2
 
@@ -95,8 +95,8 @@ module mesoslip_contacts_ageing
       procedure :: exchange
       procedure :: rebuild
       procedure, private, non_overridable :: is_due, refresh, break_due, break_near, &
-         & break_leaders, attach_due, enter, face, foresee, foresee_fall, lead_on, watch_near, scan, &
-         & scan_if_due, farthest_behind
+         & break_leaders, attach_due, enter, face, foresee, foresee_fall, lead_on, watch_near, &
+         & scan, scan_if_due, farthest_behind
    end type contact_ageing_type
 
 contains
@@ -249,6 +249,12 @@ contains
       if (self%duration > 0.0_wp) doubt = doubt * max(1.0_wp, step / self%duration)
       if (.not. (doubt < 0.5_wp * speed .and. abs(pull) * step < 0.25_wp * speed)) return
 
+      if (rate * step**2 * (1.0_wp / self%ageing%time + abs(pull) / speed) &
+         & <= 0.1_wp * tiny_gap * self%stretch) then
+         ! So close that the threshold grows along a line.
+         coordinate = coordinate + (1.0_wp - doubt / speed) * rate * step
+         return
+      end if
       grown = limit
       do number = 1, most_steps
          call self%ageing%follow(self%life(life_limit, contact), self%stretch, age + step, grown, &

@@ -1,9 +1,9 @@
 !> How the threshold of a contact changes with its age.
 !>
-!> A contact is born with a deviate of the threshold law, and keeps it: its threshold at the age t is
-!> mean(t) + width(t) times this deviate (model section 9). The deviate is given by the threshold
-!> that is configured, the old one of the law `relax` and that at birth of the law `log`. Thresholds grow
-!> with it at any age, so contacts of one age and force break in its order.
+!> A contact is born with a deviate of the threshold law, and keeps it: its threshold at the age t
+!> is mean(t) + width(t) times this deviate (model section 9). The deviate is given by the threshold
+!> that is configured, the old one of the law `relax` and that at birth of the law `log`. Thresholds
+!> grow with it at any age, so contacts of one age and force break in its order.
 module mesoslip_contacts_ageing_law
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid

@@ -1,9 +1,10 @@
 !> The kinds of contacts by name: the only place that knows them all.
 module mesoslip_contacts
+   use mesoslip_contacts_ageing, only: make_contact_ageing
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
    use mesoslip_contacts_lattice, only: make_contact_lattice
-   use mesoslip_contacts_populations, only: make_contact_populations
+   use mesoslip_contacts_populations, only: make_ageing_populations, make_contact_populations
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: i8
    use mesoslip_numerics_parameters, only: parameters_type
@@ -32,6 +33,10 @@ contains
       call take_contact_parameters(common, parameters, seed, realization, error)
       if (allocated(error)) return
       select case (kind)
+      case ("ageing")
+         call make_contact_ageing(contacts, common, parameters, error)
+      case ("ageing populations")
+         call make_ageing_populations(contacts, common, parameters, error)
       case ("ensemble")
          call make_contact_ensemble(contacts, common, parameters, error)
       case ("lattice")

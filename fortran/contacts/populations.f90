@@ -8,6 +8,10 @@
 !> Work that a step did not do after all, the next ones make up for. The jump of the force between
 !> two lines is the estimate of the error.
 !>
+!> Thresholds may change with the age of a population: what has broken of it is told by the
+!> configured threshold of the last contact that did, as contacts of one age and force break in its
+!> order. It is found anew at the end of each step, from the force and the age.
+!>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations
    use mesoslip_numerics_kinds, only: wp
@@ -15,6 +19,7 @@ module mesoslip_contacts_populations
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
       & initial_steady, initial_uniform
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts
@@ -24,6 +29,7 @@ module mesoslip_contacts_populations
    private
 
    public :: contact_populations_type, new_contact_populations, make_contact_populations
+   public :: make_ageing_populations
 
    !> Moments of the thresholds of a population's pinned contacts: their number, stiffness, one over
    !> it, twice the energy that they lose in breaking, and mass.
@@ -31,7 +37,7 @@ module mesoslip_contacts_populations
    integer, parameter :: number = 1, stiff = 2, compliant = 3, lost = 4, massive = 5
 
    !> Numbers kept for a population
-   integer, parameter :: population_length = 7 + moments_length
+   integer, parameter :: population_length = 8 + moments_length
    !> Displacement at which stretches are zero but for the force at attaching [m]
    integer, parameter :: row_origin = 1
    !> Force at attaching, signed
@@ -44,8 +50,10 @@ module mesoslip_contacts_populations
    integer, parameter :: row_law = 5
    !> Displacements at which contacts break, forward and backward [m]
    integer, parameter :: row_ahead = 6, row_behind = 7
+   !> When it attached [s]
+   integer, parameter :: row_birth = 8
    !> The moments come after these
-   integer, parameter :: row_moments = 7
+   integer, parameter :: row_moments = 8
 
    !> Numbers kept for detached contacts: they broke evenly from one time to another [s], so many,
    !> with such a mass
@@ -85,6 +93,16 @@ module mesoslip_contacts_populations
 
    !> Populations of contacts.
    type, extends(contacts_type) :: contact_populations_type
+      !> Whether thresholds change with age, and how
+      logical :: ages = .false.
+      type(ageing_law_type) :: ageing
+      !> Whether some thresholds fall, and over what part of the time of ageing a step may last then
+      logical, private :: some_fall = .false.
+      real(wp), private :: resolution = 1.0_wp
+      !> Since when all contacts age that are attached [s], and how long this step may last for
+      !> those whose thresholds fall [s]
+      real(wp), private :: last_birth = 0.0_wp, longest_fall = huge(1.0_wp)
+
       !> Number of populations
       integer :: count = 0
       !> Length of a step [m]
@@ -107,12 +125,12 @@ module mesoslip_contacts_populations
       !> Total stiffness [N/m] and stiffness times origin less force at attaching [N]
       type(accumulator_type), private :: stiffness, offset
 
-      !> What breaks until a displacement in a direction: the populations, the thresholds below
-      !> which they will have broken, and what they will be
-      real(wp), private :: trial_end = 0.0_wp, trial_sense = 1.0_wp
+      !> What breaks until a displacement and time in a direction: the populations, the thresholds
+      !> below which they will have broken, and what they will be
+      real(wp), private :: trial_end = 0.0_wp, trial_time = 0.0_wp, trial_sense = 1.0_wp
       integer, private :: trials = 0
       integer, allocatable, private :: trial_population(:)
-      real(wp), allocatable, private :: trial_broken(:), trial_moments(:, :)
+      real(wp), allocatable, private :: trial_broken(:), trial_moments(:, :), trial_lost(:)
       !> Breaks then, and their mass; work that need not be done for them [J]
       real(wp), private :: trial_breaks = 0.0_wp, trial_mass = 0.0_wp, trial_work = 0.0_wp
       !> Where the next population breaks [m]
@@ -143,7 +161,7 @@ module mesoslip_contacts_populations
       procedure :: rebuild
       !> Number of contacts that are pinned
       procedure :: pinned
-      procedure, private :: add_population, bear, try, try_until, break_tried
+      procedure, private :: add_population, bear, try, try_until, break_tried, see_ages
       procedure, private :: make_room, make_room_for_packets
       procedure, private :: expect, attach_due
    end type contact_populations_type
@@ -213,6 +231,41 @@ contains
       call move_alloc(populations, contacts)
    end subroutine make_contact_populations
 
+   !> Set up populations whose thresholds change with age from named numbers.
+   subroutine make_ageing_populations(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: resolution, and the law of ageing
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_populations_type), allocatable :: populations
+      type(contact_parameters_type) :: all
+      type(ageing_law_type) :: ageing
+      real(wp) :: resolution
+
+      all = common
+      call parameters%take("resolution", resolution, error)
+      call take_ageing_law(ageing, all%law, parameters, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      allocate (populations)
+      call new_contact_populations(populations, all, resolution, error)
+      if (allocated(error)) return
+      populations%ages = .true.
+      populations%ageing = ageing
+      associate (moments => populations%moments(1))
+         if (ageing%falls(moments%least, 1.0_wp) .or. ageing%falls(moments%greatest, 1.0_wp)) then
+            populations%some_fall = .true.
+         end if
+      end associate
+      populations%resolution = resolution
+      call move_alloc(populations, contacts)
+   end subroutine make_ageing_populations
+
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state)
       !> The populations
@@ -224,7 +277,8 @@ contains
 
       associate (parameters => self%parameters, moments => self%moments(1))
          if (state /= initial_steady .and. state /= initial_uniform) then
-            call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, 0.0_wp)
+            call self%add_population(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, &
+               & 0.0_wp, -self%ageing%initial_age, 0.0_wp)
          else
             back = 0.0_wp
             if (state == initial_steady) back = parameters%back_force_ratio
@@ -240,7 +294,8 @@ contains
                edge = edge + cell
                call self%add_population(-middle * self%stretch, back, cell, &
                   & merge(1, 2, state == initial_steady), &
-                  & broken_threshold(parameters%coupling, back, middle), 0.0_wp)
+                  & broken_threshold(parameters%coupling, back, middle), 0.0_wp, &
+                  & -self%ageing%initial_age, 0.0_wp)
             end do
             total = sum(self%population(:self%count, row_moments + number))
             associate (all => self%population(:self%count, :))
@@ -249,11 +304,12 @@ contains
             end associate
          end if
       end associate
+      self%last_birth = -self%ageing%initial_age
       call self%bear()
    end subroutine initialize
 
    !> Add a population.
-   subroutine add_population(self, origin, force, weight, law, broken, displacement)
+   subroutine add_population(self, origin, force, weight, law, broken, displacement, birth, time)
       class(contact_populations_type), intent(inout) :: self
       !> Where it attached [m], with what force, how many contacts, with which law
       real(wp), intent(in) :: origin, force, weight
@@ -262,6 +318,8 @@ contains
       real(wp), intent(in) :: broken
       !> Where the slider is [m]: what is due to break there does so when the slider moves on
       real(wp), intent(in) :: displacement
+      !> When it attached, and when that is [s]
+      real(wp), intent(in) :: birth, time
 
       real(wp) :: moments(moments_length)
 
@@ -274,9 +332,10 @@ contains
          population(place, row_weight) = weight
          population(place, row_law) = real(law, wp)
          population(place, row_broken) = max(broken, self%moments(law)%least)
+         population(place, row_birth) = birth
          population(place, row_moments + 1:) = weight * moments
-         population(place, row_ahead) = max(displacement, next_break(self, place, 1.0_wp))
-         population(place, row_behind) = min(displacement, next_break(self, place, -1.0_wp))
+         population(place, row_ahead) = max(displacement, next_break(self, place, 1.0_wp, time))
+         population(place, row_behind) = min(displacement, next_break(self, place, -1.0_wp, time))
          self%ahead = min(self%ahead, population(place, row_ahead))
          self%behind = max(self%behind, population(place, row_behind))
       end associate
@@ -295,16 +354,46 @@ contains
    end subroutine make_room
 
    !> Displacement at which contacts of a population break next in a direction.
-   pure function next_break(self, place, sense) result(displacement)
+   pure function next_break(self, place, sense, time) result(displacement)
       class(contact_populations_type), intent(in) :: self
       integer, intent(in) :: place
-      real(wp), intent(in) :: sense
+      !> The direction, and when that is [s]
+      real(wp), intent(in) :: sense, time
       real(wp) :: displacement
 
+      real(wp) :: threshold
+
+      threshold = self%population(place, row_broken)
+      if (self%ages) threshold = self%ageing%threshold(threshold, 1.0_wp, &
+         & time - self%population(place, row_birth))
       displacement = self%population(place, row_origin) + sense * self%stretch &
          & * breaking_distance(self%parameters%coupling, &
-         & sense * self%population(place, row_force), self%population(place, row_broken))
+         & sense * self%population(place, row_force), threshold)
    end function next_break
+
+   !> Find anew where populations break next, as their thresholds have changed.
+   subroutine see_ages(self, displacement, time)
+      class(contact_populations_type), intent(inout) :: self
+      !> Where the slider is [m], and when that is [s]
+      real(wp), intent(in) :: displacement, time
+
+      real(wp) :: threshold, rate
+      integer :: place
+
+      if (self%ageing%is_old(time - self%last_birth)) return
+      do place = 1, self%count
+         associate (one => self%population(place, :))
+            call self%ageing%follow(one(row_broken), 1.0_wp, time - one(row_birth), threshold, rate)
+            if (.not. abs(rate) > 0.0_wp) cycle
+            self%population(place, row_ahead) = &
+               & max(displacement, next_break(self, place, 1.0_wp, time))
+            self%population(place, row_behind) = &
+               & min(displacement, next_break(self, place, -1.0_wp, time))
+         end associate
+      end do
+      self%ahead = minval(self%population(:self%count, row_ahead))
+      self%behind = maxval(self%population(:self%count, row_behind))
+   end subroutine see_ages
 
    !> Sum stiffness and offset anew, and find what breaks next.
    subroutine bear(self)
@@ -369,7 +458,10 @@ contains
       self%trials = 0
       self%trial_breaks = 0.0_wp
       self%trial_mass = 0.0_wp
-      if (breaks) call self%try(pose%displacement, sense, reach)
+      self%longest_fall = huge(1.0_wp)
+      if (self%some_fall) self%longest_fall = time_to_fall(self, pose, &
+         & time_to_move(pose, sense, reach))
+      if (breaks) call self%try(pose, sense, reach)
       breaks = self%trials > 0
       duration = time_to_move(pose, sense, reach)
       part = way_made(pose, sense, duration) / reach
@@ -388,6 +480,9 @@ contains
             & self%most_attached_at_rest, births)
       end if
       window%end_time = births%end_time
+      if (self%some_fall) then
+         window%end_time = min(window%end_time, pose%time + self%longest_fall)
+      end if
 
       window%upper = max(self%ahead, pose%displacement)
       window%lower = min(self%behind, pose%displacement)
@@ -480,6 +575,25 @@ contains
       end if
    end function time_to_move
 
+   !> How long a step may last while thresholds fall, so that contacts let go in time that do so at
+   !> rest; while the slider moves its steps are short enough.
+   pure function time_to_fall(self, pose, duration) result(time)
+      class(contact_populations_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> Time in which the slider makes a step [s]
+      real(wp), intent(in) :: duration
+      real(wp) :: time
+
+      real(wp) :: age
+
+      time = huge(1.0_wp)
+      age = pose%time - self%last_birth
+      if (self%ageing%is_old(age)) return
+      time = self%resolution * max(self%ageing%time, age, self%parameters%delay)
+      if (duration < longest_time) time = max(time, creeping_part * duration)
+      time = max(time, nearest(pose%time, huge(1.0_wp)) - pose%time)
+   end function time_to_fall
+
    !> Way that the slider will make in a time, in the direction in which it moves.
    pure function way_made(pose, sense, time) result(way)
       type(pose_type), intent(in) :: pose
@@ -496,34 +610,54 @@ contains
    !>
    !> Where many populations start to break together, as they do where the slider turned before, the
    !> force has a kink: a way ends there.
-   subroutine try(self, start, sense, way)
+   subroutine try(self, pose, sense, way)
       class(contact_populations_type), intent(inout) :: self
-      !> Where the way starts [m], and in which direction it goes
-      real(wp), intent(in) :: start, sense
-      !> Its length [m]
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> In which direction it goes
+      real(wp), intent(in) :: sense
+      !> Length of the way [m]
       real(wp), intent(inout) :: way
 
-      real(wp) :: late, onset
+      real(wp) :: late, onset, displacement
 
-      call self%try_until(start, start + sense * way, sense, late, onset)
+      call self%try_until(pose, pose%displacement + sense * way, expected_time(way), sense, late, &
+         & onset)
       if (late > self%most_late) then
-         way = abs(onset - start)
-         call self%try_until(start, onset, sense, late, onset)
+         displacement = onset
+         way = abs(displacement - pose%displacement)
+         call self%try_until(pose, displacement, expected_time(way), sense, late, onset)
       end if
+
+   contains
+
+      !> When the slider will be at the end of its way [s].
+      pure function expected_time(distance) result(time)
+         real(wp), intent(in) :: distance
+         real(wp) :: time
+
+         time = pose%time
+         if (self%ages) time = pose%time &
+            & + min(time_to_move(pose, sense, distance), self%longest_fall, longest_time)
+      end function expected_time
+
    end subroutine try
 
    !> Find what breaks until the slider comes to a displacement.
-   subroutine try_until(self, start, displacement, sense, late, onset)
+   subroutine try_until(self, before, displacement, time, sense, late, onset)
       class(contact_populations_type), intent(inout) :: self
-      !> Where the slider is, where it comes to [m], and in which direction it goes
-      real(wp), intent(in) :: start, displacement, sense
+      !> Where the slider is
+      type(pose_type), intent(in) :: before
+      !> Where it comes to [m] and when [s], and in which direction it goes
+      real(wp), intent(in) :: displacement, time, sense
       !> Breaks of populations that start to break on the way, and where most of them do so [m]
       real(wp), intent(out) :: late, onset
 
       real(wp) :: moments(moments_length), loss(moments_length), distance, force, broken, next
-      real(wp) :: most, edge
+      real(wp) :: most, edge, start
       integer :: place, row
 
+      start = before%displacement
       row = merge(row_ahead, row_behind, sense > 0.0_wp)
       next = huge(1.0_wp)
       late = 0.0_wp
@@ -533,29 +667,37 @@ contains
       self%trials = 0
       if (allocated(self%trial_population)) then
          if (size(self%trial_population) < self%count) then
-            deallocate (self%trial_population, self%trial_broken, self%trial_moments)
+            deallocate (self%trial_population, self%trial_broken, self%trial_moments, &
+               & self%trial_lost)
          end if
       end if
       if (.not. allocated(self%trial_population)) then
          associate (places => size(self%population, 1))
             allocate (self%trial_population(places), self%trial_broken(places))
-            allocate (self%trial_moments(moments_length, places))
+            allocate (self%trial_moments(moments_length, places), self%trial_lost(places))
          end associate
       end if
       self%trial_end = displacement
+      self%trial_time = time
       self%trial_sense = sense
       self%trial_breaks = 0.0_wp
       self%trial_mass = 0.0_wp
       self%trial_work = 0.0_wp
       do place = 1, self%count
-         if (sense * (self%population(place, row) - displacement) >= 0.0_wp) then
+         if (sense * (self%population(place, row) - displacement) >= 0.0_wp &
+            & .and. .not. falls_at_rest(place)) then
             next = min(next, sense * self%population(place, row))
             cycle
          end if
          force = sense * self%population(place, row_force)
          distance = sense * (displacement - self%population(place, row_origin)) / self%stretch
-         broken = max(self%population(place, row_broken), &
-            & broken_threshold(self%parameters%coupling, force, distance))
+         if (self%ages) then
+            broken = max(self%population(place, row_broken), self%ageing%configured( &
+               & max(0.0_wp, distance + force), time - self%population(place, row_birth)))
+         else
+            broken = max(self%population(place, row_broken), &
+               & broken_threshold(self%parameters%coupling, force, distance))
+         end if
          call self%moments(nint(self%population(place, row_law)))%interpolate(broken, moments)
          moments = min(self%population(place, row_weight) * moments, &
             & self%population(place, row_moments + 1:))
@@ -564,10 +706,14 @@ contains
          self%trial_population(self%trials) = place
          self%trial_broken(self%trials) = broken
          self%trial_moments(:, self%trials) = moments
+         self%trial_lost(self%trials) = loss(lost)
+         if (self%ages) self%trial_lost(self%trials) = loss(lost) + loss(number) &
+            & * more_lost(place, broken, distance + force)
          self%trial_breaks = self%trial_breaks + loss(number)
          self%trial_mass = self%trial_mass + loss(massive)
          self%trial_work = self%trial_work + 0.5_wp * (loss(stiff) * distance**2 &
-            & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 - loss(lost))
+            & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 &
+            & - self%trial_lost(self%trials))
          if (sense * self%population(place, row) > edge) then
             late = late + loss(number)
             if (loss(number) > most) then
@@ -582,6 +728,46 @@ contains
          if (sense > 0.0_wp) self%ahead = self%trial_next
          if (sense < 0.0_wp) self%behind = self%trial_next
       end if
+
+   contains
+
+      !> Whether contacts of a population may break while the slider rests.
+      pure function falls_at_rest(population)
+         integer, intent(in) :: population
+         logical :: falls_at_rest
+
+         falls_at_rest = .false.
+         if (self%some_fall) then
+            falls_at_rest = .not. sense * (self%population(population, row) - displacement) > 0.0_wp
+         end if
+      end function falls_at_rest
+
+      !> Energy of the contacts of a population that break on the way, beyond that of their
+      !> configured thresholds: twice that of each of them in the mean, if on the way the force at
+      !> which they break is a line over those.
+      pure function more_lost(population, last, last_force) result(energy)
+         integer, intent(in) :: population
+         !> Threshold below which they will have broken, and the force then
+         real(wp), intent(in) :: last, last_force
+         real(wp) :: energy
+
+         real(wp) :: first, start_force, start_broken, part, first_force
+
+         energy = 0.0_wp
+         first = self%population(population, row_broken)
+         if (.not. last > first) return
+         start_force = max(0.0_wp, force + sense &
+            & * (start - self%population(population, row_origin)) / self%stretch)
+         start_broken = self%ageing%configured(start_force, &
+            & before%time - self%population(population, row_birth))
+         part = 0.0_wp
+         if (start_broken < first) part = (first - start_broken) / (last - start_broken)
+         first_force = start_force + part * (last_force - start_force)
+         if (start_broken > first) first = start_broken
+         energy = ((first_force**2 - first**2) + (first_force * last_force - first * last) &
+            & + (last_force**2 - last**2)) / 3.0_wp
+      end function more_lost
+
    end subroutine try_until
 
    !> Break what was found to break.
@@ -605,16 +791,17 @@ contains
             call self%offset%add(parameters%static_force * loss(number) &
                & * population(place, row_force) &
                & - parameters%stiffness * loss(stiff) * population(place, row_origin))
-            call self%break_loss%add(0.5_wp * parameters%static_force * self%stretch * loss(lost))
+            call self%break_loss%add(0.5_wp * parameters%static_force * self%stretch &
+               & * self%trial_lost(trial))
             population(place, row_moments + 1:) = self%trial_moments(:, trial)
             population(place, row_broken) = self%trial_broken(trial)
             if (population(place, row_moments + number) > 0.0_wp) then
                if (self%trial_sense > 0.0_wp) then
                   population(place, row_ahead) = self%trial_end
-                  population(place, row_behind) = next_break(self, place, -1.0_wp)
+                  population(place, row_behind) = next_break(self, place, -1.0_wp, self%trial_time)
                else
                   population(place, row_behind) = self%trial_end
-                  population(place, row_ahead) = next_break(self, place, 1.0_wp)
+                  population(place, row_ahead) = next_break(self, place, 1.0_wp, self%trial_time)
                end if
                self%ahead = min(self%ahead, population(place, row_ahead))
                self%behind = max(self%behind, population(place, row_behind))
@@ -650,13 +837,23 @@ contains
       else
          reaches = after%displacement < self%behind
       end if
+      if (self%some_fall .and. .not. reaches) then
+         ! Where thresholds fall contacts may break at rest.
+         if (.not. abs(way) > 0.0_wp) sense = after%sense
+         if (sense > 0.0_wp) then
+            reaches = after%displacement >= self%ahead
+         else
+            reaches = after%displacement <= self%behind
+         end if
+      end if
       ! The work that the offered law did, beyond that of the contacts which are pinned by now.
       gain = way * (0.5_wp * (self%offered%stiffness - self%stiffness%total()) &
          & * (after%displacement + before%displacement) &
          & - (self%offered%offset - self%offset%total()))
       if (reaches) then
-         if (self%trials == 0 .or. abs(self%trial_end - after%displacement) > 0.0_wp) then
-            call self%try_until(before%displacement, after%displacement, sense, late, onset)
+         if (self%trials == 0 .or. abs(self%trial_end - after%displacement) > 0.0_wp &
+            & .or. (self%ages .and. abs(self%trial_time - after%time) > 0.0_wp)) then
+            call self%try_until(before, after%displacement, after%time, sense, late, onset)
          end if
          call self%break_tried()
          if (self%trials > 0) gain = gain + self%trial_work
@@ -669,6 +866,7 @@ contains
          end if
       end if
       if (self%first <= self%last) call self%attach_due(before, after, gain)
+      if (self%ages) call self%see_ages(after%displacement, after%time)
       self%detached_count = self%detached_number%total()
       self%cost = 1.0_wp + self%count / populations_per_cost
       if (self%offers) then
@@ -797,9 +995,11 @@ contains
       real(wp), intent(inout) :: gain
 
       real(wp) :: early, late, until, part, part_before, births, moment, more, origin, force, way
+      real(wp) :: when
 
       births = 0.0_wp
       moment = 0.0_wp
+      when = 0.0_wp
       do while (self%first <= self%last)
          call due_times(self, self%first, early, late)
          if (early > after%time) exit
@@ -813,6 +1013,7 @@ contains
          more = self%packet(row_number, self%first) * (part - part_before)
          births = births + more
          moment = moment + more * position_at(before, after, 0.5_wp * (early + until))
+         when = when + more * 0.5_wp * (early + until)
          call self%detached_mass%add(-self%packet(row_mass, self%first) * (part - part_before))
          self%attached_part = part
          if (part < 1.0_wp) exit
@@ -835,7 +1036,9 @@ contains
       call self%stiffness%add(self%newborn_stiffness * births)
       call self%offset%add(self%newborn_stiffness * moment &
          & - self%parameters%static_force * births * force)
-      call self%add_population(origin, force, births, 1, 0.0_wp, after%displacement)
+      self%last_birth = after%time
+      call self%add_population(origin, force, births, 1, 0.0_wp, after%displacement, &
+         & min(when / births, after%time), after%time)
    end subroutine attach_due
 
    !> Where the slider was at a time of its last motion, by Hermite's interpolation [m].
@@ -929,6 +1132,7 @@ contains
       call archive%exchange("stiffness", self%stiffness)
       call archive%exchange("offset", self%offset)
       call archive%exchange("debt", self%debt)
+      call archive%exchange("last_birth", self%last_birth)
    end subroutine exchange
 
    !> Nothing is derived from the state: all of it is in the archive.

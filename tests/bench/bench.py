@@ -96,6 +96,29 @@ def prescribed_cost() -> None:
         )
 
 
+def ageing_cost() -> None:
+    """What ageing adds to a break and rebirth, from old to young contacts."""
+    print("\nCost of a break and rebirth of contacts that age, prescribed slider, 4080 contacts")
+    print("  velocity over that of ageing     ns/break   advances/break   without ageing")
+    ageing = {"law": "relax", "time": 0.01, "young_force_ratio": 0.5, "young_relative_width": 0.3}
+    for ratio in (0.01, 0.1, 1.0, 10.0, 100.0):
+        tables = Config.load(KLEIN).to_dict()
+        tables["slider"] = {"kind": "prescribed"}
+        tables["drive"]["velocity"] = 9e-9 / 0.01 * ratio
+        tables["run"]["duration"] = 60 * 0.01 / ratio
+        tables["output"] = {"interval": tables["run"]["duration"]}
+        tables["contacts"] |= {"initial": "steady", "coupling": "equal", "delay": 0.0}
+        tables["contacts"]["threshold"]["relative_width"] = 0.1
+        plain = finish(Config.from_dict(tables))
+        tables["contacts"]["ageing"] = ageing
+        aged = finish(Config.from_dict(tables))
+        costs = [one.kernel_seconds / one.breaks * 1e9 for one in (aged, plain)]
+        print(
+            f"{ratio:30g} {costs[0]:12.0f} {aged.advances / aged.breaks:16.3f} {costs[1]:16.0f}",
+            flush=True,
+        )
+
+
 def against_fixed_steps() -> None:
     """A fixed-step model at the step that gives the first slip of Klein's case to 1 % of F_s."""
     duration = 1.96
@@ -346,6 +369,7 @@ def main() -> None:
     )
     cost_over_contacts()
     prescribed_cost()
+    ageing_cost()
     against_fixed_steps()
     curve_cost()
     master_equation_cost()

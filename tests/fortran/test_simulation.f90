@@ -40,6 +40,10 @@ program test_simulation
    call goes_on("lattice", "quasistatic", solver_series)
    call goes_on("populations", "rigid", solver_series)
    call goes_on("populations", "layered", solver_series)
+   call goes_on("ageing", "rigid", solver_series)
+   call goes_on("ageing", "prescribed", solver_series)
+   call goes_on("ageing", "quasistatic", solver_series)
+   call goes_on("ageing populations", "rigid", solver_series)
    call runs_ahead("rigid", law_gaussian, 0.1_wp, 5.0e-4_wp)
    call runs_ahead("rigid", law_exponential, 1.0_wp, 5.0e-4_wp)
    call runs_ahead("rigid", law_exponential, 1.0_wp, 0.0_wp)
@@ -298,6 +302,10 @@ contains
       character(len=name_length), parameter :: common(10) = [character(len=name_length) :: &
          & "count", "static_force", "stiffness", "drag", "delay", "back_force_ratio", "coupling", &
          & "reattach", "law", "relative_width"]
+      character(len=name_length), parameter :: ageing(5) = [character(len=name_length) :: &
+         & "ageing", "ageing_time", "initial_age", "young_force_ratio", "young_relative_width"]
+      ! Some thresholds fall, as the young are spread widely.
+      real(wp), parameter :: relax(5) = [1.0_wp, 3.0e-3_wp, 0.0_wp, 0.9_wp, 0.3_wp]
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
       type(recorder_parameters_type) :: recorder
@@ -306,12 +314,19 @@ contains
       delay = 5.0e-4_wp
       if (slider == "quasistatic") delay = 0.0_wp
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
-         & 0.1_wp, real(coupling, wp), 1.0_wp, real(law, wp), width]
+         & 0.1_wp, real(merge(coupling_equal, coupling, contacts(:6) == "ageing"), wp), 1.0_wp, &
+         & real(law, wp), width]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &
             & "bond", "lattice"], [values, real(columns, wp), real(count / columns, wp), &
             & 100.0_wp / count, 1.0_wp])
+      case ("ageing")
+         call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
+            & "slider_jumps"], [values, relax, merge(1.0_wp, 0.0_wp, slider == "quasistatic")])
+      case ("ageing populations")
+         call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
+            & "resolution"], [values, relax, 0.5_wp])
       case ("populations")
          call new_parameters(parameters, [character(len=name_length) :: common, "resolution"], &
             & [values, 0.5_wp])

@@ -28,6 +28,10 @@ LAYERED = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 3}
 BASE = {"mass": 5e-3, "stiffness": 1e4, "damping": 10.0}
 SNAPSHOTS = {"interaction": PLACES, "output__snapshots": [0.01, 0.03], "output__snapshot_size": 20}
 
+# Contacts that grow stronger but for the strongest of them.
+RELAX = {"law": "relax", "time": 3e-3, "young_force_ratio": 0.6, "young_relative_width": 0.3}
+AGEING = {"contacts__coupling": "equal", "contacts__ageing": RELAX}
+
 KINDS: dict[str, dict[str, Any]] = {
     "rigid": {},
     "rigid, three realizations": {"run__realizations": 3, "contacts__coupling": "equal"},
@@ -53,6 +57,20 @@ KINDS: dict[str, dict[str, Any]] = {
         "drive": {"force_rate": 1e-6},
         "contacts__reattach": False,
         "contacts__count": 2000,
+    },
+    "rigid, ageing": AGEING,
+    "rigid, ageing, weaker": AGEING
+    | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},
+    "rigid, ageing, log": AGEING
+    | {"contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03}},
+    "rigid, ageing, me": AGEING | {"run__engine": "me"},
+    "prescribed, ageing": AGEING | {"slider": {"kind": "prescribed"}},
+    "layered, ageing": AGEING | {"slider": LAYERED | {"base": BASE}},
+    "quasistatic, ageing": AGEING
+    | {
+        "slider": {"kind": "quasistatic", "stiffness": 97.0},
+        "contacts__count": 200,
+        "contacts__ageing": RELAX | {"young_force_ratio": 0.9, "initial_age": 0.0},
     },
 }
 

@@ -5,6 +5,7 @@ None of them shares code with the kernels, but for Philox, which is checked by k
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -94,6 +95,11 @@ class Contacts:
         self.due = np.full(count, np.nan)
         self.u = np.array([self.draw(contact) for contact in range(count)])
         self.sense = 1.0
+        self.time = 0.0
+        self.birth = np.full(count, 0.0)
+        ageing = contacts.ageing
+        if ageing is not None and ageing.law == "relax" and ageing.initial_age is None:
+            self.birth[:] = -np.inf
         self.bonds = np.zeros((count, count))
         if self.config.interaction is not None:
             self.bonds = bonds(self.config)
@@ -103,7 +109,17 @@ class Contacts:
     def draw(self, contact: int) -> float:
         seed = self.config.run.seed
         uniform, _ = uniforms(seed, self.realization, contact, int(self.renewal[contact]))
-        return self.law.isf(uniform * self.law.sf(self.config.contacts.back_force_ratio))
+        return self.law.isf(uniform * self.law.sf(least_configured(self.config)))
+
+    @property
+    def thresholds(self) -> np.ndarray:
+        """Thresholds of now [N]."""
+        contacts = self.config.contacts
+        if contacts.ageing is None:
+            return self.u * contacts.contact_static_force
+        z = (self.u - 1) / contacts.threshold.relative_width
+        mean, width = aged(self.config, self.time - self.birth)
+        return (mean + width * z) * contacts.contact_static_force
 
     @property
     def pinned(self) -> np.ndarray:
@@ -123,7 +139,7 @@ class Contacts:
 
     @property
     def limit(self) -> np.ndarray:
-        return self.u * self.config.contacts.contact_static_force / self.stiffness
+        return self.thresholds / self.stiffness
 
     def sums(self) -> tuple[float, float, float]:
         """K_c, S, C of the linear law."""
@@ -147,7 +163,7 @@ class Contacts:
         step = self.config.contacts.static_force / self.config.contacts.stiffness
         force = self.breaking_force(x)
         rate = (self.breaking_force(x + step) - force) / step
-        over = np.abs(force) - self.u * self.config.contacts.contact_static_force
+        over = np.abs(force) - self.thresholds
         return np.where(self.pinned, over / np.where(self.pinned, rate, 1.0), -np.inf)
 
     def breaking_force(self, x: float) -> np.ndarray:
@@ -159,6 +175,7 @@ class Contacts:
     def act(self, x: float, v: float, time: float, slack: float = 0.0) -> None:
         """Break what is due at a displacement and time, and what that pushes over; attach."""
         contacts = self.config.contacts
+        self.time = time
         if v != 0:
             self.sense = math.copysign(1.0, v)
         broken: list[int] = []
@@ -187,9 +204,35 @@ class Contacts:
                     self.stiffness[contact] + self.bonds[contact].sum()
                 )
                 self.due[contact] = np.nan
+                self.birth[contact] = time
         self.events += [(time, contact) for contact in broken]
         if broken:
             self.avalanches.append((time, broken))
+
+
+def aged(config: Config, age):
+    """Mean and width of the thresholds at an age over the static force, of model section 9."""
+    width, ageing = config.contacts.threshold.relative_width, config.contacts.ageing
+    if ageing.law == "log":
+        mean = 1 + ageing.growth * np.log(1 + age / ageing.time)
+        return mean, width * mean
+    young = ageing.young_force_ratio
+    decay = np.exp(-age / ageing.time)
+    return (
+        1 + (young - 1) * decay,
+        width + (young * ageing.young_relative_width - width) * decay,
+    )
+
+
+def least_configured(config: Config) -> float:
+    """Configured threshold over the mean below which a contact is drawn again: one of the young or
+    of the old would be below the back force."""
+    contacts, ageing = config.contacts, config.contacts.ageing
+    least = contacts.back_force_ratio
+    if ageing is None or ageing.law == "log":
+        return least
+    mean, width = aged(config, 0.0)
+    return max(least, 1 + contacts.threshold.relative_width * (least - mean) / width)
 
 
 def bonds(config: Config) -> np.ndarray:
@@ -337,3 +380,47 @@ def exact_events(config: Config, scan: float) -> Contacts:
         time = end
         contacts.act(state[0], state[1], time, slack=1e-19)
     return contacts
+
+
+def ageing_force(config: Config, velocity: float) -> float:
+    """Steady contact force at a velocity of contacts that age, without delay [N].
+
+    F/F_s = <int_0^T f dt> / <T> over the law of the thresholds, T being the first time at which the
+    force f of a contact, k v t above the back force, is its threshold.
+    """
+    contacts = config.contacts
+    width = contacts.threshold.relative_width
+    law = frozen_law(contacts.threshold.law, width)
+    back, least = contacts.back_force_ratio, least_configured(config)
+    speed = velocity / contacts.break_stretch
+
+    def passage(u: float) -> float:
+        z = (u - 1) / width
+
+        def gap(time: float) -> float:
+            mean, spread = aged(config, time)
+            return mean + spread * z - back - speed * time
+
+        end = 1.0 / speed
+        while gap(end) > 0:
+            end *= 2
+        # The first of several zeros, if the threshold grows faster than the force for a while.
+        times = np.unique(np.concatenate([np.geomspace(end * 1e-9, end, 400), [0.0]]))
+        signs = gap(times) <= 0
+        place = int(np.argmax(signs))
+        if place == 0:
+            return 0.0
+        return optimize.brentq(gap, times[place - 1], times[place], xtol=1e-300, rtol=1e-14)
+
+    lower, upper = max(least, law.ppf(1e-15)), law.isf(1e-15)
+    point, weight = np.polynomial.legendre.leggauss(20)
+    edges = np.linspace(lower, upper, 81)
+    work = time = 0.0
+    for start, end in itertools.pairwise(edges):
+        for node, share in zip(point, weight, strict=True):
+            u = (start + end) / 2 + (end - start) / 2 * node
+            last = passage(u)
+            chance = share * law.pdf(u)
+            work += chance * (back * last + speed * last**2 / 2)
+            time += chance * last
+    return contacts.static_force * work / time

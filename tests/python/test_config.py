@@ -120,7 +120,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("contacts__back_force_ratio", 1.0, ["contacts.back_force_ratio", "less than 1"]),
         ("contacts__coupling", "loose", ["contacts.coupling", "loose", "scaled"]),
         ("contacts__reattach", "yes", ["contacts.reattach", "boolean"]),
-        ("contacts__ageing", {}, ["contacts.ageing", "not available in this version"]),
+        ("contacts__ageing", {}, ["contacts.ageing.time", "missing"]),
         ("contacts__threshold__law", "cauchy", ["contacts.threshold.law", "gaussian"]),
         ("contacts__threshold__relative_width", 0, ["relative_width", "greater than 0"]),
         ("contacts__threshold__relative_width", 1e-8, ["relative_width", "at least 1e-06"]),

@@ -67,7 +67,7 @@ class Config(Table):
     @property
     def contact_kind(self) -> ContactKind:
         """The kind of contacts."""
-        return contact_kind(self.run, self.interaction)
+        return contact_kind(self.run, self.contacts, self.interaction)
 
     @property
     def initial_code(self) -> int:

@@ -13,9 +13,6 @@ from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.table import Table
 from mesoslip.errors import Problem
 
-# Tables and keys that the format knows and this version does not.
-NOT_YET_KEYS = {"contacts": ("ageing",)}
-
 
 def problems(error: ValidationError, source: str, whole: type[Table]) -> list[Problem]:
     """Everything that is wrong with a configuration.
@@ -76,8 +73,6 @@ def _dotted(place: Iterable[Any]) -> str:
 def _about_unknown(place: list[Any], slider: str, whole: type[Table]) -> str:
     """What to say of a key that its table does not have."""
     table, name = _dotted(place[:-1]), str(place[-1])
-    if name in NOT_YET_KEYS.get(table, ()):
-        return "not available in this version"
     if (table, name) == ("", "base"):
         return "names the file under another one, and cannot be laid over it"
     kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]

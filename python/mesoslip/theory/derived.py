@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.contacts.tables import Ageing
+from mesoslip.theory.ageing import mean_life, steady_force
 from mesoslip.theory.lives import scales
 
 
@@ -70,9 +72,10 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         yield "contact_radius", math.sqrt(area / math.pi), "m", "radius of a contact"
     yield (
         "threshold_acceptance",
-        contacts.threshold.probability_above(contacts.back_force_ratio),
+        contacts.threshold.probability_above(contacts.least_threshold),
         "1",
-        "probability that a threshold drawn is above the back force",
+        "probability that a threshold drawn is above the back force"
+        + (", young and old" if contacts.ageing is not None else ""),
     )
     yield (
         "K_star_estimate",
@@ -90,6 +93,13 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
             "1",
             "that of all bonds of a contact over its own, G z/k",
         )
+    yield from _lives(config) if contacts.ageing is None else _ageing(config, contacts.ageing)
+
+
+def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
+    """What follows from the lives of contacts, from attaching to breaking."""
+    contacts = config.contacts
+    static, stiffness = contacts.contact_static_force, contacts.contact_stiffness
     lives = scales(config)
     yield (
         "mean_life",
@@ -111,3 +121,65 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
                 "N",
                 "force of stationary sliding at the drive's velocity, with delay and drag",
             )
+
+
+def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, str]]:
+    """What follows from the lives of contacts that age: of the young, of the old, and at the
+    velocity of the drive."""
+    contacts, width = config.contacts, config.contacts.threshold.relative_width
+    weakest, mean, strongest = ageing.threshold([1 - width, 1.0, 1 + width], width, 0.0)
+    yield (
+        "young_static_force",
+        contacts.static_force * float(mean),
+        "N",
+        "force of all contacts at their mean thresholds when they attach",
+    )
+    yield (
+        "young_relative_width",
+        float((strongest - weakest) / (2 * mean)),
+        "1",
+        "standard deviation over mean of their thresholds then, before any is rejected",
+    )
+    yield (
+        "ageing_velocity",
+        contacts.break_stretch / ageing.time,
+        "m/s",
+        "mean breaking stretch over the time of ageing: contacts are old when they break where "
+        "sliding is much slower, and young where it is much faster",
+    )
+    if ageing.growth is not None:
+        yield (
+            "growth_per_decade",
+            ageing.growth * math.log(10),
+            "1",
+            "growth of thresholds for each decade of their age, over that at birth",
+        )
+    else:
+        life = mean_life(config, 0.0)
+        yield "mean_life", life, "m", "mean displacement from attaching to breaking, of the old"
+    if not contacts.reattach:
+        return
+    if ageing.growth is None:
+        slow = steady_force(config, 0.0)
+        yield "F_steady", slow, "N", "force of stationary slow sliding, of old contacts"
+    fast = steady_force(config, math.inf)
+    yield (
+        "F_steady_young",
+        fast,
+        "N",
+        "force of stationary fast sliding, of young contacts, without delay and drag",
+    )
+    speed = config.drive_speed
+    if speed > 0:
+        yield (
+            "mean_life_drive",
+            mean_life(config, speed),
+            "m",
+            "mean displacement from attaching to breaking, sliding at the drive's velocity",
+        )
+        yield (
+            "F_steady_drive",
+            steady_force(config, speed),
+            "N",
+            "force of stationary sliding at the drive's velocity, with ageing, delay and drag",
+        )

@@ -152,12 +152,25 @@ class ForceCurve:
     Raises
     ------
     ConfigError
-        If the curve is too long for so narrow a threshold law.
+        If the curve is too long for so narrow a threshold law, or contacts age.
     """
 
     def __init__(self, config: Config) -> None:
         self.config = config
         contacts = config.contacts
+        if contacts.ageing is not None:
+            raise ConfigError(
+                [
+                    Problem(
+                        "",
+                        "contacts.ageing",
+                        "has no force curve: F(X) depends on how fast the slider moves; that of "
+                        "contacts with the configured thresholds is the one without this table, "
+                        "and `mesoslip info` gives the steady force of young and old contacts and "
+                        "at the velocity of the drive",
+                    )
+                ]
+            )
         self.newborn_width = config.curve.newborn_width
         self._stretch = contacts.static_force / contacts.stiffness
         self.scales = scales(config, self.newborn_width)

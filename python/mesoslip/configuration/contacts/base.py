@@ -16,6 +16,8 @@ class Block(Protocol):
 
     @property
     def ignores_delay(self) -> bool: ...
+    @property
+    def jumps(self) -> bool: ...
 
 
 class Setting(Protocol):
@@ -66,7 +68,7 @@ class ContactKind(ABC):
 
     @classmethod
     @abstractmethod
-    def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
         """Whether the tables of a configuration describe contacts of this kind."""
 
     @property

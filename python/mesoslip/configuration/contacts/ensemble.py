@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -16,7 +16,9 @@ class EnsembleContacts(ContactKind):
     kernel_kind: ClassVar[str] = "ensemble"
 
     @classmethod
-    def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
+        if contacts.ageing is not None:
+            return False
         return run.engine == "eq" and (interaction is None or interaction.strength == 0)
 
     @property

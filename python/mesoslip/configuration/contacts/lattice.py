@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import LATTICES, Interaction
+from mesoslip.configuration.contacts.tables import LATTICES, Contacts, Interaction
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -19,7 +19,9 @@ class LatticeContacts(ContactKind):
     interaction: Interaction
 
     @classmethod
-    def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
+        if contacts.ageing is not None:
+            return False
         return run.engine == "eq" and interaction is not None and interaction.strength > 0
 
     def kernel_parameters(self, config: Setting) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
 
@@ -26,8 +26,8 @@ class PopulationContacts(ContactKind):
     remedy: ClassVar[str] = "a smaller run.resolution helps: the error falls with its square"
 
     @classmethod
-    def is_meant(cls, run: Run, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "me"
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
+        return run.engine == "me" and contacts.ageing is None
 
     def kernel_parameters(self, config: Setting) -> dict[str, float]:
         return common_parameters(config) | {"resolution": config.run.resolution}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, StrictBool, model_validator
 
 from mesoslip.configuration.table import (
@@ -25,8 +27,11 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.configuration.threshold_law import LAWS, NARROWEST, ThresholdLaw
 
+Array = NDArray[np.float64]
+
 # Choices, and their codes in the kernels.
 COUPLINGS = {"scaled": 1, "equal": 2}
+AGEING_LAWS = {"relax": 1, "log": 2}
 INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
 LATTICES = {"triangular": 1, "square": 2}
 
@@ -35,6 +40,11 @@ NEIGHBOURS = {"triangular": 6, "square": 4}
 
 # Part of the thresholds that must be above the back force, or drawing them takes too long.
 LEAST_ACCEPTED = 0.5
+
+# Keys of [contacts.ageing] that belong to one law each.
+AGEING_KEYS = {"relax": ("young_force_ratio", "young_relative_width"), "log": ("growth",)}
+# Age of contacts that have always been there [s].
+ALWAYS = 1e300
 
 # Stiffness of all bonds of a contact over its own, beyond which the force that breaks it, the
 # difference of what it and what its neighbours pull, has fewer than ten digits.
@@ -72,6 +82,64 @@ class Threshold(Table):
         return ThresholdLaw(self.law, self.relative_width, threshold).acceptance
 
 
+class Ageing(Table):
+    """How the threshold of a contact changes with its age (model section 9).
+
+    With the law `relax` the static force and the relative width of [contacts] are those of the old,
+    with `log` they are those at birth. Contacts of the start of a run have just these thresholds,
+    unless ``initial_age`` says how old they are.
+    """
+
+    law: Annotated[str, choice(AGEING_LAWS)] = "relax"
+    time: Annotated[Time, Field(gt=0)]
+    young_force_ratio: Annotated[Number, Field(gt=0)] | None = None
+    young_relative_width: Annotated[Number, Field(gt=0)] | None = None
+    growth: Annotated[Number, Field(ge=0)] | None = None
+    initial_age: Annotated[Time, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _keys_of_the_law(self) -> Self:
+        for law, keys in AGEING_KEYS.items():
+            for key in keys:
+                is_given = getattr(self, key) is not None
+                if is_given and law != self.law:
+                    raise problem(key, f'is for law = "{law}", not "{self.law}"')
+                if not is_given and law == self.law:
+                    raise problem(key, f'needed for law = "{law}"')
+        return self
+
+    @property
+    def start_age(self) -> float:
+        """Age of the contacts at the start of a run [s]."""
+        if self.initial_age is not None:
+            return self.initial_age
+        return ALWAYS if self.law == "relax" else 0.0
+
+    def kernel_parameters(self) -> dict[str, float]:
+        """What the kernel is told of the law."""
+        return {
+            "ageing": AGEING_LAWS[self.law],
+            "ageing_time": self.time,
+            "initial_age": self.start_age,
+            **{key: getattr(self, key) for key in AGEING_KEYS[self.law]},
+        }
+
+    def threshold(self, configured: ArrayLike, width: float, age: ArrayLike) -> Array:
+        """Thresholds at an age [s] of contacts with configured ones, both over the static force;
+        ``width`` is the relative width of the configured ones."""
+        old, relative_age = np.asarray(configured), np.asarray(age) / self.time
+        if self.law == "log":
+            return np.asarray(old * (1 + (self.growth or 0.0) * np.log1p(relative_age)))
+        ratio, young_width = self.young_force_ratio or 1.0, self.young_relative_width or width
+        young = ratio * (1 + young_width * (old - 1) / width)
+        return np.asarray(old + (young - old) * np.exp(-relative_age))
+
+    def configured(self, threshold: float, width: float, age: float) -> float:
+        """Configured threshold of the contact that has a threshold at an age."""
+        at_zero, at_one = self.threshold([0.0, 1.0], width, age)
+        return float((threshold - at_zero) / (at_one - at_zero))
+
+
 class Contacts(Table):
     """The contacts of the interface; forces, stiffness and area are those of all together."""
 
@@ -88,6 +156,7 @@ class Contacts(Table):
     initial: Annotated[str, choice(INITIAL_STATES)] = "relaxed"
     reattach: StrictBool = True
     threshold: Threshold
+    ageing: Ageing | None = None
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:
@@ -99,15 +168,29 @@ class Contacts(Table):
 
     @model_validator(mode="after")
     def _contacts_attach(self) -> Self:
-        above = self.threshold.probability_above(self.back_force_ratio)
+        above = self.threshold.probability_above(self.least_threshold)
         if above < LEAST_ACCEPTED:
             raise problem(
                 "back_force_ratio",
-                f"only {above:.3g} of the thresholds are above the back force, at least "
-                f"{LEAST_ACCEPTED} must be: choose a lower back_force_ratio or a narrower "
-                "threshold law",
+                f"only {above:.3g} of the thresholds{self._of_the_young} are above the back force, "
+                f"at least {LEAST_ACCEPTED} must be: choose a lower back_force_ratio or a narrower "
+                f"threshold law{', or stronger young contacts' if self._of_the_young else ''}",
             )
         return self
+
+    @property
+    def _of_the_young(self) -> str:
+        """Whose thresholds those are that contacts attach with, if they are not all the same."""
+        return " of young contacts" if self.least_threshold > self.back_force_ratio else ""
+
+    @property
+    def least_threshold(self) -> float:
+        """Configured threshold over the mean at or below which a contact cannot attach, or would
+        let go of itself."""
+        if self.ageing is None:
+            return self.back_force_ratio
+        young = self.ageing.configured(self.back_force_ratio, self.threshold.relative_width, 0.0)
+        return max(self.back_force_ratio, young)
 
     @property
     def contact_static_force(self) -> float:

@@ -1,0 +1,734 @@
+!> N contacts that know nothing of each other, whose thresholds change with their age.
+!>
+!> A contact breaks at the first time at which its force is its threshold, while both move. What a
+!> slider is offered is a window in displacement and time in which that happens to none:
+!>
+!> - a threshold that grows is never below what it is now, so contacts are queued by where they
+!>   break with a threshold of some time ago. Those whose place in the queue comes into reach lead: they
+!>   have their thresholds of now, and where they break is foreseen from the motion of the slider,
+!>   by Newton's method, and held back by what is not known of this motion. A slider that comes to
+!>   where a leader was to break finds it there, or a little ahead of it and foresees again;
+!> - a threshold that falls is bounded by what it will be at the end of the window, which is where
+!>   and when the contact is foreseen to break, whether the slider moves or not. Few contacts do so
+!>   in most cases; of many, those are near that may break before the next scan.
+!>
+!> A contact that does not age breaks as in the ensemble without ageing, to the bit.
+module mesoslip_contacts_ageing
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
+   use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
+   use mesoslip_contacts_record, only: row_limit, row_origin, row_renewal, row_stiffness, &
+      & ahead_coordinate, behind_coordinate
+   use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set
+   implicit none
+   private
+
+   public :: contact_ageing_type, make_contact_ageing
+
+   !> A probability too small to meet among the keys of a ring of buckets.
+   real(wp), parameter :: rare = 1.0e-4_wp
+   !> Gap to its threshold over the mean breaking stretch at which a contact breaks that ages.
+   real(wp), parameter :: tiny_gap = 1.0e-12_wp
+   !> How much worse the motion is foreseen than it was last time, at most.
+   real(wp), parameter :: caution = 4.0_wp
+   !> How much of the jolt of the slider is remembered at its next motion.
+   real(wp), parameter :: memory = 0.99_wp
+   !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
+   integer, parameter :: most_steps = 8, most_steps_falling = 32
+   !> Number of contacts whose thresholds fall that are all near.
+   integer, parameter :: few = 32
+
+   !> Where a contact is kept: in the queue, among the leaders, among those that fall
+   integer, parameter :: seat_queue = 0, seat_lead = 1, seat_falling = 2
+
+   !> Numbers of the life of a contact: when it was born [s], its configured breaking stretch [m]
+   integer, parameter :: life_length = 2
+   integer, parameter :: life_birth = 1, life_limit = 2
+
+   !> A list of contacts.
+   type :: list_type
+      integer :: count = 0
+      !> Their numbers, the first of them, shape (number of contacts)
+      integer, allocatable :: contact(:)
+   end type list_type
+
+   !> Contacts that age. The limit in a record is a bound on the breaking stretch from below.
+   type, extends(contact_set_type) :: contact_ageing_type
+      !> How thresholds change
+      type(ageing_law_type) :: ageing
+      !> Whether the slider may jump while time stands still, when the law changes
+      logical :: jumps = .false.
+      !> Bound on the coordinates at which contacts of the queue break on the way back [m]
+      real(wp) :: behind = -huge(1.0_wp)
+      !> Direction of motion for which the queue is kept, +1 or -1
+      real(wp) :: direction = 1.0_wp
+
+      !> Mean configured breaking stretch [m]
+      real(wp), private :: stretch = 1.0_wp
+      !> Birth and configured breaking stretch, shape (life_length, count)
+      real(wp), allocatable, private :: life(:, :)
+      type(contact_queue_type), private :: queue
+      !> Contacts that lead, whose thresholds fall, and those of them that are near
+      type(list_type), private :: lead, falling, near
+      !> Where each contact is kept, shape (count)
+      integer, allocatable, private :: seat(:)
+      !> Coordinates between which [m], and time until which [s], no other contacts whose thresholds
+      !> fall break than those that are near
+      real(wp), private :: scan_upper = huge(1.0_wp), scan_lower = -huge(1.0_wp)
+      real(wp), private :: scan_time = huge(1.0_wp)
+      !> Time of the last response [s], duration of the last motion, and by how much lately
+      !> the acceleration was another at the end of a motion [m/s2]
+      real(wp), private :: now = 0.0_wp, duration = 0.0_wp, jolt = 0.0_wp
+      !> Whether the law stayed as it was in the last response
+      logical, private :: calm = .false.
+   contains
+      procedure :: initialize
+      procedure :: offer
+      procedure :: respond
+      procedure :: shift_origin
+      procedure :: records
+      procedure :: exchange
+      procedure :: rebuild
+      procedure, private, non_overridable :: is_due, refresh, break_due, break_near, &
+         & break_leaders, attach_due, enter, face, foresee, foresee_fall, lead_on, watch_near, &
+         & scan, scan_if_due, farthest_behind
+   end type contact_ageing_type
+
+contains
+
+   !> Set up contacts that age from named numbers.
+   subroutine make_contact_ageing(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: the law of ageing, and whether the slider jumps
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_ageing_type), allocatable :: self
+      real(wp) :: longest, rate
+      integer :: stat
+
+      allocate (self)
+      self%parameters = common
+      call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
+      call parameters%take("slider_jumps", self%jumps, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      self%stretch = common%static_force / common%stiffness
+      call self%allocate_records(0, 0, error)
+      if (allocated(error)) return
+      associate (count => common%count)
+         allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
+         if (stat == 0) allocate (self%seat(count), source=seat_queue, stat=stat)
+         if (stat == 0) allocate (self%lead%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%falling%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%near%contact(count), source=0, stat=stat)
+      end associate
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the ages of contacts")
+         return
+      end if
+      ! As for contacts that do not age: keys that grow with time are farther along the ring.
+      call self%ageing%follow(max(self%parameters%law%quantile(rare), 1.0_wp), 1.0_wp, &
+         & self%ageing%time, longest, rate)
+      longest = max(longest, self%parameters%law%quantile(rare), 1.0_wp)
+      call new_contact_queue(self%queue, common%count, &
+         & 1.1_wp * self%stretch * longest * (1.0_wp + common%back_force_ratio), error)
+      call move_alloc(self, contacts)
+   end subroutine make_contact_ageing
+
+   !> Draw all contacts for the start of a run.
+   subroutine initialize(self, state)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      integer :: contact
+
+      call self%draw(state)
+      do contact = 1, self%parameters%count
+         self%life(life_birth, contact) = -self%ageing%initial_age
+         self%life(life_limit, contact) = self%record(row_limit, contact)
+         call self%enter(contact, 0.0_wp)
+      end do
+      call self%rebuild(0.0_wp)
+      self%behind = self%farthest_behind()
+   end subroutine initialize
+
+   !> Contact force as a law, which holds until a contact breaks or attaches.
+   subroutine offer(self, pose, law, window)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds; a contact may break at its lower end if the motion is forward
+      type(window_type), intent(out) :: window
+
+      real(wp) :: upper, lower
+
+      law = law_set(self)
+      upper = huge(1.0_wp)
+      lower = self%behind
+      window%end_time = self%next_attachment
+      call self%scan_if_due(pose)
+      call self%lead_on(pose, upper)
+      call self%watch_near(pose, upper, lower, window%end_time)
+      if (self%direction > 0.0_wp) then
+         window%upper = upper
+         window%lower = lower
+      else
+         window%upper = -lower
+         window%lower = -upper
+      end if
+   end subroutine offer
+
+   !> Bring those to the lead that may break next, and find until where the slider may go.
+   subroutine lead_on(self, pose, upper)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      !> Coordinate until which no contact breaks [m]
+      real(wp), intent(inout) :: upper
+
+      integer :: place, contact
+
+      do place = 1, self%lead%count
+         upper = min(upper, self%foresee(self%lead%contact(place), pose))
+      end do
+      do while (self%queue%first_key < upper)
+         call self%queue%pop(self%record, contact)
+         call append(self%lead, contact)
+         self%seat(contact) = seat_lead
+         upper = min(upper, self%foresee(contact, pose))
+      end do
+      do place = self%lead%count, 1, -1
+         contact = self%lead%contact(place)
+         associate (key => ahead_coordinate(self%record(:, contact), self%direction))
+            if (key > upper) then
+               call self%queue%insert(contact, key)
+               self%seat(contact) = seat_queue
+               call remove(self%lead, place)
+            end if
+         end associate
+      end do
+   end subroutine lead_on
+
+   !> Where a contact is foreseen to break whose threshold grows; its bound becomes that of now.
+   function foresee(self, contact, pose) result(coordinate)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+      !> Coordinate along the direction of motion, not beyond where it breaks [m]
+      real(wp) :: coordinate
+
+      real(wp) :: age, limit, rate, gap, speed, pull, grown, step, excess, slope, doubt
+      integer :: number
+
+      age = pose%time - self%life(life_birth, contact)
+      call self%ageing%follow(self%life(life_limit, contact), self%stretch, age, limit, rate)
+      self%record(row_limit, contact) = limit
+      coordinate = ahead_coordinate(self%record(:, contact), self%direction)
+      if (.not. rate > 0.0_wp .or. (self%jumps .and. .not. self%calm)) return
+      speed = self%direction * pose%velocity
+      if (.not. speed > rate) return
+      pull = 0.5_wp * self%direction * pose%acceleration
+      gap = coordinate - self%direction * pose%displacement
+      step = gap / (speed - rate)
+      if (.not. step > 0.0_wp) return
+      doubt = 0.5_wp * caution * self%jolt * step
+      if (self%duration > 0.0_wp) doubt = doubt * max(1.0_wp, step / self%duration)
+      if (.not. (doubt < 0.5_wp * speed .and. abs(pull) * step < 0.25_wp * speed)) return
+
+      if (rate * step**2 * (1.0_wp / self%ageing%time + abs(pull) / speed) &
+         & <= 0.1_wp * tiny_gap * self%stretch) then
+         ! So close that the threshold grows along a line.
+         coordinate = coordinate + (1.0_wp - doubt / speed) * rate * step
+         return
+      end if
+      grown = limit
+      do number = 1, most_steps
+         call self%ageing%follow(self%life(life_limit, contact), self%stretch, age + step, grown, &
+            & rate)
+         excess = gap + (grown - limit) - step * (speed + pull * step)
+         slope = speed + 2.0_wp * pull * step - rate
+         if (.not. slope > 0.0_wp) return
+         step = max(0.0_wp, step + excess / slope)
+         if (abs(excess) <= 0.1_wp * tiny_gap * self%stretch) exit
+      end do
+      if (grown > limit) coordinate = coordinate + (1.0_wp - doubt / speed) * (grown - limit)
+   end function foresee
+
+   !> Find until where and when the slider may go before a contact breaks whose threshold falls.
+   subroutine watch_near(self, pose, upper, lower, end_time)
+      class(contact_ageing_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> Coordinates between which [m], and time until which [s], no contact breaks
+      real(wp), intent(inout) :: upper, lower, end_time
+
+      integer :: place
+
+      upper = min(upper, self%scan_upper)
+      lower = max(lower, self%scan_lower)
+      end_time = min(end_time, self%scan_time)
+      do place = 1, self%near%count
+         associate (contact => self%near%contact(place))
+            if (ahead_coordinate(self%record(:, contact), self%direction) < upper &
+               & .or. behind_coordinate(self%record(:, contact), self%direction) > lower) then
+               call self%foresee_fall(contact, pose, upper, lower, end_time)
+            end if
+         end associate
+      end do
+   end subroutine watch_near
+
+   !> Where and when a contact is foreseen to break whose threshold falls: before that, it cannot.
+   pure subroutine foresee_fall(self, contact, pose, upper, lower, end_time)
+      class(contact_ageing_type), intent(in) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(inout) :: upper, lower, end_time
+
+      real(wp) :: age, limit, rate, stretch, speed, step, gap, longest
+      integer :: number
+
+      age = pose%time - self%life(life_birth, contact)
+      stretch = pose%displacement - self%record(row_origin, contact)
+      speed = max(0.0_wp, sign(1.0_wp, stretch) * pose%velocity)
+      stretch = abs(stretch)
+      longest = end_time - pose%time
+      step = 0.0_wp
+      do number = 1, most_steps_falling
+         call self%ageing%follow(self%life(life_limit, contact), self%stretch, age + step, limit, &
+            & rate)
+         gap = limit - stretch - speed * step
+         if (gap <= 0.1_wp * tiny_gap * self%stretch) exit
+         if (speed - rate > 0.0_wp) then
+            step = step + gap / (speed - rate)
+         else
+            step = longest
+         end if
+         if (.not. step < longest) exit
+      end do
+      ! A slider that jumps comes closer while time stands still: both have to have room.
+      if (self%jumps .and. .not. speed > 0.0_wp) step = 0.5_wp * step
+      if (step < longest) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))
+      limit = max(stretch, self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+         & end_time - self%life(life_birth, contact)))
+      upper = min(upper, self%direction * self%record(row_origin, contact) + limit)
+      lower = max(lower, self%direction * self%record(row_origin, contact) - limit)
+   end subroutine foresee_fall
+
+   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
+   subroutine respond(self, before, after)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: breaks
+
+      self%now = after%time
+      self%duration = after%time - before%time
+      self%jolt = max(abs(after%acceleration - before%acceleration), memory * self%jolt)
+      breaks = self%breaks
+      self%calm = self%next_attachment > after%time
+      call self%break_due(after)
+      if (self%breaks > breaks) self%calm = .false.
+      call self%attach_due(after)
+      self%detached_count = real(self%waiting, wp)
+   end subroutine respond
+
+   !> Whether a contact breaks, now that its bound is that of now.
+   pure function is_due(self, contact, pose)
+      class(contact_ageing_type), intent(in) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+      logical :: is_due
+
+      real(wp) :: gap, limit, rate
+
+      gap = ahead_coordinate(self%record(:, contact), self%direction) &
+         & - self%direction * pose%displacement
+      is_due = gap <= 0.0_wp
+      if (is_due .or. gap > tiny_gap * self%stretch) return
+      ! One whose threshold moves is never met to the last digit.
+      call self%ageing%follow(self%life(life_limit, contact), self%stretch, &
+         & pose%time - self%life(life_birth, contact), limit, rate)
+      is_due = abs(rate) > 0.0_wp
+   end function is_due
+
+   !> Break all contacts that are due.
+   subroutine break_due(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: breaks
+      integer :: contact
+
+      if (self%direction * pose%displacement <= self%behind) then
+         ! The bound may be that of a contact which has broken since.
+         self%behind = self%farthest_behind()
+         if (self%direction * pose%displacement <= self%behind) call self%face(pose)
+      end if
+      breaks = self%breaks
+      call self%break_near(pose)
+      call self%break_leaders(pose)
+      do while (self%queue%first_key <= self%direction * pose%displacement)
+         call self%queue%pop(self%record, contact)
+         call self%refresh(contact, pose%time)
+         if (self%is_due(contact, pose)) then
+            call self%let_go(contact, pose%displacement, pose%time)
+         else
+            call append(self%lead, contact)
+            self%seat(contact) = seat_lead
+         end if
+      end do
+      if (self%breaks > breaks) self%track%generation = self%track%generation + 1
+   end subroutine break_due
+
+   !> Break the leaders that are due, in the order of their places.
+   subroutine break_leaders(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: place, first, contact
+      real(wp) :: key, least, late
+
+      do place = 1, self%lead%count
+         call self%refresh(self%lead%contact(place), pose%time)
+      end do
+      do
+         first = 0
+         least = huge(1.0_wp)
+         do place = 1, self%lead%count
+            contact = self%lead%contact(place)
+            key = ahead_coordinate(self%record(:, contact), self%direction)
+            if (key < least .and. self%is_due(contact, pose)) then
+               least = key
+               first = place
+            end if
+         end do
+         if (first == 0) return
+         contact = self%lead%contact(first)
+         late = self%direction * pose%displacement - least
+         if (late > tiny_gap * self%stretch) then
+            self%error_estimate = max(self%error_estimate, late * self%parameters%stiffness)
+         end if
+         call remove(self%lead, first)
+         self%seat(contact) = seat_queue
+         call self%let_go(contact, pose%displacement, pose%time)
+      end do
+   end subroutine break_leaders
+
+   !> Break the contacts that are due of those whose thresholds fall, in either direction.
+   subroutine break_near(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stretch, limit
+      integer :: place, contact
+
+      do place = self%near%count, 1, -1
+         contact = self%near%contact(place)
+         stretch = abs(pose%displacement - self%record(row_origin, contact)) &
+            & + tiny_gap * self%stretch
+         if (self%record(row_limit, contact) > stretch) cycle
+         limit = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+            & pose%time - self%life(life_birth, contact))
+         if (limit > stretch) cycle
+         call self%let_go(contact, pose%displacement, pose%time)
+         call remove(self%near, place)
+         call remove(self%falling, position(self%falling, contact))
+         self%seat(contact) = seat_queue
+      end do
+   end subroutine break_near
+
+   !> Attach all contacts that are due, in the order in which they broke.
+   subroutine attach_due(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+      real(wp) :: back_force
+
+      back_force = pose%sense * self%parameters%back_force_ratio * self%parameters%static_force
+      do while (self%next_attachment <= pose%time)
+         call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
+         self%life(life_birth, contact) = pose%time
+         self%life(life_limit, contact) = self%record(row_limit, contact)
+         call self%enter(contact, pose%time)
+         if (self%seat(contact) == seat_queue) then
+            call self%queue%insert(contact, &
+               & ahead_coordinate(self%record(:, contact), self%direction))
+            self%behind = max(self%behind, &
+               & behind_coordinate(self%record(:, contact), self%direction))
+         end if
+      end do
+   end subroutine attach_due
+
+   !> Bound the breaking stretch of a contact that is born or drawn, and find its place.
+   subroutine enter(self, contact, time)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time
+
+      self%seat(contact) = seat_queue
+      if (self%ageing%falls(self%life(life_limit, contact), self%stretch) &
+         & .and. .not. self%ageing%is_old(time - self%life(life_birth, contact))) then
+         self%seat(contact) = seat_falling
+         call append(self%falling, contact)
+         call append(self%near, contact)
+         call self%refresh(contact, self%scan_time)
+      else
+         call self%refresh(contact, time)
+      end if
+   end subroutine enter
+
+   !> Make the bound of a contact's breaking stretch that of a time, or of the end of its scan.
+   subroutine refresh(self, contact, time)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time
+
+      self%record(row_limit, contact) = self%ageing%threshold(self%life(life_limit, contact), &
+         & self%stretch, time - self%life(life_birth, contact))
+   end subroutine refresh
+
+   !> Turn round: keep the queue for the other direction of motion, with the thresholds of now.
+   subroutine face(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+
+      self%direction = -self%direction
+      self%lead%count = 0
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         if (self%seat(contact) == seat_falling) cycle
+         self%seat(contact) = seat_queue
+         call self%refresh(contact, pose%time)
+      end do
+      if (self%falling%count > 0) call self%scan(pose)
+      call self%rebuild(pose%displacement)
+      self%behind = self%farthest_behind()
+   end subroutine face
+
+   !> Scan the contacts whose thresholds fall if that is due; those that are old do so no more.
+   subroutine scan_if_due(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: place
+
+      if (self%falling%count == 0) return
+      do place = self%near%count, 1, -1
+         call retire(self, self%near%contact(place), pose%time)
+      end do
+      if (pose%time >= self%scan_time &
+         & .or. self%direction * pose%displacement >= self%scan_upper &
+         & .or. self%direction * pose%displacement <= self%scan_lower &
+         & .or. self%near%count > max(few, self%falling%count / 2)) call self%scan(pose)
+   end subroutine scan_if_due
+
+   !> Put a contact whose threshold has fallen into the queue.
+   subroutine retire(self, contact, time)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time
+
+      integer :: place
+
+      if (.not. self%ageing%is_old(time - self%life(life_birth, contact))) return
+      place = position(self%near, contact)
+      if (place > 0) call remove(self%near, place)
+      call remove(self%falling, position(self%falling, contact))
+      self%seat(contact) = seat_queue
+      call self%refresh(contact, time)
+      call self%queue%insert(contact, ahead_coordinate(self%record(:, contact), self%direction))
+      self%behind = max(self%behind, &
+         & behind_coordinate(self%record(:, contact), self%direction))
+   end subroutine retire
+
+   !> Find the contacts near breaking of those whose thresholds fall, and for how long they are.
+   subroutine scan(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: place, contact
+      real(wp) :: fastest, limit, rate, reach
+
+      do place = self%falling%count, 1, -1
+         call retire(self, self%falling%contact(place), pose%time)
+      end do
+      self%scan_upper = huge(1.0_wp)
+      self%scan_lower = -huge(1.0_wp)
+      self%scan_time = huge(1.0_wp)
+      if (self%falling%count > few) then
+         fastest = 0.0_wp
+         do place = 1, self%falling%count
+            contact = self%falling%contact(place)
+            call self%ageing%follow(self%life(life_limit, contact), self%stretch, &
+               & pose%time - self%life(life_birth, contact), limit, rate)
+            fastest = max(fastest, -rate)
+         end do
+         ! About as many scans while the slider moves by a stretch as contacts that are near.
+         reach = 0.5_wp * self%stretch / sqrt(real(self%falling%count, wp))
+         self%scan_upper = self%direction * pose%displacement + reach
+         self%scan_lower = self%direction * pose%displacement - reach
+         if (fastest > 0.0_wp) then
+            self%scan_time = max(pose%time + reach / fastest, nearest(pose%time, 1.0_wp))
+         end if
+      end if
+      self%near%count = 0
+      do place = 1, self%falling%count
+         contact = self%falling%contact(place)
+         call self%refresh(contact, self%scan_time)
+         if (ahead_coordinate(self%record(:, contact), self%direction) < self%scan_upper .or. &
+            & behind_coordinate(self%record(:, contact), self%direction) > self%scan_lower) then
+            call append(self%near, contact)
+         end if
+      end do
+   end subroutine scan
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift, displacement)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+      !> Displacement of the slider from the new origin [m]
+      real(wp), intent(in) :: displacement
+
+      call self%shift_records(shift)
+      if (self%scan_upper < huge(1.0_wp)) then
+         self%scan_upper = self%scan_upper - self%direction * shift
+         self%scan_lower = self%scan_lower - self%direction * shift
+      end if
+      call self%rebuild(displacement)
+      self%behind = self%farthest_behind()
+   end subroutine shift_origin
+
+   !> Order the queue anew, from the records.
+   subroutine rebuild(self, displacement)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+
+      integer :: contact
+
+      call self%queue%clear(self%direction, self%direction * displacement)
+      do contact = 1, self%parameters%count
+         if (self%seat(contact) /= seat_queue) cycle
+         if (self%record(row_stiffness, contact) > 0.0_wp) then
+            call self%queue%insert(contact, &
+               & ahead_coordinate(self%record(:, contact), self%direction))
+         end if
+      end do
+   end subroutine rebuild
+
+   !> Greatest coordinate at which a contact of the queue may break on the way back.
+   pure function farthest_behind(self) result(coordinate)
+      class(contact_ageing_type), intent(in) :: self
+      real(wp) :: coordinate
+
+      integer :: contact
+
+      coordinate = -huge(1.0_wp)
+      do contact = 1, self%parameters%count
+         if (self%seat(contact) == seat_falling) cycle
+         if (self%record(row_stiffness, contact) > 0.0_wp) then
+            coordinate = max(coordinate, &
+               & behind_coordinate(self%record(:, contact), self%direction))
+         end if
+      end do
+   end function farthest_behind
+
+   !> What each contact is.
+   pure subroutine records(self, values)
+      !> The contacts
+      class(contact_ageing_type), intent(in) :: self
+      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch of now [m], number of
+      !> renewals of each contact, shape (contact_record_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      integer :: contact
+
+      do contact = 1, self%parameters%count
+         values(:, contact) = self%record([row_origin, row_stiffness, row_limit, row_renewal], &
+            & contact)
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         values(3, contact) = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+            & self%now - self%life(life_birth, contact))
+      end do
+   end subroutine records
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("contacts that age")
+      call exchange_set(self, archive)
+      call archive%exchange("behind", self%behind)
+      call archive%exchange("direction", self%direction)
+      call archive%exchange("life", self%life)
+      call archive%exchange("seat", self%seat)
+      call archive%exchange("lead", self%lead%contact)
+      call archive%exchange("leaders", self%lead%count)
+      call archive%exchange("falling", self%falling%contact)
+      call archive%exchange("falling_count", self%falling%count)
+      call archive%exchange("near", self%near%contact)
+      call archive%exchange("near_count", self%near%count)
+      call archive%exchange("scan_upper", self%scan_upper)
+      call archive%exchange("scan_lower", self%scan_lower)
+      call archive%exchange("scan_time", self%scan_time)
+      call archive%exchange("now", self%now)
+      call archive%exchange("duration", self%duration)
+      call archive%exchange("jolt", self%jolt)
+      call archive%exchange("calm", self%calm)
+   end subroutine exchange
+
+   !> Add a contact to a list.
+   pure subroutine append(list, contact)
+      type(list_type), intent(inout) :: list
+      integer, intent(in) :: contact
+
+      list%count = list%count + 1
+      list%contact(list%count) = contact
+   end subroutine append
+
+   !> Remove a contact from a list; the last one takes its place.
+   pure subroutine remove(list, place)
+      type(list_type), intent(inout) :: list
+      integer, intent(in) :: place
+
+      list%contact(place) = list%contact(list%count)
+      list%count = list%count - 1
+   end subroutine remove
+
+   !> Place of a contact in a list; 0 if it is not in it.
+   pure function position(list, contact) result(place)
+      type(list_type), intent(in) :: list
+      integer, intent(in) :: contact
+      integer :: place
+
+      do place = list%count, 1, -1
+         if (list%contact(place) == contact) return
+      end do
+      place = 0
+   end function position
+
+end module mesoslip_contacts_ageing

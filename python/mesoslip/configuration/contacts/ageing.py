@@ -1,0 +1,83 @@
+"""Contacts whose thresholds change with their age, one by one and in populations."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
+from mesoslip.configuration.contacts.populations import PopulationContacts
+from mesoslip.configuration.contacts.tables import Ageing, Contacts, Interaction
+from mesoslip.configuration.table import Complaint, Complaints
+from mesoslip.configuration.tables import Run
+
+
+def ageing_of(config: Setting) -> Ageing:
+    """The table of ageing of contacts that age."""
+    assert config.contacts.ageing is not None
+    return config.contacts.ageing
+
+
+def ageing_problems(config: Setting) -> Complaints:
+    """What contacts that age refuse, in both engines."""
+    contacts, ageing = config.contacts, ageing_of(config)
+    if contacts.coupling != "equal":
+        yield Complaint(
+            "contacts.coupling",
+            'must be "equal" for contacts that age: their thresholds change while their stiffness '
+            'and mass stay, which with "scaled" go with the threshold',
+            contacts.coupling,
+        )
+    if config.interaction is not None:
+        yield Complaint(
+            "interaction",
+            "is not for contacts that age: a break changes the forces of neighbours at once, and "
+            "where those break next is foreseen for thresholds that stay",
+        )
+    if ageing.initial_age is not None and contacts.initial != "relaxed":
+        yield Complaint(
+            "contacts.ageing.initial_age",
+            'needs contacts.initial = "relaxed": the other states are those of contacts with the '
+            "configured thresholds, more than young contacts may bear",
+            ageing.initial_age,
+        )
+
+
+class AgeingContacts(ContactKind):
+    """Contacts one by one that know nothing of each other."""
+
+    kernel_kind: ClassVar[str] = "ageing"
+    bytes_per_contact: ClassVar[int] = 190
+    # Where a contact breaks is foreseen; the kernel tells how late it came, should it be so.
+    force_error_bound: ClassVar[float] = 1e-9
+
+    @classmethod
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
+        return run.engine == "eq" and contacts.ageing is not None
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+        return (
+            common_parameters(config)
+            | ageing_of(config).kernel_parameters()
+            | {"slider_jumps": int(config.slider.jumps)}
+        )
+
+    def problems(self, config: Setting) -> Complaints:
+        yield from ageing_problems(config)
+
+
+class AgeingPopulations(PopulationContacts):
+    """Infinitely many contacts that age."""
+
+    kernel_kind: ClassVar[str] = "ageing populations"
+
+    @classmethod
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
+        return run.engine == "me" and contacts.ageing is not None
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+        return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
+
+    def problems(self, config: Setting) -> Complaints:
+        yield from super().problems(config)
+        # The master equation has no neighbours whether or not its contacts age.
+        yield from (one for one in ageing_problems(config) if one.key != "interaction")

@@ -1,0 +1,110 @@
+"""Steady sliding of contacts that age, at a constant velocity (model section 9)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+from scipy.optimize.elementwise import find_root
+
+from mesoslip.configuration.threshold_law import ThresholdLaw
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+Array = NDArray[np.float64]
+
+# Panels and points of the rule over the configured thresholds, and how far it goes: what is left
+# out has the probability that a normal deviate is as far.
+PANELS, POINTS = 80, 12
+FARTHEST = 8.0
+
+
+def steady_force(config: Config, velocity: float) -> float:
+    """Force of contacts that slide steadily at a velocity, with delay and drag [N].
+
+    A contact attaches with the back force, which grows by k v in a second, and breaks at the first
+    time T at which it is its threshold; then it is dragged for the delay:
+
+        F = N (<∫_0^T f dt> + m eta v tau_d) / (<T> + tau_d)
+
+    For contacts that do not age this is the formula of model section 4, with equal coupling.
+
+    Parameters
+    ----------
+    config
+        A configuration with contacts that age.
+    velocity
+        Positive [m/s]; 0 for the limit of slow sliding, of the law `relax` only, and infinity for
+        that of fast sliding, both without delay and drag.
+
+    Returns
+    -------
+    float
+        The force [N].
+    """
+    contacts = config.contacts
+    weight, threshold = _thresholds(config)
+    back = contacts.back_force_ratio
+    if velocity == 0 or np.isinf(velocity):
+        # All contacts are old when they break, or all young.
+        broken = _threshold(config, threshold, np.inf if velocity == 0 else 0.0)
+        work = float(weight @ (broken**2 - back**2)) / 2
+        return contacts.static_force * work / float(weight @ (broken - back))
+    speed = velocity / contacts.break_stretch
+    life = _lives(config, threshold, speed)
+    delay = 0.0 if config.slider.ignores_delay else contacts.delay
+    work = float(weight @ (back * life + speed * life**2 / 2))
+    drag = contacts.contact_drag * contacts.count * velocity * delay
+    return (contacts.static_force * work + drag) / (float(weight @ life) + delay)
+
+
+def mean_life(config: Config, velocity: float) -> float:
+    """Mean displacement from attaching to breaking, v <T> [m]; at velocity 0 that of the old."""
+    weight, threshold = _thresholds(config)
+    stretch = config.contacts.break_stretch
+    if velocity == 0:
+        broken = _threshold(config, threshold, np.inf)
+        return stretch * float(weight @ broken - config.contacts.back_force_ratio)
+    return velocity * float(weight @ _lives(config, threshold, velocity / stretch))
+
+
+def _thresholds(config: Config) -> tuple[Array, Array]:
+    """Weights and points of a rule over the configured thresholds, relative to the mean."""
+    contacts = config.contacts
+    law = ThresholdLaw(
+        contacts.threshold.law, contacts.threshold.relative_width, contacts.least_threshold
+    )
+    # Panels that a normal law would have of one width: narrow where a law is steep.
+    edges = law.quantile(special.ndtr(np.linspace(FARTHEST, -FARTHEST, PANELS + 1)))
+    point, share = np.polynomial.legendre.leggauss(POINTS)
+    half = np.diff(edges)[:, None] / 2
+    threshold = (edges[:-1, None] + half * (1 + point)).ravel()
+    weight = (half * share).ravel() * law.density(threshold)
+    return weight / np.sum(weight), threshold
+
+
+def _threshold(config: Config, configured: Array, age: float | Array) -> Array:
+    """Thresholds at an age of contacts with configured ones, over the static force."""
+    assert config.contacts.ageing is not None
+    width = config.contacts.threshold.relative_width
+    return config.contacts.ageing.threshold(configured, width, age)
+
+
+def _lives(config: Config, configured: Array, speed: float) -> Array:
+    """Times T at which contacts break whose forces grow by f_s times a speed in a second [s]."""
+    back = config.contacts.back_force_ratio
+
+    # Thresholds are concave in time where they grow, and fall otherwise: there is one solution.
+    def gap(time: Array, threshold: Array) -> Array:
+        return _threshold(config, threshold, time) - back - speed * time
+
+    longest = np.ones_like(configured) / speed
+    while np.any(gap(longest, configured) > 0):
+        longest = np.where(gap(longest, configured) > 0, 2 * longest, longest)
+    lives: Array = find_root(
+        gap, (np.zeros_like(longest), longest), args=(configured,), tolerances={"xrtol": 1e-14}
+    ).x
+    return lives

@@ -1,0 +1,97 @@
+!> Laws of ageing: limits, rates by differences, and which contacts break under a force.
+program test_ageing_law
+   use mesoslip_contacts_ageing_law, only: ageing_law_type, ageing_log, ageing_relax, &
+      & take_ageing_law
+   use mesoslip_contacts_threshold_law, only: law_gaussian, new_threshold_law, threshold_law_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
+   use testing, only: check, check_close, finish
+   implicit none
+
+   real(wp), parameter :: width = 0.1_wp, tau = 2.0_wp
+   type(ageing_law_type) :: law
+   type(threshold_law_type) :: thresholds
+   type(error_type), allocatable :: error
+
+   call take("relax", [0.5_wp, 0.4_wp])
+   call check(.not. allocated(error), "relax")
+   ! Two deviations above the mean: 0.5 (1 + 2 0.4) when young, 1 + 2 0.1 when old.
+   call check_close(law%threshold(1.2_wp, 1.0_wp, 0.0_wp), 0.9_wp, 1.0e-15_wp, "young")
+   call check_close(law%threshold(1.2_wp, 1.0_wp, 1.0e3_wp), 1.2_wp, 0.0_wp, "old")
+   call check_close(law%threshold(1.2_wp, 1.0_wp, tau), 1.2_wp - 0.3_wp * exp(-1.0_wp), &
+      & 1.0e-15_wp, "at tau_a")
+   call check(law%falls(1.6_wp, 1.0_wp) .and. .not. law%falls(1.4_wp, 1.0_wp), &
+      & "the strongest fall, beyond five deviations")
+   call check(law%is_old(100.0_wp) .and. .not. law%is_old(10.0_wp), "old after some tau_a")
+   ! 0.5 (1 + 0.4 z) = 0.1 for z = -2.
+   call check_close(thresholds%minimum, 0.8_wp, 1.0e-14_wp, "the weakest young cannot attach")
+   call consistent()
+
+   call take("relax", [1.0_wp, width])
+   call check_close(thresholds%minimum, 0.1_wp, 0.0_wp, "young like old: the same contacts attach")
+   call check_close(law%threshold(1.2_wp, 1.0_wp, 0.3_wp), 1.2_wp, 0.0_wp, "young like old")
+
+   call take("log", [0.05_wp])
+   call check(.not. allocated(error), "log")
+   call check_close(law%threshold(1.2_wp, 1.0_wp, 0.0_wp), 1.2_wp, 0.0_wp, "at birth")
+   call check_close(law%threshold(1.2_wp, 1.0_wp, tau * (exp(3.0_wp) - 1.0_wp)), 1.38_wp, &
+      & 1.0e-14_wp, "three e-folds")
+   call check(.not. law%falls(9.0_wp, 1.0_wp) .and. .not. law%is_old(1.0e9_wp), "grows for ever")
+   call consistent()
+
+   call take("relax", [0.0_wp, 0.4_wp])
+   call check(allocated(error), "young without force are refused")
+   call take("relax", [0.01_wp, 0.001_wp])
+   call check(allocated(error), "young of whom none can attach are refused")
+   call take("log", [-0.1_wp])
+   call check(allocated(error), "a growth below 0 is refused")
+   call take("none", [0.1_wp])
+   call check(allocated(error), "an unknown law is refused")
+   call finish()
+
+contains
+
+   !> Take a law of ageing from named numbers.
+   subroutine take(kind, values)
+      character(len=*), intent(in) :: kind
+      real(wp), intent(in) :: values(:)
+
+      type(parameters_type) :: parameters
+
+      call new_threshold_law(thresholds, law_gaussian, width, 0.1_wp, error)
+      select case (kind)
+      case ("relax")
+         call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &
+            & "initial_age", "young_force_ratio", "young_relative_width"], &
+            & [real(ageing_relax, wp), tau, 0.0_wp, values])
+      case ("log")
+         call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &
+            & "initial_age", "growth"], [real(ageing_log, wp), tau, 0.0_wp, values])
+      case default
+         call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &
+            & "initial_age"], [99.0_wp, tau, 0.0_wp])
+      end select
+      call take_ageing_law(law, thresholds, parameters, error)
+   end subroutine take
+
+   !> Rates are those of differences, and the contacts that break are those whose threshold is met.
+   subroutine consistent()
+      real(wp), parameter :: ages(4) = [0.0_wp, 0.5_wp, 3.0_wp, 20.0_wp], step = 1.0e-5_wp
+      real(wp) :: threshold, rate, difference
+      integer :: place
+
+      do place = 1, size(ages)
+         call law%follow(0.9_wp, 1.0_wp, ages(place) + step, threshold, rate)
+         difference = (law%threshold(0.9_wp, 1.0_wp, ages(place) + 2.0_wp * step) &
+            & - law%threshold(0.9_wp, 1.0_wp, ages(place))) / (2.0_wp * step)
+         call check_close(rate, difference, 1.0e-9_wp, "rate")
+         call check_close(law%configured(threshold, ages(place) + step), 0.9_wp, 1.0e-14_wp, &
+            & "who breaks")
+         ! In any unit.
+         call check_close(law%threshold(0.9e-8_wp, 1.0e-8_wp, ages(place) + step), &
+            & 1.0e-8_wp * threshold, 1.0e-22_wp, "unit")
+      end do
+   end subroutine consistent
+
+end program test_ageing_law

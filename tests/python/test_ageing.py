@@ -1,0 +1,373 @@
+"""Contacts that age: limits, independent models, the steady force, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import mesoslip
+import numpy as np
+import pytest
+from kinds import KINDS, configuration
+from mesoslip import ConfigError
+from mesoslip.output import layout
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.runner import run_realizations
+from mesoslip.theory.ageing import mean_life, steady_force
+from oracles import Contacts, aged, ageing_force, fixed_step, stationary_force
+from scipy import optimize
+from test_events import breaks
+
+STATIC, STRETCH = 18e-6, 9e-9
+# Most thresholds grow; those of the strongest fall, as the young are spread more widely.
+RELAX = {"law": "relax", "time": 5e-3, "young_force_ratio": 0.5, "young_relative_width": 0.3}
+WEAKEN = RELAX | {"young_force_ratio": 1.5, "young_relative_width": 0.2}
+LOG = {"law": "log", "time": 1e-4, "growth": 0.05}
+LAWS = {"relax": RELAX, "weaken": WEAKEN, "log": LOG}
+
+# Forward, a hold, back beyond the start, forward again.
+STAGES = [(0.02, 1e-6), (0.005, 0.0), (0.05, -1e-6), (0.03, 1e-6)]
+
+
+def staged(factor: float = 1.0) -> dict[str, object]:
+    stages = [{"duration": time, "velocity": factor * velocity} for time, velocity in STAGES]
+    return {"run__duration": None, "drive": {"stage": stages}, "output__interval": 1e-4}
+
+
+PRESCRIBED = {"slider": {"kind": "prescribed"}, "contacts__coupling": "equal"}
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if "lattice" not in kind and "ageing" not in kind]
+)
+@pytest.mark.parametrize("law", ["relax", "log"])
+def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
+    same = {"law": "relax", "time": 1e-3, "young_force_ratio": 1.0, "young_relative_width": 0.1}
+    if law == "log":
+        same = {"law": "log", "time": 1e-3, "growth": 0.0}
+    one, other = (
+        layout.build_tree(
+            run_realizations(configuration(kind, contacts__coupling="equal", **ageing), workers=1)
+        )
+        for ageing in ({}, {"contacts__ageing": same})
+    )
+    assert one["breaks"].values.min() >= 48
+    for name in ("displacement", "velocity", "spring_force", "contact_force", "breaks"):
+        assert one[name].values.tobytes() == other[name].values.tobytes(), name
+    assert one["energy_residual"].values.tobytes() == other["energy_residual"].values.tobytes()
+
+
+@pytest.mark.parametrize("engine", ["eq", "me"])
+@pytest.mark.parametrize("limit", ["old", "young"])
+def test_limits_of_fast_and_slow_ageing(klein, engine, limit):
+    """With tau_a to 0 contacts are old from birth, with tau_a to infinity they stay young."""
+    young = {"law": "relax", "young_force_ratio": 0.8, "young_relative_width": 0.1}
+    changes = PRESCRIBED | staged() | {"run__engine": engine, "contacts__count": 100}
+    changes["contacts__threshold__relative_width"] = 0.05
+    if limit == "old":
+        aged = klein(**changes, contacts__ageing=young | {"time": 1e-15})
+        plain = klein(**changes)
+    else:
+        aged = klein(**changes, contacts__ageing=young | {"time": 1e15, "initial_age": 0.0})
+        changes["contacts__threshold__relative_width"] = 0.1
+        plain = klein(
+            **changes, contacts__static_force=0.8 * STATIC, contacts__back_force_ratio=0.1 / 0.8
+        )
+    one, other = mesoslip.run(aged), mesoslip.run(plain)
+    # The master equation has other steps: those of the old, and shorter ones in the hold.
+    bound = 1e-9 if engine == "eq" else {"old": 1e-3, "young": 1e-2}[limit]
+    assert float(one["breaks"][0]) == pytest.approx(float(other["breaks"][0]), rel=bound)
+    difference = np.abs(one["contact_force"] - other["contact_force"]).values
+    assert np.max(difference) < bound * STATIC
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_prescribed_with_reversals_converges_to_events(klein, law):
+    config = klein(
+        **PRESCRIBED | staged(),
+        contacts__count=12,
+        contacts__threshold__relative_width=0.2,
+        contacts__delay=2e-3,
+        contacts__ageing=LAWS[law],
+    )
+    events = breaks(config)
+    assert len(events) > 60
+    force = mesoslip.run(config)["contact_force"].values[0]
+    errors = []
+    for step in (4e-6, 1e-6):
+        trace, contacts = fixed_step(config, step)
+        assert [one for _, one in contacts.events] == [one for _, one in events]
+        late = [one[0] - other[0] for one, other in zip(contacts.events, events, strict=True)]
+        assert np.max(np.abs(late)) < 6 * step
+        errors.append(np.median(np.abs(trace[:, 5] - force)) / STATIC)
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] > 2.5
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_rigid_with_reversals_converges_to_events(klein, law):
+    config = klein(
+        **staged(10.0),
+        contacts__coupling="equal",
+        contacts__count=12,
+        contacts__threshold__relative_width=0.2,
+        contacts__delay=2e-3,
+        contacts__ageing=LAWS[law],
+    )
+    tree = mesoslip.run(config)
+    events = breaks(config)
+    # Among them are breaks both ways and in the hold; what follows is sensitive to rounding.
+    first = 40
+    late = []
+    for step in (4e-6, 1e-6):
+        _, contacts = fixed_step(config, step)
+        assert [one for _, one in contacts.events[:first]] == [one for _, one in events[:first]]
+        pairs = zip(contacts.events[:first], events[:first], strict=True)
+        late.append(np.max([abs(one[0] - other[0]) for one, other in pairs]))
+        assert late[-1] < 20 * step
+    assert late[0] / late[1] > 2
+    assert float(tree["force_error"][0]) < 1e-10 * STATIC
+    assert abs(float(tree["energy_residual"][0])) < 1e-12
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("velocity", [1e-8, 1e-6, 1e-5, -1e-5])
+def test_a_break_is_where_force_and_threshold_meet(klein, law, velocity):
+    """One contact, born again and again; the times between breaks by root finding."""
+    config = klein(
+        **PRESCRIBED,
+        drive__velocity=velocity,
+        run__duration=20 * STRETCH / abs(velocity),
+        output__interval=STRETCH / abs(velocity),
+        contacts__count=1,
+        contacts__delay=0.0,
+        contacts__threshold__relative_width=0.1,
+        contacts__ageing=LAWS[law],
+    )
+    realization = Realization(config, 0)
+    births, lives = [], []
+    while not realization.finished:
+        realization.advance(1)
+        renewals = realization.contacts["renewals"][0]
+        if renewals > len(births):
+            births.append(realization.time)
+            if len(births) > 1:
+                lives.append(births[-1] - births[-2])
+    assert len(lives) >= 10
+    oracle = Contacts(config)
+    speed = abs(velocity) / STRETCH
+    for number, life in enumerate(lives):
+        oracle.renewal[0] = number + 1
+        z = (oracle.draw(0) - 1) / 0.1
+
+        def gap(time: float, z=z) -> float:
+            mean, width = aged(config, time)
+            return mean + width * z - 0.1 - speed * time
+
+        expected = optimize.brentq(gap, 0.0, 5 / speed, xtol=1e-300, rtol=1e-15)
+        assert life == pytest.approx(expected, rel=1e-11, abs=1e-14 * births[-1])
+
+
+def test_contacts_that_weaken_break_at_rest(klein):
+    """Stretched to between the old and the young threshold they let go in the hold, when due."""
+    stages = [
+        {"duration": 1e-3, "velocity": 1.2 * STRETCH / 1e-3},
+        {"duration": 1.0, "velocity": 0},
+    ]
+    config = klein(
+        **PRESCRIBED,
+        run__duration=None,
+        drive={"stage": stages},
+        output__interval=1e-2,
+        contacts__count=50,
+        contacts__threshold__relative_width=0.05,
+        contacts__reattach=False,
+        contacts__ageing=WEAKEN | {"time": 0.05, "young_relative_width": 0.05, "initial_age": 0.0},
+    )
+    u = Realization(config, 0).contacts["break_stretch"] / (1.5 * STRETCH)
+    expected = [
+        (0.05 * math.log(0.5 * one / (1.2 - one)), contact)
+        for contact, one in enumerate(u)
+        if one < 1.2
+    ]
+    events = breaks(config)
+    assert [one for _, one in events] == [one for _, one in sorted(expected)]
+    assert len(events) == 50
+    times = [time for time, _ in sorted(expected)]
+    np.testing.assert_allclose([time for time, _ in events], times, rtol=1e-11)
+
+
+def steady(law: str, width: float, velocity: float, **changes: object) -> dict[str, object]:
+    """A run from the steady state of the old to that at a velocity."""
+    return {
+        **PRESCRIBED,
+        "drive__velocity": velocity,
+        "contacts__initial": "steady",
+        "contacts__delay": 0.0,
+        "contacts__drag_rate": 0.0,
+        "contacts__threshold": {"law": law, "relative_width": width},
+        "contacts__ageing": RELAX | {"time": 1e-2},
+        **changes,
+    }
+
+
+VELOCITIES = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4]
+
+
+@pytest.mark.parametrize(("law", "width"), [("gaussian", 0.1), ("uniform", 0.2), ("weibull", 0.15)])
+@pytest.mark.parametrize("velocity", VELOCITIES)
+def test_steady_force_of_many_contacts(klein, law, width, velocity):
+    """Block averages of N contacts against the integral over first passages."""
+    period = STRETCH / velocity
+    config = klein(
+        **steady(law, width, velocity, contacts__count=1000, run__seed=7),
+        run__duration=90 * period,
+        output__interval=0.01 * period,
+    )
+    force = mesoslip.run(config)["contact_force"].values[0][1000:9000]
+    blocks = force.reshape(20, -1).mean(axis=1)
+    error = blocks.std(ddof=1) / math.sqrt(20)
+    assert error < 2e-3 * STATIC
+    assert abs(blocks.mean() - ageing_force(config, velocity)) < 4 * error
+
+
+@pytest.mark.parametrize(
+    ("law", "width", "resolution", "bound"),
+    [("gaussian", 0.1, 0.05, 1e-6), ("uniform", 0.2, 0.1, 3e-5), ("weibull", 0.15, 0.1, 1e-5)],
+)
+@pytest.mark.parametrize("velocity", VELOCITIES)
+def test_steady_force_of_the_master_equation(klein, law, width, resolution, bound, velocity):
+    """To six digits; the error falls with the square of the resolution."""
+    period = STRETCH / velocity
+    config = klein(
+        **steady(law, width, velocity, run__engine="me", run__resolution=resolution),
+        run__duration=25 * period,
+        output__interval=0.003 * period,
+    )
+    tree = mesoslip.run(config)
+    force = tree["contact_force"].values[0][-2000:]
+    assert force.mean() == pytest.approx(ageing_force(config, velocity), rel=bound)
+    assert abs(float(tree["energy_residual"][0])) < 1e-6
+
+
+@pytest.mark.parametrize("law", ["gaussian", "uniform", "lognormal", "weibull", "exponential"])
+def test_steady_force_of_info_is_that_of_the_integral(klein, law):
+    config = klein(**steady(law, 0.3, 1e-6))
+    for velocity in VELOCITIES:
+        assert steady_force(config, velocity) == pytest.approx(
+            ageing_force(config, velocity), rel=1e-11
+        )
+    assert steady_force(config, 0.0) == pytest.approx(steady_force(config, 1e-11), rel=1e-9)
+    assert steady_force(config, math.inf) == pytest.approx(steady_force(config, 1.0), rel=1e-6)
+    assert mean_life(config, 0.0) == pytest.approx(mean_life(config, 1e-11), rel=1e-9)
+    plain = klein(
+        **steady(law, 0.3, 1e-6, contacts__delay=5e-4, contacts__drag_rate=2e11)
+        | {"contacts__ageing": LOG | {"growth": 0.0}}
+    )
+    assert steady_force(plain, 1e-6) == pytest.approx(stationary_force(plain, 1e-6), rel=1e-11)
+
+
+@pytest.mark.parametrize("slider", ["prescribed", "rigid"])
+def test_many_contacts_come_to_the_master_equation(klein, slider):
+    """A velocity step, a hold and a restart: the difference falls as N^(-1/2)."""
+    changes = staged(5.0) | {
+        "contacts__coupling": "equal",
+        "contacts__threshold__relative_width": 0.2,
+        "contacts__ageing": RELAX,
+    }
+    if slider == "prescribed":
+        changes |= PRESCRIBED
+    else:
+        # A spring stiff enough for sliding to be smooth: slips come at random times.
+        changes |= {"slider__stiffness": 5000.0}
+    infinite = mesoslip.run(klein(**changes, run__engine="me", run__resolution=0.1))
+    counts = np.array([100, 400, 1600, 6400])
+    errors = []
+    for count in counts:
+        many = mesoslip.run(klein(**changes, contacts__count=int(count), run__realizations=8))
+        difference = many["contact_force"].values - infinite["contact_force"].values
+        errors.append(np.sqrt(np.mean(difference**2)) / STATIC)
+    slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert -0.58 < slope < -0.42
+    assert errors[-1] < 0.01
+
+
+@pytest.mark.parametrize("engine", ["eq", "me"])
+def test_restart_peak_grows_with_the_logarithm_of_the_hold(klein, engine):
+    """Contacts that have been held for so much longer are stronger by growth ln(10) a decade."""
+    peaks = []
+    for hold in (0.1, 1.0, 10.0, 100.0):
+        stages = [(0.2, 1e-6), (hold, 0.0), (0.02, 1e-6)]
+        config = klein(
+            **PRESCRIBED,
+            run__engine=engine,
+            run__duration=None,
+            drive={
+                "stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]
+            },
+            output__interval=1e-4,
+            contacts__count=4000,
+            contacts__initial="steady",
+            contacts__threshold__relative_width=0.2,
+            contacts__ageing=LOG | {"time": 1e-3, "growth": 0.02},
+        )
+        tree = mesoslip.run(config)
+        restarted = tree["time"].values > 0.2 + hold
+        peaks.append(tree["contact_force"].values[0][restarted].max() / STATIC)
+    steps = np.diff(peaks)
+    assert np.all(steps > 0.01)
+    assert steps[-1] == pytest.approx(steps[-2], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("ageing", "changes", "key", "message"),
+    [
+        (RELAX, {"contacts__coupling": "scaled"}, "contacts.coupling", "must be 'equal'"),
+        (RELAX | {"growth": 0.1}, {}, "contacts.ageing.growth", "is for law = 'log'"),
+        ({"law": "relax", "time": 1.0}, {}, "contacts.ageing.young_force_ratio", "needed"),
+        ({"law": "log", "time": 1.0}, {}, "contacts.ageing.growth", "needed for law = 'log'"),
+        ({"law": "log", "growth": 0.1}, {}, "contacts.ageing.time", "missing"),
+        (LOG | {"law": "linear"}, {}, "contacts.ageing.law", "'relax' or 'log'"),
+        (LOG | {"growth": -0.1}, {}, "contacts.ageing.growth", "greater than or equal"),
+        (LOG | {"time": 0.0}, {}, "contacts.ageing.time", "greater than"),
+        (
+            RELAX | {"young_force_ratio": 0.09},
+            {},
+            "contacts.back_force_ratio",
+            "of the thresholds of young contacts are above the back force",
+        ),
+        (
+            RELAX,
+            {"interaction": {"strength": 0.1, "columns": 60, "rows": 68}},
+            "interaction",
+            "is not for contacts that age",
+        ),
+        (
+            RELAX | {"initial_age": 1.0},
+            {"contacts__initial": "steady"},
+            "contacts.ageing.initial_age",
+            "needs contacts.initial = 'relaxed'",
+        ),
+    ],
+)
+def test_bad_input_is_one_message(klein, ageing, changes, key, message):
+    changes = {"contacts__coupling": "equal"} | changes
+    with pytest.raises(ConfigError) as error:
+        klein(**changes, contacts__ageing=ageing)
+    assert [problem.key for problem in error.value.problems] == [key]
+    assert message in error.value.problems[0].message.replace('"', "'")
+
+
+def test_a_curve_is_refused_and_info_tells_of_young_and_old(klein):
+    config = klein(contacts__coupling="equal", contacts__ageing=RELAX)
+    with pytest.raises(ConfigError, match=r"contacts\.ageing: has no force curve"):
+        mesoslip.curve(config)
+    told = mesoslip.info(config)
+    assert told["young_static_force"].value == pytest.approx(0.5 * STATIC)
+    assert told["young_relative_width"].value == pytest.approx(0.3)
+    assert told["ageing_velocity"].value == pytest.approx(STRETCH / 5e-3)
+    forces = [told[name].value for name in ("F_steady", "F_steady_drive", "F_steady_young")]
+    assert forces == sorted(forces, reverse=True)
+    told = mesoslip.info(klein(contacts__coupling="equal", contacts__ageing=LOG))
+    assert told["growth_per_decade"].value == pytest.approx(0.05 * math.log(10))
+    # Without an end of growing there is no limit of slow sliding.
+    assert "F_steady" not in told

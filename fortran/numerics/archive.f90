@@ -5,7 +5,7 @@
 !> state of another kind, or of another version of the program, is an error and not a wrong result.
 module mesoslip_numerics_archive
    use mesoslip_numerics_accumulator, only: accumulator_type
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    implicit none
    private
@@ -86,6 +86,7 @@ contains
          words(:name_words) = transfer(padded, words, name_words)
          words(name_words + 1:) = [kind, int(extent, i8)]
          call self%reserve(int(heading_words, i8))
+         if (allocated(self%failure)) return
          self%word(self%place + 1:self%place + heading_words) = words
          self%place = self%place + heading_words
          self%length = self%place
@@ -116,6 +117,7 @@ contains
       length = size(words, kind=i8)
       if (self%saving) then
          call self%reserve(length)
+         if (allocated(self%failure)) return
          self%word(self%place + 1:self%place + length) = words
          self%length = self%place + length
       else if (self%place + length <= self%length) then
@@ -150,10 +152,18 @@ contains
 
       integer(i8), parameter :: least = 1024_i8
       integer(i8), allocatable :: longer(:)
+      integer :: stat
 
-      if (.not. allocated(self%word)) allocate (self%word(max(least, more)))
-      if (self%place + more <= size(self%word, kind=i8)) return
-      allocate (longer(max(2_i8 * size(self%word, kind=i8), self%place + more)))
+      stat = 0
+      if (.not. allocated(self%word)) allocate (self%word(max(least, more)), stat=stat)
+      if (stat == 0) then
+         if (self%place + more <= size(self%word, kind=i8)) return
+         allocate (longer(max(2_i8 * size(self%word, kind=i8), self%place + more)), stat=stat)
+      end if
+      if (stat /= 0) then
+         call raise(self%failure, status_memory, "not enough memory for a checkpoint")
+         return
+      end if
       longer(:self%place) = self%word(:self%place)
       call move_alloc(longer, self%word)
    end subroutine reserve

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from mesoslip.errors import FileError
 from mesoslip.output import files, layout
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.stop import StopFlag
 from mesoslip.theory.derived import Derived, derived_quantities
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def simulate(
     *,
     workers: int | None = None,
     progress: Callable[[float], None] | None = None,
-    stop: threading.Event | None = None,
+    stop: StopFlag | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Results:
     """Simulate; what came out as tables, to build a tree of or to write to a file.

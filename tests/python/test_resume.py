@@ -179,6 +179,9 @@ def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
     results = advanced(config, tmp_path, None, told)
     assert "damaged" in told[0]
     assert len(told) == (3 if damage == "no rows" else 1)
+    # Nothing is thrown away: what was damaged may be of use to somebody.
+    kept = tmp_path.with_name(f"{tmp_path.name}.old") if damage == "no rows" else tmp_path
+    assert (kept / "damaged.state.npz").exists()
     assert_same(whole("rigid"), layout.build_tree(results))
 
 
@@ -208,11 +211,67 @@ def test_another_configuration_or_program_is_refused(tmp_path, monkeypatch):
 def test_two_runs_of_one_output_are_refused(tmp_path):
     config = configuration("rigid")
     realization = Realization(config, 0)
-    realization.advance(10)
-    with Checkpoint(tmp_path, config) as one, Checkpoint(tmp_path, config, resume=True) as other:
-        assert one.write([realization])
+    folder = tmp_path / "checkpoint"
+    with Checkpoint(folder, config) as one, Checkpoint(folder, config, resume=True) as other:
+        one.restore([realization])
         with pytest.raises(FileError, match="under way"):
             other.restore([Realization(config, 0)])
+    assert not folder.exists()
+
+
+def test_a_run_that_starts_anew_keeps_what_was_there(tmp_path):
+    """Who forgot --resume, and stops the new run, has lost nothing."""
+    config, told = configuration("rigid"), []
+    folder = tmp_path / "c"
+    advanced(config, folder, 500, told)
+    with Checkpoint(folder, config, tell=told.append) as checkpoint:
+        checkpoint.restore([Realization(config, 0)])
+        assert not (folder / "state.npz").exists()
+    assert "c.old" in told[-1]
+    (tmp_path / "c.old").rename(folder)
+    told.clear()
+    assert_same(whole("rigid"), layout.build_tree(advanced(config, folder, None, told)))
+    assert told == []
+    with Checkpoint(folder, config) as checkpoint:
+        checkpoint.remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_realizations_that_wait_for_a_worker_do_not_hold_up_checkpoints(tmp_path):
+    """Taken up by fewer workers than before."""
+    config, told = configuration("rigid, three realizations"), []
+    advanced(config, tmp_path, 50, told)
+    with Checkpoint(tmp_path, config, interval=1e-9, resume=True) as checkpoint:
+        realizations = [Realization(config, number) for number in range(3)]
+        checkpoint.restore(realizations)
+        before = (tmp_path / "state.npz").stat().st_ino
+        for _ in range(3):
+            realizations[0].advance(10)
+            checkpoint.visit(realizations[0])
+            checkpoint.look(realizations)
+        assert (tmp_path / "state.npz").stat().st_ino != before
+
+
+def test_whatever_ends_a_run_leaves_a_checkpoint(klein, tmp_path):
+    """Such as a progress bar that finds no terminal any more."""
+    config = klein(run__duration=10_000.0, output__interval=1.0)
+
+    def no_terminal(part: float) -> None:
+        if part > 0:
+            raise BrokenPipeError
+
+    with Checkpoint(tmp_path / "c", config) as checkpoint, pytest.raises(BrokenPipeError):
+        run_realizations(config, progress=no_terminal, checkpoint=checkpoint)
+    assert (tmp_path / "c" / "state.npz").exists()
+
+
+def test_contacts_of_a_finished_run_are_gone():
+    one = Realization(configuration("rigid"), 0)
+    while not one.finished:
+        one.advance()
+    one.close()
+    with pytest.raises(RunError, match="over"):
+        _ = one.contacts
 
 
 def test_states_are_whole_at_any_moment(tmp_path):
@@ -338,8 +397,8 @@ def test_killed_runs_go_on(long_run, tmp_path):
         if process.poll() is None and kills < 5:
             process.send_signal(signal.SIGTERM if kills == 2 else signal.SIGKILL)
             kills += 1
-        process.communicate()
-        assert process.returncode in {0, -signal.SIGKILL, 128 + signal.SIGTERM}
+        _, told = process.communicate()
+        assert process.returncode in {0, -signal.SIGKILL, 128 + signal.SIGTERM}, told
     assert kills >= 3
     assert not folder.exists()
     assert_same(read_whole(expected), read_whole(output))
@@ -365,6 +424,6 @@ def test_ctrl_c_tells_how_to_go_on(long_run, tmp_path):
     again.kill()
     again.communicate()
     process = start(long_run, output, "--resume")
-    process.communicate()
-    assert process.returncode == 0
+    _, told = process.communicate()
+    assert process.returncode == 0, told
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.toml", "stopped.nc"]

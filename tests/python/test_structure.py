@@ -16,11 +16,16 @@ FORTRAN = ROOT / "fortran"
 MAY_USE: dict[str, set[str]] = {
     "numerics": set(),
     "interface_law": {"numerics"},
-    "contacts": {"numerics", "interface_law"},
-    "sliders": {"numerics", "interface_law"},
-    "recording": {"numerics", "interface_law", "contacts", "sliders"},
+    "schedule": {"numerics", "interface_law"},
+    "watch": {"numerics"},
+    "contacts": {"numerics", "interface_law", "schedule"},
+    "sliders": {"numerics", "interface_law", "schedule", "watch"},
+    "recording": {"numerics", "interface_law", "schedule", "watch", "contacts", "sliders"},
     "theory": {"numerics", "contacts"},
-    "simulation": {"numerics", "interface_law", "contacts", "sliders", "recording"},
+    "simulation": {
+        *("numerics", "interface_law", "schedule", "watch"),
+        *("contacts", "sliders", "recording"),
+    },
     "handles": {"numerics", "simulation"},
     "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "simulation", "handles"},
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import typer
 
@@ -29,9 +29,26 @@ def progress_shown(quiet: bool) -> Iterator[Callable[[float], None]]:
     )
 
     columns = (TextColumn("simulating"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda part: bar.update(task, completed=part)
+    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = bar.add_task("", total=1.0)
+
+    def tell(part: float) -> None:
+        with suppress(OSError):
+            bar.update(task, completed=part)
+
+    with suppress(OSError):
+        bar.start()
+    try:
+        yield tell
+    finally:
+        with suppress(OSError):
+            bar.stop()
+
+
+def say(text: str) -> None:
+    """Tell the user, if there still is a terminal: a run does not end because nobody listens."""
+    with suppress(OSError):
+        typer.echo(text, err=True)
 
 
 def _lines() -> Callable[[float], None]:
@@ -45,6 +62,6 @@ def _lines() -> Callable[[float], None]:
         if int(10 * part) > told and passed > 2:
             told = int(10 * part)
             left = passed * (1 - part) / part
-            typer.echo(f"{10 * told} % after {passed:.0f} s, {left:.0f} s left", err=True)
+            say(f"{10 * told} % after {passed:.0f} s, {left:.0f} s left")
 
     return tell

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mesoslip.command_line.options import ConfigArgument, SetOption
-from mesoslip.command_line.progress import progress_shown
+from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.command_line.signals import Stop, stopped_by_signals
-from mesoslip.errors import FileError, MesoslipError
+from mesoslip.errors import FileError
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -64,13 +64,13 @@ def run(
     files.check_writable(path, [config])
 
     def tell(text: str) -> None:
-        typer.echo(f"{path}: {text}", err=True)
+        say(f"{path}: {text}")
 
     with (
         Checkpoint(
             checkpoint_folder(path), checked, interval=checkpoint_interval, resume=resume, tell=tell
         ) as checkpoint,
-        stopped_by_signals(tell) as stop,
+        stopped_by_signals() as stop,
     ):
         with progress_shown(quiet) as progress:
             results = api.simulate(
@@ -80,7 +80,7 @@ def run(
             raise typer.Exit(_keep(results, path, stop, checkpoint))
         try:
             files.write_results(results, path)
-        except MesoslipError as error:
+        except FileError as error:
             if checkpoint.write(results.realizations):
                 raise FileError(
                     f"{error}; the results are kept in {checkpoint.folder}: the same command with "
@@ -109,9 +109,12 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
         told += "; the same command with --resume goes on from there"
     # Who is being shut down has no time for a file that the checkpoint makes superfluous.
     if stop.signal in {None, signal.SIGINT} or not is_kept:
-        files.write_results(results, _partial(path))
-        told += f"; what there is, is in {_partial(path)}"
-    typer.echo(f"{path}: {told}", err=True)
+        try:
+            files.write_results(results, _partial(path))
+            told += f"; what there is, is in {_partial(path)}"
+        except FileError as error:
+            told += f"; {error}"
+    say(f"{path}: {told}")
     return stop.exit_status
 
 
@@ -124,13 +127,12 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
     if config.has_avalanches:
         count = sum(one.avalanche_count for one in results.realizations)
         found = f"{count} avalanches, {found}"
-    typer.echo(
+    say(
         f"{path}: {told['break_count']:.0f} breaks, {found}, "
         f"energy balance to {abs(told['energy_residual']):.0e}, "
         f"{told['wall_seconds']:.2f} s",
-        err=True,
     )
     if told["audit"] != "passed":
-        typer.echo(f"{path}: warning: {told['audit']}", err=True)
+        say(f"{path}: warning: {told['audit']}")
     if told["ending"] != ENDINGS[1]:
-        typer.echo(f"{path}: the run ended as follows: {told['ending']}", err=True)
+        say(f"{path}: the run ended as follows: {told['ending']}")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import signal
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+from mesoslip.simulation.stop import StopFlag
 
 # Exit status of a program that a signal has ended, less the number of the signal.
 SIGNALLED = 128
@@ -14,13 +15,12 @@ SIGNALLED = 128
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-class Stop(threading.Event):
+class Stop(StopFlag):
     """Set by the first signal that stops a run; later ones find that it is on its way."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.signal: signal.Signals | None = None
-        self._tell = tell
 
     @property
     def exit_status(self) -> int:
@@ -30,15 +30,13 @@ class Stop(threading.Event):
         """What happens at a signal: files that are being written become whole all the same."""
         if self.signal is None:
             self.signal = signal.Signals(number)
-        else:
-            self._tell("stopping: what there is, is being saved")
         self.set()
 
 
 @contextmanager
-def stopped_by_signals(tell: Callable[[str], None]) -> Iterator[Stop]:
+def stopped_by_signals() -> Iterator[Stop]:
     """Have Ctrl-C, SIGTERM and SIGHUP set an event instead of cutting off what is under way."""
-    stop = Stop(tell)
+    stop = Stop()
     before = {number: signal.getsignal(number) for number in STOPPING}
     # Who runs a program with nohup does not want to have it ended so.
     heard = [number for number in STOPPING if before[number] is not signal.SIG_IGN]

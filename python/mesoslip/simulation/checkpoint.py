@@ -16,9 +16,9 @@ import os
 import shutil
 import threading
 import time
-import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -38,6 +38,8 @@ FORMAT = 1
 
 # Wall time between two checkpoints [s].
 INTERVAL = 60.0
+# Time after which a full disk or the like is tried again [s].
+RETRY = 10.0
 # What may wait in memory before it is put into the files [bytes].
 MOST_WAITING = 64e6
 
@@ -94,6 +96,9 @@ class Checkpoint:
         self._interval = interval
         self._resume = resume
         self._tell = tell
+        # What runs now, not what is installed by the time of a checkpoint.
+        self._program = _program()
+        self._paths = {table: folder / f"{table}.rows" for table in TABLES}
         self._sizes = dict.fromkeys(TABLES, 0)
         self._saved: dict[int, tuple[int, Saved]] = {}
         self._grown: dict[int, Realization] = {}
@@ -103,6 +108,7 @@ class Checkpoint:
         self._before = 0.0
         self._lock_file: io.TextIOBase | None = None
         self._is_failing = False
+        self._last_failure = -RETRY
 
     def __enter__(self) -> Self:
         return self
@@ -128,7 +134,9 @@ class Checkpoint:
     def look(self, realizations: Sequence[Realization]) -> None:
         """Now and then: begin a checkpoint when it is time, finish one that all are saved for."""
         if self._epoch > self._written:
-            running = [one for one in realizations if one.advances > 0 and not one.finished]
+            # Those of a run that was taken up wait for a worker as they were saved.
+            running = [one for one in realizations if one.is_open and one.advances > 0]
+            running = [one for one in running if not one.finished]
             if all(self._saved.get(one.number, (-1,))[0] == self._epoch for one in running):
                 self._write(realizations)
         elif 0 < self._interval <= time.perf_counter() - self._last:
@@ -136,7 +144,8 @@ class Checkpoint:
         with self._lock:
             grown = list(self._grown.values())
         waiting = sum(rows.waiting_bytes for one in grown for _, rows in one.waiting)
-        if waiting > MOST_WAITING and not self._is_failing:
+        is_time = time.perf_counter() - self._last_failure >= RETRY
+        if waiting > MOST_WAITING and (is_time or not self._is_failing):
             self._attempt(lambda: self._flush(grown))
 
     def write(self, realizations: Sequence[Realization]) -> bool:
@@ -160,35 +169,56 @@ class Checkpoint:
         FileError
             If the checkpoint is of another configuration or program, or in use.
         """
+        with suppress(OSError):
+            self._take_lock()
         there = [name for name in (STATE, PREVIOUS) if (self.folder / name).exists()]
         if not self._resume:
             if there:
-                self._tell(
-                    f"starts anew; {self.folder} is of a run that was stopped, which --resume "
-                    "would go on with"
-                )
+                self._set_aside("starts anew")
             return 0.0
         for name in there:
-            self._take_lock()
             try:
                 return self._read(self.folder / name, realizations)
             except DamagedError as error:
                 self._tell(f"{self.folder / name}: damaged ({error})")
-        self._tell(f"no checkpoint in {self.folder}: starts at the beginning")
+                # It must not take the place of the previous one, which may be whole.
+                (self.folder / name).replace(self.folder / f"damaged.{name}")
+        if there:
+            self._set_aside("no checkpoint can be taken up: starts at the beginning")
+        else:
+            self._tell(f"no checkpoint in {self.folder}: starts at the beginning")
         return 0.0
+
+    def _set_aside(self, what: str) -> None:
+        """Keep what another run has left, and this one does not go on with, under another name."""
+        self.close()
+        shutil.rmtree(self._aside, ignore_errors=True)
+        self.folder.replace(self._aside)
+        self._take_lock()
+        self._tell(
+            f"{what}; the checkpoint of a run that was stopped is kept as {self._aside} until this "
+            f"one is complete (as {self.folder}, --resume goes on with it)"
+        )
+
+    @property
+    def _aside(self) -> Path:
+        return self.folder.with_name(f"{self.folder.name}.old")
 
     def remove(self) -> None:
         """Remove it, when the output is there."""
-        if self.folder.exists():
-            self._take_lock()
-            shutil.rmtree(self.folder, ignore_errors=True)
+        for folder in (self.folder, self._aside):
+            shutil.rmtree(folder, ignore_errors=True)
         self.close()
 
     def close(self) -> None:
-        """Leave it to another run; it stays where it is."""
-        if self._lock_file is not None:
-            self._lock_file.close()
-            self._lock_file = None
+        """Leave it to another run; it stays where it is, unless nothing is in it."""
+        if self._lock_file is None:
+            return
+        with suppress(OSError):
+            if [one.name for one in self.folder.iterdir()] == [LOCK]:
+                shutil.rmtree(self.folder)
+        self._lock_file.close()
+        self._lock_file = None
 
     def _take_lock(self) -> None:
         """Be the only run of this output.
@@ -200,19 +230,26 @@ class Checkpoint:
         """
         if self._lock_file is not None:
             return
-        self.folder.mkdir(parents=True, exist_ok=True)
-        file = (self.folder / LOCK).open("w")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        path = self.folder / LOCK
+        while True:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            file = path.open("w")
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                file.close()
+                raise FileError(
+                    f"{self.folder}: another run of this output is under way; wait for it, or give "
+                    "this one another output (-o)"
+                ) from None
+            except OSError:
+                # A file system without locks: there is nothing to be had.
+                break
+            # Another run may have removed the folder meanwhile.
+            with suppress(OSError):
+                if path.stat().st_ino == os.fstat(file.fileno()).st_ino:
+                    break
             file.close()
-            raise FileError(
-                f"{self.folder}: another run of this output is under way; wait for it, or give "
-                "this one another output (-o)"
-            ) from None
-        except OSError:
-            # A file system without locks: there is nothing to be had.
-            pass
         self._lock_file = file
 
     def _attempt(self, action: Callable[[], None]) -> bool:
@@ -227,6 +264,7 @@ class Checkpoint:
                     "the run goes on, and tries again"
                 )
             self._is_failing = True
+            self._last_failure = time.perf_counter()
             return False
         self._is_failing = False
         return True
@@ -241,7 +279,7 @@ class Checkpoint:
                     rows.store(number, self._append(table, values))
 
     def _append(self, table: str, values: Any) -> Stored:
-        path, place = self.folder / f"{table}.rows", self._sizes[table]
+        path, place = self._paths[table], self._sizes[table]
         data = np.ascontiguousarray(values, dtype=np.float64)
         with path.open("r+b" if place else "wb") as file:
             file.seek(place)
@@ -264,10 +302,10 @@ class Checkpoint:
         # Before rows are put into files, as one that ends meanwhile is saved with more of them.
         with self._lock:
             saved = {number: one for number, (_, one) in self._saved.items()}
-        self._flush([one for one in realizations if one.advances > 0])
+        self._flush([realizations[number] for number in saved])
         for table, size in self._sizes.items():
             if size:
-                with (self.folder / f"{table}.rows").open("r+b") as file:
+                with self._paths[table].open("r+b") as file:
                     file.truncate(size)
                     os.fsync(file.fileno())
         arrays: dict[str, Any] = {}
@@ -285,7 +323,7 @@ class Checkpoint:
                     left -= len(piece)
         for table, pieces in tables.items():
             arrays[f"pieces.{table}"] = np.array(pieces, dtype=np.int64).reshape(-1, 5)
-        header = _program() | {
+        header = self._program | {
             "configuration": self._config.to_toml(),
             "wall_seconds": self._before + time.perf_counter() - self._start,
             "realizations": {
@@ -325,16 +363,21 @@ class Checkpoint:
             with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
                 arrays = {name: file[name] for name in file.files if name != "header"}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
+        # What a damaged archive has the libraries raise is not specified.
+        except Exception as error:
             raise DamagedError(str(error) or type(error).__name__) from error
         self._compare(header)
+        if missing := {f"pieces.{table}" for table in TABLES} - arrays.keys():
+            raise DamagedError(f"without {min(missing)}")
         sizes = dict.fromkeys(TABLES, 0)
         tables: dict[int, dict[str, Rows]] = {}
         for text, kept in header["realizations"].items():
             columns = kept["scalars"]["columns"]
             tables[int(text)] = {table: Rows(columns[table]) for table in columns}
         for table in TABLES:
-            file_path = self.folder / f"{table}.rows"
+            file_path = self._paths[table]
             for number, place, length, columns, checksum in arrays[f"pieces.{table}"].tolist():
                 stored = Stored(file_path, place, (length, columns), checksum)
                 tables[number][table].add(stored)
@@ -361,11 +404,10 @@ class Checkpoint:
         FileError
             If it is of another configuration or program.
         """
-        mine = _program()
         advice = (
             "; run without --resume to start anew, or give another output (-o) to keep this one"
         )
-        for name, value in mine.items():
+        for name, value in self._program.items():
             if header.get(name) != value:
                 raise FileError(
                     f"{self.folder}: the checkpoint was made with {name} {header.get(name)} of "

@@ -76,6 +76,8 @@ class Kernel:
         _core.open_simulation(self._handle)
         # The finalizer holds the handle, not this object.
         self._free = weakref.finalize(self, _core.close_simulation, self._handle)
+        # Not at exit, when a thread may still be at work with it.
+        self._free.atexit = False
 
     def _call(self, procedure: Any, *arguments: Any) -> tuple[Any, ...]:
         if not self._lock.acquire(blocking=False):

@@ -226,6 +226,11 @@ class Realization:
             self._kernel = None
 
     @property
+    def is_open(self) -> bool:
+        """Whether it has a kernel, which may be at work."""
+        return self._kernel is not None
+
+    @property
     def finished(self) -> bool:
         """Whether the run is over."""
         return bool(self.ending)
@@ -260,7 +265,15 @@ class Realization:
     @property
     def contacts(self) -> dict[str, Array]:
         """Of each of N contacts: origin [m], stiffness [N/m], 0 if it is detached, breaking stretch
-        [m], number of renewals."""
+        [m], number of renewals.
+
+        Raises
+        ------
+        RunError
+            If the run is over and the memory of the kernel was given back.
+        """
+        if self.finished and self._kernel is None:
+            raise RunError(f"realization {self.number}: the run is over, and its contacts are gone")
         names = ("origin", "stiffness", "break_stretch", "renewals")
         return dict(zip(names, self._open().contacts(self.config.contacts.count), strict=True))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.stop import StopFlag
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -22,6 +22,7 @@ TOO_MUCH = (
     "not enough memory for what is recorded: a larger output.avalanche_size or "
     "output.snapshot_size, or a longer output.interval, takes less"
 )
+
 
 # How often the main thread looks at what the others do [s].
 LOOK_SECONDS = 0.1
@@ -43,7 +44,7 @@ def run_realizations(
     *,
     workers: int | None = None,
     progress: Callable[[float], None] | None = None,
-    stop: threading.Event | None = None,
+    stop: StopFlag | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Results:
     """Run all realizations of a configuration on threads.
@@ -71,7 +72,7 @@ def run_realizations(
     """
     workers = _checked_workers(workers)
     start = time.perf_counter()
-    stop = stop or threading.Event()
+    stop = stop or StopFlag()
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
     before = checkpoint.restore(realizations) if checkpoint is not None else 0.0
 
@@ -94,22 +95,29 @@ def run_realizations(
         if checkpoint is not None:
             checkpoint.look(realizations)
 
+    has_failed = False
     with ThreadPoolExecutor(min(workers, len(realizations))) as pool:
-        pending = {pool.submit(finish, one) for one in realizations if not one.finished}
+        pending: set[Future[None]] = set()
         try:
+            pending = {pool.submit(finish, one) for one in realizations if not one.finished}
             while pending:
                 done, pending = wait(pending, LOOK_SECONDS, return_when="FIRST_EXCEPTION")
                 look(done)
         except KeyboardInterrupt:
             pass
+        except RunError:
+            has_failed = True
+            raise
         finally:
             stop.set()
             for future in pending:
                 future.cancel()
-    complete = all(one.finished for one in realizations)
-    if checkpoint is not None and not complete:
-        checkpoint.write(realizations)
-    return Results(config, realizations, complete, before + time.perf_counter() - start)
+            wait(pending)
+            # Whatever ends the run: what there is can be taken up, unless it cannot go on.
+            is_complete = all(one.finished for one in realizations)
+            if checkpoint is not None and not (has_failed or is_complete):
+                checkpoint.write(realizations)
+    return Results(config, realizations, is_complete, before + time.perf_counter() - start)
 
 
 def _checked_workers(workers: int | None) -> int:

@@ -76,7 +76,7 @@ COLUMNS = {
 TABLES = tuple(COLUMNS)
 
 
-@dataclass
+@dataclass(slots=True)
 class Stored:
     """Rows in a file."""
 

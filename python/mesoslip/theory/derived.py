@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing
-from mesoslip.theory.ageing import mean_life, steady_force
 from mesoslip.theory.lives import scales
 
 
@@ -126,6 +125,9 @@ def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
 def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, str]]:
     """What follows from the lives of contacts that age: of the young, of the old, and at the
     velocity of the drive."""
+    # With scipy, which takes long to import.
+    from mesoslip.theory.ageing import mean_life, steady_force
+
     contacts, width = config.contacts, config.contacts.threshold.relative_width
     weakest, mean, strongest = ageing.threshold([1 - width, 1.0, 1 + width], width, 0.0)
     yield (

@@ -6,8 +6,9 @@
 !> - a threshold that grows is never below what it is now, so contacts are queued by where they
 !>   break with a threshold of some time ago. Those whose place in the queue comes into reach lead:
 !>   they have their thresholds of now, and where they break is foreseen from the motion of the
-!>   slider, by Newton's method, and held back by what is not known of this motion. A slider that comes to
-!>   where a leader was to break finds it there, or a little ahead of it and foresees again;
+!>   slider, by Newton's method, and held back by what is not known of this motion. A slider that
+!>   comes to where a leader was to break finds it there, or a little ahead of it and foresees
+!>   again;
 !> - a threshold that falls is bounded by what it will be at the end of the window, which is where
 !>   and when the contact is foreseen to break, whether the slider moves or not. Few contacts do so
 !>   in most cases; of many, those are near that may break before the next scan.

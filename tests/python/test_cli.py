@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import signal
 import subprocess
@@ -269,3 +270,12 @@ def test_a_curve_has_no_slips(short, tmp_path, command):
     status, _, told = command("slips", output)
     assert status == 2
     assert "not an output of mesoslip run" in told
+
+
+def test_json_has_no_number_that_is_not_finite(capsys):
+    """Such as a verdict that cannot be computed: null, which every reader of JSON knows."""
+    from mesoslip.command_line.options import print_json
+
+    print_json({"a": [1.5, math.nan, (math.inf,)], "b": {"c": -math.inf, "d": None, "e": True}})
+    told = json.loads(capsys.readouterr().out)
+    assert told == {"a": [1.5, None, [None]], "b": {"c": None, "d": None, "e": True}}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, OutputArgument, show
+from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show
 
 # Scale and unit of the statistics of slips: those of the table above them.
 SHOWN = {
@@ -40,7 +39,7 @@ def slips(
         catalogue.write_csv(tree, table)
     rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
     if as_json:
-        typer.echo(json.dumps({"slips": rows, "statistics": statistics}, indent=2))
+        print_json({"slips": rows, "statistics": statistics})
         return
     typer.echo(
         "  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s"
@@ -117,7 +116,7 @@ def avalanches(
         sizes, part = ccdf(data["size"].values)
         cumulative = {"size": sizes.tolist(), "part_at_least": part.tolist()}
         answer = {"statistics": statistics, "distribution": distribution, "ccdf": cumulative}
-        typer.echo(json.dumps(answer, indent=2))
+        print_json(answer)
         return
     typer.echo("       from         to      count        P(s)       error")
     for one in distribution:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -29,3 +31,18 @@ def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None
     else:
         shown = f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
     typer.echo(f"{name:22} {shown:20} {meaning}")
+
+
+def print_json(value: object) -> None:
+    """Print JSON, which has no numbers that are not finite: they are null."""
+    typer.echo(json.dumps(_finite(value), indent=2, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return value

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import ConfigArgument, JsonOption, SetOption, show
+from mesoslip.command_line.options import (
+    ConfigArgument,
+    JsonOption,
+    SetOption,
+    print_json,
+    show,
+)
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -27,7 +32,7 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         checked = Config.load(config, changes or ())
     quantities = derived_quantities(checked)
     if as_json:
-        typer.echo(json.dumps({name: one.value for name, one in quantities.items()}, indent=2))
+        print_json({name: one.value for name, one in quantities.items()})
         return
     for name, one in quantities.items():
         show(name, one.value, one.unit, one.meaning)
@@ -59,7 +64,7 @@ def curve(
         files.write(force_curve.to_tree(), output)
     summary = force_curve.summary()
     if as_json:
-        typer.echo(json.dumps(summary, indent=2))
+        print_json(summary)
     else:
         for name, value in summary.items():
             show(name, value, *SUMMARY[name])
@@ -96,7 +101,7 @@ def onset(
     summary = {name: tree.attrs[name] for name in SUMMARY if name in tree.attrs}
     summary["stable"] = tree.attrs["stable"] == "true"
     if as_json:
-        typer.echo(json.dumps(summary, indent=2))
+        print_json(summary)
         return
     for name, value in summary.items():
         show(name, value, *SUMMARY[name])

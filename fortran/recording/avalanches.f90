@@ -92,7 +92,8 @@ contains
       integer :: room
 
       self%parameters = parameters
-      self%snapshot_time = snapshot_time
+      if (allocated(self%snapshot_time)) deallocate (self%snapshot_time)
+      allocate (self%snapshot_time, source=snapshot_time)
       room = 0
       if (parameters%least_size > 0.0_wp) room = first_avalanches
       call self%catalogue%open(avalanche_length, room)

@@ -185,6 +185,39 @@ def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
     assert_same(whole("rigid"), layout.build_tree(results))
 
 
+def test_whatever_damage_a_state_has_the_one_before_is_taken(tmp_path):
+    """Also to the headings of the archive, of which the libraries raise all kinds of errors."""
+    config = configuration("rigid")
+    folder = tmp_path / "c"
+    advanced(config, folder, 50, [])
+    advanced(config, folder, 50, [])
+    data, before = (folder / "state.npz").read_bytes(), (folder / "state.previous.npz").read_bytes()
+    random = np.random.default_rng(1)
+    headings = [*range(120), *range(len(data) - 800, len(data))]
+    for place in random.choice(headings, 60, replace=False):
+        flipped = bytes([data[place] ^ (1 << int(random.integers(8)))])
+        (folder / "state.npz").write_bytes(data[:place] + flipped + data[place + 1 :])
+        (folder / "state.previous.npz").write_bytes(before)
+        realization = Realization(config, 0)
+        with Checkpoint(folder, config, resume=True) as checkpoint:
+            checkpoint.restore([realization])
+        assert realization.advances in {50, 100}
+
+
+def test_what_cannot_be_read_is_not_taken_for_damaged(tmp_path):
+    """Nor is the checkpoint touched: the disk may be there again in a moment."""
+    config = configuration("rigid")
+    advanced(config, tmp_path, 50, [])
+    (tmp_path / "state.npz").rename(tmp_path / "kept")
+    (tmp_path / "state.npz").mkdir()
+    with (
+        Checkpoint(tmp_path, config, resume=True) as checkpoint,
+        pytest.raises(FileError, match="cannot be read"),
+    ):
+        checkpoint.restore([Realization(config, 0)])
+    assert (tmp_path / "state.npz").exists()
+
+
 def test_rows_that_were_changed_are_told(tmp_path):
     config, told = configuration("rigid"), []
     advanced(config, tmp_path, 2000, told)

@@ -360,11 +360,13 @@ class Checkpoint:
             If it is of another configuration or program.
         """
         try:
-            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                header = json.loads(str(file["header"]))
-                arrays = {name: file[name] for name in file.files if name != "header"}
+            data = path.read_bytes()
         except OSError as error:
             raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as file:
+                header = json.loads(str(file["header"]))
+                arrays = {name: file[name] for name in file.files if name != "header"}
         # What a damaged archive has the libraries raise is not specified.
         except Exception as error:
             raise DamagedError(str(error) or type(error).__name__) from error

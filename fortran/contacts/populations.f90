@@ -655,7 +655,8 @@ contains
 
       real(wp) :: moments(moments_length), loss(moments_length), distance, force, broken, next
       real(wp) :: most, edge, start
-      integer :: place, row
+      integer :: place, row, trial, listed
+      logical :: breaks
 
       start = before%displacement
       row = merge(row_ahead, row_behind, sense > 0.0_wp)
@@ -664,7 +665,6 @@ contains
       most = 0.0_wp
       onset = displacement
       edge = sense * start + tiny_gap * self%step
-      self%trials = 0
       if (allocated(self%trial_population)) then
          if (size(self%trial_population) < self%count) then
             deallocate (self%trial_population, self%trial_broken, self%trial_moments, &
@@ -683,12 +683,17 @@ contains
       self%trial_breaks = 0.0_wp
       self%trial_mass = 0.0_wp
       self%trial_work = 0.0_wp
+      ! Which ones break is as good as random: they are listed without a branch.
+      listed = 0
       do place = 1, self%count
-         if (sense * (self%population(place, row) - displacement) >= 0.0_wp &
-            & .and. .not. falls_at_rest(place)) then
-            next = min(next, sense * self%population(place, row))
-            cycle
-         end if
+         breaks = sense * (self%population(place, row) - displacement) < 0.0_wp
+         if (self%some_fall) breaks = breaks .or. falls_at_rest(place)
+         self%trial_population(listed + 1) = place
+         listed = listed + merge(1, 0, breaks)
+         next = min(next, merge(huge(1.0_wp), sense * self%population(place, row), breaks))
+      end do
+      do trial = 1, listed
+         place = self%trial_population(trial)
          force = sense * self%population(place, row_force)
          distance = sense * (displacement - self%population(place, row_origin)) / self%stretch
          if (self%ages) then
@@ -698,22 +703,20 @@ contains
             broken = max(self%population(place, row_broken), &
                & broken_threshold(self%parameters%coupling, force, distance))
          end if
-         call self%moments(nint(self%population(place, row_law)))%interpolate(broken, moments)
+         call self%moments(int(self%population(place, row_law)))%interpolate(broken, moments)
          moments = min(self%population(place, row_weight) * moments, &
             & self%population(place, row_moments + 1:))
          loss = self%population(place, row_moments + 1:) - moments
-         self%trials = self%trials + 1
-         self%trial_population(self%trials) = place
-         self%trial_broken(self%trials) = broken
-         self%trial_moments(:, self%trials) = moments
-         self%trial_lost(self%trials) = loss(lost)
-         if (self%ages) self%trial_lost(self%trials) = loss(lost) + loss(number) &
+         self%trial_broken(trial) = broken
+         self%trial_moments(:, trial) = moments
+         self%trial_lost(trial) = loss(lost)
+         if (self%ages) self%trial_lost(trial) = loss(lost) + loss(number) &
             & * more_lost(place, broken, distance + force)
          self%trial_breaks = self%trial_breaks + loss(number)
          self%trial_mass = self%trial_mass + loss(massive)
          self%trial_work = self%trial_work + 0.5_wp * (loss(stiff) * distance**2 &
             & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 &
-            & - self%trial_lost(self%trials))
+            & - self%trial_lost(trial))
          if (sense * self%population(place, row) > edge) then
             late = late + loss(number)
             if (loss(number) > most) then
@@ -722,6 +725,7 @@ contains
             end if
          end if
       end do
+      self%trials = listed
       self%trial_work = self%trial_work * self%parameters%static_force * self%stretch
       self%trial_next = sense * next
       if (self%trials == 0) then

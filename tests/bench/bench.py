@@ -56,7 +56,7 @@ def goal(case: str, count: int, cost: float) -> str:
 
 
 class Measured(Realization):
-    """A realization whose kernel seconds are those of the processor: other programs do not count."""
+    """A realization whose kernel seconds are those of the processor, whatever else it does."""
 
     def advance(self, advances: int | None = None, *, work: float | None = None) -> None:
         """Go on for one segment."""

@@ -76,7 +76,7 @@ module mesoslip_sliders_rigid
    type, extends(slider_type) :: slider_rigid_type
       !> Mass M [kg], stiffness of the drive's spring K [N/m], damping rate eta_S [1/s]
       real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp, damping = 0.0_wp
-      !> Deceleration by the damper, D = eta_S (V - W), with W the running mean of the velocity [m/s2]
+      !> Deceleration by the damper, D = eta_S (V - W), W being the mean velocity [m/s2]
       real(wp) :: damper = 0.0_wp
       !> Contact force during the last advance, and displacement at its start [m]
       type(interface_law_type), private :: law

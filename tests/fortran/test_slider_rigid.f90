@@ -103,8 +103,8 @@ contains
          & "energy over all crossings")
    end subroutine climbs
 
-   !> The damper leaves the momentum to block and damper alike: M (V + W) is the impulse of the drive,
-   !> its work over its velocity. What the damper takes of the energy is its loss.
+   !> The damper leaves the momentum to block and damper alike: M (V + W) is the impulse of the
+   !> drive, its work over its velocity. What the damper takes of the energy is its loss.
    subroutine damps(rung)
       !> Way from one crossing to the next; it settles whether steps are short or long
       real(wp), intent(in) :: rung

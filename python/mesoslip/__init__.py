@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         read,
         run,
         slips,
+        sweep,
     )
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
@@ -49,6 +50,7 @@ __all__ = [
     "read",
     "run",
     "slips",
+    "sweep",
 ]
 
 # What takes long to import is imported when it is asked for.
@@ -67,6 +69,7 @@ _LAZY = {
     "read": "api",
     "run": "api",
     "slips": "api",
+    "sweep": "api",
 }
 
 

@@ -1,0 +1,1 @@
+"""Campaigns: many runs from one file, their measures in one dataset."""

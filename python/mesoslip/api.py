@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
-from mesoslip.errors import FileError, RunError
+from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output import files, layout
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import Results, checked_workers, run_realizations
@@ -111,7 +111,7 @@ def sweep(
     store: PathLike | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    threads: bool = False,
+    pool: str = "both",
     progress: Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Run a configuration over a range of parameters, and measure each run.
@@ -128,8 +128,9 @@ def sweep(
         depend on it.
     scheduler
         Address of a Dask scheduler, whose workers are to compute the points.
-    threads
-        Whether to use threads of this process rather than processes.
+    pool
+        What points are computed on: "threads", "processes", or "both", that is threads first and
+        processes in a sweep that takes long.
     progress
         Called now and then with the part of the points that are there, 0 to 1.
 
@@ -156,7 +157,7 @@ def sweep(
             store=kept,
             workers=workers,
             scheduler=scheduler,
-            threads=threads,
+            pool=pool,
             progress=progress,
         )
     if done.missing and done.ending != INTERRUPTED:
@@ -189,7 +190,7 @@ def run_plan(
     store: Store | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    threads: bool = False,
+    pool: str = "both",
     progress: Callable[[float], None] | None = None,
     stop: StopFlag | None = None,
 ) -> Sweep:
@@ -197,10 +198,14 @@ def run_plan(
     from mesoslip.campaign import cluster, execution, runner
 
     count = checked_workers(workers)
+    if pool not in execution.POOLS:
+        raise ConfigError(
+            [Problem("", "pool", f"must be one of {', '.join(execution.POOLS)}", pool)]
+        )
     # Before a cluster is asked.
     _ = plan.combinations
     if scheduler is None:
-        executor = execution.on_threads(count) if threads else execution.on_processes(count)
+        executor = execution.on_this_machine(count, pool)
         return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
     with cluster.connected(scheduler) as client:
         executor = cluster.on_dask(client)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mesoslip.campaign.assembly import Assembly
-from mesoslip.campaign.execution import Executor, on_processes
+from mesoslip.campaign.execution import Executor, on_this_machine
 from mesoslip.campaign.plan import Combination, Plan, described
 from mesoslip.campaign.point import Task, point_name, program
 from mesoslip.campaign.store import Points, Store, Stored
@@ -106,7 +106,7 @@ def run_sweep(
     store
         Where points are taken from and kept; nowhere by default.
     executor
-        Where points are computed; on as many processes as there are processors by default.
+        Where points are computed; on as many workers as there are processors by default.
     progress
         Called with the part of the points that are there.
     stop
@@ -119,7 +119,7 @@ def run_sweep(
     FileError
         If the store cannot be read or written; what was written stays.
     """
-    executor = executor or on_processes(os.cpu_count() or 1)
+    executor = executor or on_this_machine(os.cpu_count() or 1)
     stop = stop or StopFlag()
     assembly = Assembly(plan)
     # Points of one name, as of runs that differ by their titles, are one.

@@ -41,9 +41,14 @@ def sweep(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Tell what it will take, and run nothing")
     ] = False,
-    threads: Annotated[
-        bool, typer.Option("--threads", help="Use threads of one process, not processes")
-    ] = False,
+    pool: Annotated[
+        str,
+        typer.Option(
+            help="What points are computed on: threads, processes, or both: threads first, "
+            "processes in a sweep that takes long",
+            metavar="POOL",
+        ),
+    ] = "both",
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
 ) -> None:
     """Run a configuration over a range of parameters, and write the measures of all runs.
@@ -71,7 +76,7 @@ def sweep(
                 store=store,
                 workers=workers,
                 scheduler=scheduler,
-                threads=threads,
+                pool=pool,
                 progress=progress,
                 stop=stop,
             )

@@ -361,7 +361,7 @@ def measured(run: RunView, measure: Measure) -> float:
     except MemoryError:
         raise
     except Exception as error:
-        place = _line(error, measure.path) if measure.path else ""
+        place = f" ({measure.path}{_line(error, measure.path)})" if measure.path else ""
         raise RunError(f"measure {measure.name}{place}: {type(error).__name__}: {error}") from error
     if not isinstance(value, Real):
         raise RunError(f"measure {measure.name}: gave {value!r:.60}, not a number")

@@ -107,13 +107,16 @@ class Store(Points):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / LOCK).open("w")
+        except OSError as error:
+            raise FileError(f"{folder}: cannot be written: {error.strerror}") from None
+        try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self.close()
             raise FileError(f"{folder}: another sweep is at work there") from None
-        except OSError as error:
-            self.close()
-            raise FileError(f"{folder}: cannot be written: {error.strerror}") from None
+        except OSError:
+            # A file system without locks, such as some of networks: there is nothing to be had.
+            pass
         # Nobody else writes here: these are of a process that was killed.
         for path in folder.glob(".*"):
             with suppress(OSError):

@@ -14,7 +14,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from kill_sweep import Study, is_alive, workers_of
+from kill_sweep import Study, is_alive, points_of, workers_of
 from test_sweep import SIMPLE, sweep_file, tables
 
 __all__ = ["sweep_file"]
@@ -50,11 +50,6 @@ SLOW = """
 OWN = "import time\ndef slow(tree):\n    time.sleep(0.1)\n    return 1\n"
 
 
-def points(output: Path) -> list[Path]:
-    folder = output.with_name(f"{output.stem}.points")
-    return [path for path in folder.glob("*.json") if path.name != "sweep.json"]
-
-
 @pytest.mark.parametrize("pool", ["threads", "processes"])
 def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     """It ends at once, with all its workers, and what there is can be looked at."""
@@ -62,7 +57,7 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     output = tmp_path / "out" / "sweep.nc"
     process = begin(sweep_file(SLOW), output, "--pool", pool, "--workers", "2")
     deadline = time.monotonic() + 60
-    while len(points(output)) < 4:
+    while len(points_of(output)) < 4:
         assert time.monotonic() < deadline
         time.sleep(0.02)
     children = workers_of(process.pid)
@@ -73,7 +68,7 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     assert "Traceback" not in told
     assert "the same command does them" in told
     assert not any(map(is_alive, children))
-    kept = len(points(output))
+    kept = len(points_of(output))
     partial = xr.load_dataset(tmp_path / "out" / "sweep.partial.nc")
     assert np.sum(partial["status"].values == 0) == kept
     assert np.sum(partial["status"].values == 2) == 40 - kept
@@ -133,7 +128,7 @@ def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
     assert status == 1
     assert told.count("\n") == 1
     assert "no space left on the disk" in told
-    kept = points(output)
+    kept = points_of(output)
     assert 5 < len(kept) < 60
     assert not output.exists()
     assert not list(small_disk.rglob(".*"))
@@ -174,7 +169,7 @@ def test_an_earlier_output_outlives_a_sweep_that_is_stopped(tmp_path, sweep_file
     output.write_bytes(b"earlier")
     process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
     deadline = time.monotonic() + 60
-    while not points(output):
+    while not points_of(output):
         assert time.monotonic() < deadline
         time.sleep(0.02)
     process.send_signal(signal.SIGTERM)

@@ -15,6 +15,7 @@ tests/python/test_sweep_kill.py.
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -158,12 +159,8 @@ class Study:
 
     def _check_stored(self, output: Path, stored: dict[Path, tuple[int, int]]) -> None:
         """Points that were stored are neither lost nor written again."""
-        folder = output.with_name(f"{output.stem}.points")
-        there = {
-            path: (path.stat().st_ino, path.stat().st_mtime_ns)
-            for path in folder.glob("*.json")
-            if path.name != "sweep.json"
-        }
+        states = {path: path.stat() for path in points_of(output)}
+        there = {path: (state.st_ino, state.st_mtime_ns) for path, state in states.items()}
         for path, state in stored.items():
             if there.get(path) != state:
                 self.wrong.append(f"{path.name} was lost or written again")
@@ -171,15 +168,10 @@ class Study:
 
     def _check_log(self, log: Path, output: Path, last: dict[str, int]) -> None:
         """No point was computed after it had been stored."""
-        import json
-
         for line in log.read_text().splitlines():
             moment, point = line.split()
             last[point] = max(last.get(point, 0), int(moment))
-        folder = output.with_name(f"{output.stem}.points")
-        for path in folder.glob("*.json"):
-            if path.name == "sweep.json":
-                continue
+        for path in points_of(output):
             body = json.loads(path.read_text())
             point = f"{body['point']['contacts.delay']!r}-{body['realization']}"
             if last[point] > path.stat().st_mtime_ns:
@@ -191,6 +183,13 @@ class Study:
         for name in whole.variables:
             if whole[name].values.tobytes() != killed[name].values.tobytes():
                 self.wrong.append(f"{name} differs")
+
+
+def points_of(output: Path) -> list[Path]:
+    """The files of the points of a sweep, without those that are being written."""
+    folder = output.with_name(f"{output.stem}.points")
+    others = (".", "sweep.json")
+    return [path for path in folder.glob("*.json") if not path.name.startswith(others)]
 
 
 def workers_of(process: int) -> list[int]:

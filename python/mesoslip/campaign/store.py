@@ -58,9 +58,11 @@ class Points:
     def names(self) -> set[str]:
         """Names of the points that are there."""
         try:
-            return {path.stem for path in self.folder.glob("*.json") if path.name != MANIFEST}
+            paths = list(self.folder.glob("*.json"))
         except OSError as error:
             raise FileError(f"{self.folder}: cannot be read: {error.strerror}") from None
+        # Without those that are being written.
+        return {path.stem for path in paths if not path.name.startswith((".", MANIFEST))}
 
     def read(self, name: str) -> Stored | None:
         """A point; None if it is not there or damaged.

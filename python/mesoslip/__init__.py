@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
     from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",
@@ -38,6 +39,7 @@ __all__ = [
     "ForceCurve",
     "MesoslipError",
     "RunError",
+    "SteadySliding",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
@@ -57,6 +59,7 @@ __all__ = [
 _LAZY = {
     "Config": "configuration.config",
     "ForceCurve": "theory.force_curve",
+    "SteadySliding": "theory.steady_sliding",
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         onset,
         plot,
         read,
+        regime,
         run,
         slips,
         sweep,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
     from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",
@@ -38,6 +40,7 @@ __all__ = [
     "ForceCurve",
     "MesoslipError",
     "RunError",
+    "SteadySliding",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
@@ -48,6 +51,7 @@ __all__ = [
     "onset",
     "plot",
     "read",
+    "regime",
     "run",
     "slips",
     "sweep",
@@ -57,6 +61,7 @@ __all__ = [
 _LAZY = {
     "Config": "configuration.config",
     "ForceCurve": "theory.force_curve",
+    "SteadySliding": "theory.steady_sliding",
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",
@@ -67,6 +72,7 @@ _LAZY = {
     "onset": "api",
     "plot": "api",
     "read": "api",
+    "regime": "api",
     "run": "api",
     "slips": "api",
     "sweep": "api",

@@ -387,7 +387,7 @@ def plot(
 
     Of a run: spring force with one slip in an inset, velocity, detached contacts; of a slider
     without inertia: force and avalanches; of a force curve: the force and its slope; of an onset of
-    slip: the drop of the spring force.
+    slip: the drop of the spring force; of a sweep: its measures.
 
     Parameters
     ----------

@@ -138,8 +138,6 @@ def _result(client: Client, future: Future[Any]) -> Any:
     """
     from distributed import CancelledError
 
-    if future.status == "cancelled":
-        raise RunError("the scheduler is gone")
     try:
         return future.result(timeout=PATIENCE)
     except CancelledError:

@@ -469,7 +469,7 @@ def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
     np.testing.assert_array_equal(failed, [[False, True], [False, True]])
     assert told.count("failed: contacts.delay") == 2
     assert "failed: contacts.delay = 0.0001 s, realization = 1: measure sometimes" in told
-    assert "own.py, line 13: ValueError: too much" in told
+    assert "own.py, line 13): ValueError: too much" in told
     np.testing.assert_array_equal(np.isnan(data["mean_force"].values), failed)
     assert data.attrs["failures"].count("too much") == 2
     status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
@@ -483,7 +483,7 @@ WRONG = {
     'measures = ["mean_forc"]': "did you mean 'mean_force'",
     'measures = ["nothing.py:here"]': "nothing.py cannot be read: No such file",
     'measures = ["bad.py:here"]': "bad.py, line 2: ZeroDivisionError: division by zero",
-    'measures = ["good.py:ther"]': "has no function 'ther'; did you mean 'there'",
+    'measures = ["good.py:thera"]': "has no function 'thera'; did you mean 'there'",
     "measures = []": "must name at least one measure",
     'measures = ["breaks", "breaks"]': "is named twice",
     'measure = ["breaks"]': "sweep.measure: unknown key; did you mean 'measures'",

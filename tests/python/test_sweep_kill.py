@@ -159,6 +159,7 @@ def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
     assert "no space left on the disk" in told
     kept = points_of(output)
     assert 5 < len(kept) < 60
+    assert f"{len(kept)} points are kept: the same command goes on" in told
     assert not output.exists()
     assert not list(small_disk.rglob(".*"))
     remount = ["mount", "-o", "remount,size=4m", str(small_disk)]

@@ -173,6 +173,28 @@ def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
     return catalogue.slips(_as_tree(output))
 
 
+def regime(output: PathLike | xr.DataTree) -> xr.Dataset:
+    """Which motion each realization of an output shows: smooth, stick-slip, irregular, transient.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``realization``; ``regime`` is 0 smooth, 1 stick-slip, 2 irregular, 3 transient,
+        beside the numbers by which it is judged, see `mesoslip.analysis.regime`.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or is not of a run.
+    """
+    from mesoslip.analysis.regime import regimes
+
+    if isinstance(output, str | os.PathLike):
+        with files.opened_run(Path(output)) as tree:
+            return regimes(tree)
+    return regimes(output)
+
+
 def avalanches(
     output: PathLike | xr.DataTree, *, after: float = 0.0, force_above: float | None = None
 ) -> xr.Dataset:

@@ -22,6 +22,7 @@ COMMANDS = (
     theory.onset,
     catalogues.slips,
     catalogues.avalanches,
+    catalogues.regime,
     pictures.plot,
     pictures.figures,
 )

@@ -87,10 +87,10 @@ def run(
                     "--resume writes them"
                 ) from error
             raise
+        if not quiet:
+            _tell_results(results, checked, path)
         _partial(path).unlink(missing_ok=True)
         checkpoint.remove()
-    if not quiet:
-        _tell_results(results, checked, path)
 
 
 def _partial(path: Path) -> Path:
@@ -119,6 +119,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
 
 
 def _tell_results(results: Results, config: Config, path: Path) -> None:
+    from mesoslip.analysis import regime
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS
 
@@ -132,6 +133,7 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
         f"energy balance to {abs(told['energy_residual']):.0e}, "
         f"{told['wall_seconds']:.2f} s",
     )
+    say(f"{path}: {regime.told(list(regime.regimes_of_results(results)))}")
     if told["audit"] != "passed":
         say(f"{path}: warning: {told['audit']}")
     if told["ending"] != ENDINGS[1]:

@@ -411,9 +411,21 @@ def read(path: str | Path) -> xr.DataTree:
 def read_run(path: str | Path) -> xr.DataTree:
     """Read an output of ``mesoslip run`` into memory; see `read`."""
     tree = read(path)
+    _check_run(tree, path)
+    return tree
+
+
+@contextmanager
+def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
+    """An output of ``mesoslip run``, of which only what is used is read; see `opened`."""
+    with opened(path) as tree:
+        _check_run(tree, path)
+        yield tree
+
+
+def _check_run(tree: xr.DataTree, path: str | Path) -> None:
     if "spring_force" not in tree.data_vars:
         raise FileError(f"{path}: not an output of mesoslip run")
-    return tree
 
 
 def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mesoslip.api import (
         avalanche_summary,
         avalanches,
+        claims,
         curve,
         figures,
         group,
@@ -41,6 +42,7 @@ __all__ = [
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "claims",
     "curve",
     "figures",
     "group",
@@ -60,6 +62,7 @@ _LAZY = {
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",
+    "claims": "api",
     "curve": "api",
     "figures": "api",
     "group": "api",

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
+    from mesoslip.campaign.claims import Judgement
+
 PathLike = str | os.PathLike[str]
 
 
@@ -329,3 +331,23 @@ def figures(
     from mesoslip.plots import source_figures
 
     return source_figures.draw(names, Path(outputs), Path(folder))
+
+
+def claims(names: Iterable[str] = (), *, outputs: PathLike = "out") -> list[Judgement]:
+    """Judge claims of the source, all by default, from the outputs of their runs.
+
+    Returns
+    -------
+    list of mesoslip.campaign.claims.Judgement
+        Each with its claim, what was measured, and the verdict.
+
+    Raises
+    ------
+    FileError
+        If an output is missing.
+    ConfigError
+        If there is no claim of a name.
+    """
+    from mesoslip.campaign.claims import judge
+
+    return judge(names, Path(outputs))

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, pictures, run, theory
+from mesoslip.command_line import catalogues, claims, pictures, run, theory
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
@@ -25,6 +25,7 @@ COMMANDS = (
     catalogues.regime,
     pictures.plot,
     pictures.figures,
+    claims.claims,
 )
 
 app = typer.Typer(

@@ -395,7 +395,7 @@ class SourceFigure:
 
 # What a caption tells of the runs, if it is the same in all of them.
 PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
-    lambda config: f"$N$ = {config.contacts.count}" if config.run.engine == "eq" else None,
+    lambda config: f"$N$ = {config.contacts.count}" if config.contact_kind.is_discrete else None,
     lambda config: f"$F_s$ = {config.contacts.static_force * 1e6:g} µN",
     lambda config: f"$Nk$ = {config.contacts.stiffness:g} N/m",
     lambda config: rf"$\Delta{{f_s}}/f_s$ = {config.contacts.threshold.relative_width:.3g}",

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         regime,
         run,
         slips,
+        sweep,
     )
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
@@ -53,6 +54,7 @@ __all__ = [
     "regime",
     "run",
     "slips",
+    "sweep",
 ]
 
 # What takes long to import is imported when it is asked for.
@@ -73,6 +75,7 @@ _LAZY = {
     "regime": "api",
     "run": "api",
     "slips": "api",
+    "sweep": "api",
 }
 
 

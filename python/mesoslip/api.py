@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output import files, layout
 from mesoslip.simulation.checkpoint import Checkpoint
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.runner import Results, checked_workers, run_realizations
 from mesoslip.simulation.stop import StopFlag
 from mesoslip.theory.derived import Derived, derived_quantities
 
@@ -22,8 +23,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
     from mesoslip.campaign.claims import Judgement
+    from mesoslip.campaign.plan import Plan
+    from mesoslip.campaign.runner import Sweep
+    from mesoslip.campaign.store import Store
 
 PathLike = str | os.PathLike[str]
+
+# What ends a sweep that somebody has stopped.
+INTERRUPTED = "interrupted"
 
 
 def as_config(
@@ -97,6 +104,113 @@ def simulate(
     return run_realizations(
         config, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
     )
+
+
+def sweep(
+    plan: PathLike | Mapping[str, Any] | Plan,
+    *,
+    store: PathLike | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    pool: str = "both",
+    progress: Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Run a configuration over a range of parameters, and measure each run.
+
+    Parameters
+    ----------
+    plan
+        The file of a sweep, nested tables, or a `mesoslip.campaign.plan.Plan`.
+    store
+        Folder where each point is kept as soon as it is done, and taken from when the sweep is
+        called again; nowhere by default.
+    workers
+        Points at the same time; as many as there are processors by default. The result does not
+        depend on it.
+    scheduler
+        Address of a Dask scheduler, whose workers are to compute the points.
+    pool
+        What points are computed on: "threads", "processes", or "both", that is threads first and
+        processes in a sweep that takes long.
+    progress
+        Called now and then with the part of the points that are there, 0 to 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions: each swept key, and ``realization``; variables: ``status`` (0 ok, 1 failed, 2
+        missing) and the measures. Its attribute ``failures`` tells why points failed.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the sweep cannot be read or is wrong, or a combination cannot be run.
+    RunError
+        If the scheduler is gone, or workers cannot be started, before every point was computed.
+    """
+    from mesoslip.campaign.store import Store
+
+    checked = as_plan(plan)
+    kept = None if store is None else Store(Path(store))
+    with kept or nullcontext():
+        done = run_plan(
+            checked,
+            store=kept,
+            workers=workers,
+            scheduler=scheduler,
+            pool=pool,
+            progress=progress,
+        )
+    if done.missing and done.ending != INTERRUPTED:
+        raise RunError(done.ending)
+    return done.dataset
+
+
+def as_plan(plan: PathLike | Mapping[str, Any] | Plan, overrides: Iterable[str] = ()) -> Plan:
+    """A sweep from its file or from nested tables.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If the sweep is wrong.
+    """
+    from mesoslip.campaign.plan import Plan
+
+    if isinstance(plan, Plan):
+        return plan
+    if isinstance(plan, Mapping):
+        return Plan.from_dict(plan)
+    return Plan.load(plan, overrides)
+
+
+def run_plan(
+    plan: Plan,
+    *,
+    store: Store | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    pool: str = "both",
+    progress: Callable[[float], None] | None = None,
+    stop: StopFlag | None = None,
+) -> Sweep:
+    """Compute what is missing of a sweep; see `sweep` and `mesoslip.campaign.runner.run_sweep`."""
+    from mesoslip.campaign import cluster, execution, runner
+
+    count = checked_workers(workers)
+    if pool not in execution.POOLS:
+        raise ConfigError(
+            [Problem("", "pool", f"must be one of {', '.join(execution.POOLS)}", pool)]
+        )
+    # Before a cluster is asked.
+    _ = plan.combinations
+    if scheduler is None:
+        executor = execution.on_this_machine(count, pool)
+        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
+    with cluster.connected(scheduler) as client:
+        executor = cluster.on_dask(client)
+        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:

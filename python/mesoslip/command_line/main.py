@@ -11,12 +11,13 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, claims, pictures, run, theory
+from mesoslip.command_line import catalogues, claims, pictures, run, sweep, theory
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
 COMMANDS = (
     run.run,
+    sweep.sweep,
     theory.info,
     theory.curve,
     theory.onset,

@@ -56,7 +56,7 @@ LEAST_PATTERNS = 4
 # Motion is not settled if its amplitude changes by more than this part of it, beyond doubt:
 # by as many standard errors; or if one half of what is judged is smooth and the other one exceeds
 # the amplitude of smooth sliding by this factor.
-SETTLED_CHANGE = 0.25
+SETTLED_CHANGE = 0.4
 DOUBT = 4.0
 BEYOND_SMOOTH = 1.5
 # Velocity over that of the drive below which the slider is said to stick: pinned it still moves

@@ -407,7 +407,7 @@ PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
     ),
     lambda config: (
         f"$v_d$ = {config.drive_speed * 1e6:g} µm/s"
-        if len(config.drive_stages) == 1 and config.drive_speed > 0
+        if len(config.drive_parts) == 1 and config.drive_speed > 0
         else None
     ),
     lambda config: f"{config.contacts.threshold.law} thresholds",

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
     from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",
@@ -40,6 +41,7 @@ __all__ = [
     "ForceCurve",
     "MesoslipError",
     "RunError",
+    "SteadySliding",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
@@ -61,6 +63,7 @@ __all__ = [
 _LAZY = {
     "Config": "configuration.config",
     "ForceCurve": "theory.force_curve",
+    "SteadySliding": "theory.steady_sliding",
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",

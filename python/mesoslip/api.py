@@ -59,6 +59,7 @@ def run(
     config: PathLike | Mapping[str, Any] | Config,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.DataTree:
     """Simulate.
@@ -70,6 +71,8 @@ def run(
     workers
         Realizations at the same time; as many as there are processors by default. The result does
         not depend on it.
+    scheduler
+        Address of a Dask scheduler, whose workers are to run the realizations.
     progress
         Called now and then with the part of the work that is done, 0 to 1.
 
@@ -86,13 +89,15 @@ def run(
     RunError
         If the run fails.
     """
-    return layout.build_tree(simulate(as_config(config), workers=workers, progress=progress))
+    results = simulate(as_config(config), workers=workers, scheduler=scheduler, progress=progress)
+    return layout.build_tree(results)
 
 
 def simulate(
     config: Config,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
     stop: StopFlag | None = None,
     checkpoint: Checkpoint | None = None,
@@ -101,6 +106,14 @@ def simulate(
 
     See `run`, and `mesoslip.simulation.runner.run_realizations`.
     """
+    if scheduler is not None:
+        from mesoslip.campaign.cluster import connected
+        from mesoslip.campaign.ensemble import run_on_cluster
+
+        with connected(scheduler) as client:
+            return run_on_cluster(
+                config, client, progress=progress, stop=stop, checkpoint=checkpoint
+            )
     return run_realizations(
         config, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import uuid
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -23,7 +23,7 @@ TASKS_A_THREAD = 3
 # How often the cluster is asked how many threads it has [s], in looks.
 LOOKS_A_COUNT = 50
 
-Key = TypeVar("Key", bound=Hashable)
+Key = TypeVar("Key")
 Result = TypeVar("Result")
 
 
@@ -38,6 +38,7 @@ def connected(address: str) -> Iterator[Client]:
     """
     try:
         from distributed import Client
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError:
         raise FileError(
             "--scheduler needs the package distributed: pip install 'mesoslip[distributed]'"
@@ -47,6 +48,8 @@ def connected(address: str) -> Iterator[Client]:
     # What becomes of connections is told by this program.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
+        # A client that finds nothing complains when it is thrown away: ask before.
+        parse_host_port(parse_address(address)[1])
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise FileError(f"--scheduler {address}: there is no scheduler: {error}") from None

@@ -11,7 +11,7 @@ import difflib
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.regime import NAMES, REGIME, regimes
 from mesoslip.errors import ConfigError, Problem, RunError
 
 if TYPE_CHECKING:
@@ -48,6 +49,12 @@ class RunView:
         wanted = root["time"].values >= self.start
         values: Array = root[name].values[0, wanted]
         return values[np.isfinite(values)]
+
+    @cached_property
+    def judged(self) -> dict[str, float]:
+        """The regime, and the numbers by which it is judged."""
+        data = regimes(self.tree)
+        return {name: float(data[name].values[0]) for name in REGIME}
 
     def total(self, name: str) -> float:
         """A number of the whole run."""
@@ -132,11 +139,6 @@ def _force_amplitude(run: RunView) -> float:
     return float(np.ptp(forces) / 2) if forces.size else np.nan
 
 
-def _relative_amplitude(run: RunView) -> float:
-    mean = abs(_mean_force(run))
-    return _force_amplitude(run) / mean if mean > 0 else np.nan
-
-
 def _mean_waiting_time(run: RunView) -> float:
     starts = run.catalogue("slips", "start_time")
     return _mean(np.diff(starts))
@@ -191,18 +193,17 @@ def _mean_slip(name: str) -> Function:
     return lambda run: _mean(run.catalogue("slips", name))
 
 
+def _judged(name: str) -> Function:
+    """A number by which the regime is judged, in a part of the run of its own choice."""
+    return lambda run: run.judged[name]
+
+
 MEASURES: dict[str, Measure] = {
     one.name: one
     for one in (
         Measure("mean_force", _mean_force, "N", "mean spring force"),
         Measure("largest_force", _largest_force, "N", "greatest spring force"),
         Measure("force_amplitude", _force_amplitude, "N", "half the range of the spring force"),
-        Measure(
-            "relative_amplitude",
-            _relative_amplitude,
-            "1",
-            "half the range of the force over its mean",
-        ),
         Measure(
             "mean_peak_force",
             _mean_slip("force_before"),
@@ -230,6 +231,16 @@ MEASURES: dict[str, Measure] = {
         Measure("avalanche_count", _avalanche_count, "1", "number of avalanches"),
         Measure("mean_avalanche_size", _mean_avalanche_size, "1", "mean size of avalanches"),
         Measure("largest_avalanche", _largest_avalanche, "1", "size of the greatest avalanche"),
+        *(
+            Measure(
+                name,
+                _judged(name),
+                meaning.units,
+                meaning.long_name,
+                flags=NAMES if name == "regime" else (),
+            )
+            for name, meaning in REGIME.items()
+        ),
     )
 }
 
@@ -361,7 +372,7 @@ def measured(run: RunView, measure: Measure) -> float:
     except MemoryError:
         raise
     except Exception as error:
-        place = _line(error, measure.path) if measure.path else ""
+        place = f" ({measure.path}{_line(error, measure.path)})" if measure.path else ""
         raise RunError(f"measure {measure.name}{place}: {type(error).__name__}: {error}") from error
     if not isinstance(value, Real):
         raise RunError(f"measure {measure.name}: gave {value!r:.60}, not a number")

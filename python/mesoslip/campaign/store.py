@@ -58,9 +58,11 @@ class Points:
     def names(self) -> set[str]:
         """Names of the points that are there."""
         try:
-            return {path.stem for path in self.folder.glob("*.json") if path.name != MANIFEST}
+            paths = list(self.folder.glob("*.json"))
         except OSError as error:
             raise FileError(f"{self.folder}: cannot be read: {error.strerror}") from None
+        # Without those that are being written.
+        return {path.stem for path in paths if not path.name.startswith((".", MANIFEST))}
 
     def read(self, name: str) -> Stored | None:
         """A point; None if it is not there or damaged.
@@ -107,13 +109,16 @@ class Store(Points):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / LOCK).open("w")
+        except OSError as error:
+            raise FileError(f"{folder}: cannot be written: {error.strerror}") from None
+        try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self.close()
             raise FileError(f"{folder}: another sweep is at work there") from None
-        except OSError as error:
-            self.close()
-            raise FileError(f"{folder}: cannot be written: {error.strerror}") from None
+        except OSError:
+            # A file system without locks, such as some of networks: there is nothing to be had.
+            pass
         # Nobody else writes here: these are of a process that was killed.
         for path in folder.glob(".*"):
             with suppress(OSError):

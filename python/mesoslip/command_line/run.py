@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import ConfigArgument, SetOption
+from mesoslip.command_line.options import ConfigArgument, SchedulerOption, SetOption
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.command_line.signals import Stop, stopped_by_signals
 from mesoslip.errors import FileError
@@ -48,6 +48,7 @@ def run(
         int | None,
         typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
     ] = None,
+    scheduler: SchedulerOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
 ) -> None:
     """Simulate, and write an output file.
@@ -74,7 +75,12 @@ def run(
     ):
         with progress_shown(quiet) as progress:
             results = api.simulate(
-                checked, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
+                checked,
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+                stop=stop,
+                checkpoint=checkpoint,
             )
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))

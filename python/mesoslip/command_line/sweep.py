@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import SetOption
+from mesoslip.command_line.options import SchedulerOption, SetOption
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.command_line.signals import Stop, stopped_by_signals
 
@@ -34,10 +34,7 @@ def sweep(
         int | None,
         typer.Option(min=1, help="Points at the same time; as many as processors by default"),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Dask scheduler whose workers compute the points", metavar="ADDRESS"),
-    ] = None,
+    scheduler: SchedulerOption = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Tell what it will take, and run nothing")
     ] = False,

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, pictures, run, theory
+from mesoslip.command_line import catalogues, pictures, response, run, theory
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
@@ -22,6 +22,7 @@ COMMANDS = (
     theory.onset,
     catalogues.slips,
     catalogues.avalanches,
+    response.response,
     pictures.plot,
     pictures.figures,
 )

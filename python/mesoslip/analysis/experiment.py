@@ -18,8 +18,8 @@ from mesoslip.output.layout import group_of
 
 Array = NDArray[np.float64]
 
-# Slider displacement after a change of the drive within which a peak belongs to it, in mean breaking
-# stretches: that within which all contacts have broken once or twice.
+# Slider displacement after a change of the drive within which a peak belongs to it, in mean
+# breaking stretches: that within which all contacts have broken once or twice.
 PEAK_STRETCHES = 3.0
 # Part of the slider's motion that happens in slips, from which on it sticks and slips.
 STICK_SLIP_SHARE = 0.1
@@ -42,8 +42,8 @@ class Stage:
     start_velocity, end_velocity
         Velocities of the drive [m/s].
     exact
-        What the output's group ``stages`` tells of it, from the motion itself, each of shape (realizations,); empty
-        if the output has no such group.
+        What the output's group ``stages`` tells of it, from the motion itself, each of shape
+        (realizations,); empty if the output has no such group.
     """
 
     number: int
@@ -81,7 +81,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Peak:
-    """An extreme of the force, each of shape (realizations,): force [N], time [s], displacement [m]."""
+    """An extreme of the force, each of shape (realizations,): force [N], time [s], displacement
+    [m]."""
 
     force: Array
     time: Array
@@ -154,7 +155,8 @@ class Experiment:
 
     @property
     def peak_window(self) -> float:
-        """Slider displacement after a change of the drive within which its peak is looked for [m]."""
+        """Slider displacement after a change of the drive within which its peak is looked for
+        [m]."""
         return PEAK_STRETCHES * self.config.contacts.break_stretch
 
     def _stages(self) -> tuple[Stage, ...]:
@@ -190,11 +192,11 @@ class Experiment:
             # Without slips that end a run they are the same in all realizations.
             start = float(rows["stage_start_time"][mine].max())
             end = float(rows["stage_end_time"][mine].min())
-            velocities = [
+            first, last = (
                 float(rows[f"drive_{which}_velocity"][mine[0]]) for which in ("start", "end")
-            ]
+            )
             exact = {name: values[mine] for name, values in rows.items()}
-            found.append(Stage(int(number), start, end, *velocities, exact))
+            found.append(Stage(int(number), start, end, first, last, exact))
         return found
 
     def samples(self, stage: Stage) -> slice:
@@ -212,7 +214,8 @@ class Experiment:
 
     @cached_property
     def steady_means(self) -> dict[int, SteadyMean | None]:
-        """Steady means of the spring force in the direction of the drive, by the number of the stage.
+        """Steady means of the spring force in the direction of the drive, by the number of the
+        stage.
 
         Of stages at one velocity; None where there are too few samples.
         """
@@ -229,7 +232,8 @@ class Experiment:
     def slip_share(self, stage: Stage) -> float:
         """Part of the slider's motion in the steady part of a stage that happens in slips.
 
-        In perfect stick-slip the spring force falls in slips by what the drive loads it between them, K v t.
+        In perfect stick-slip the spring force falls in slips by what the drive loads it between
+        them, K v t.
         """
         stiffness = self.stiffness
         if not stage.is_steady or math.isinf(stiffness) or "slips" not in self.tree.children:
@@ -264,10 +268,12 @@ class Experiment:
         return self.displacement[:, self.at_start(stage)]
 
     def peak(self, stage: Stage, upward: bool = True) -> Peak | None:
-        """The greatest force (or the least one) along the direction of a stage, soon after its start.
+        """The greatest force (or the least one) along the direction of a stage, soon after its
+        start.
 
-        Where the stage sticks and slips: that from which the first slip starts. Elsewhere: of the time in which the
-        slider moves by three mean breaking stretches; from the motion if the output has it, else from the samples.
+        Where the stage sticks and slips: that from which the first slip starts. Elsewhere: of the
+        time in which the slider moves by three mean breaking stretches; from the motion if the
+        output has it, else from the samples.
 
         Returns
         -------
@@ -294,9 +300,7 @@ class Experiment:
         side = 1.0 if upward else -1.0
         place = np.argmax(np.where(is_near, side * force, -np.inf), axis=1)
         rows = np.arange(force.shape[0])
-        return Peak(
-            force[rows, place], self.time[inside][place], displacement[rows, place], False
-        )
+        return Peak(force[rows, place], self.time[inside][place], displacement[rows, place], False)
 
     def _before_first_slip(self, stage: Stage) -> Peak | None:
         """Where the first slips of a stage start; None if a realization has none."""
@@ -310,7 +314,5 @@ class Experiment:
             first = np.flatnonzero(inside)[np.argmin(times[inside])]
             force.append(stage.direction * slips["force_before"].values[first])
             time.append(times[first])
-            displacement.append(
-                np.interp(times[first], self.time, self.displacement[realization])
-            )
+            displacement.append(np.interp(times[first], self.time, self.displacement[realization]))
         return Peak(np.array(force), np.array(time), np.array(displacement), True)

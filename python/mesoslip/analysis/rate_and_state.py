@@ -65,7 +65,9 @@ FIT = Group(
     independent_points=Meaning("1", "independent points that are compared"),
     fit_p_value=Meaning("1", "probability of such a misfit by noise"),
     runs_p_value=Meaning("1", "probability of so few changes of the residuals' sign by chance"),
-    information_criterion=Meaning("1", "Akaike's criterion; the law with the lower one is likelier"),
+    information_criterion=Meaning(
+        "1", "Akaike's criterion; the law with the lower one is likelier"
+    ),
     is_described=Meaning("1", "whether the law describes the record", np.int8),
     note=Meaning("1", "what to make of it", np.str_),
 )
@@ -201,8 +203,8 @@ def make_record(
 
     Notes
     -----
-    The noise of a slider over contacts goes on as it moves: the correlation of two points is that of an
-    Ornstein-Uhlenbeck process of the displacement, averaged over their samples.
+    The noise of a slider over contacts goes on as it moves: the correlation of two points is that
+    of an Ornstein-Uhlenbeck process of the displacement, averaged over their samples.
     """
     edges = _edges(stages, time)
     first, after = edges[:-1], edges[1:]
@@ -251,8 +253,9 @@ def _edges(stages: Sequence[Loading], time: Array) -> NDArray[np.int64]:
             after = time.size
         count = after - first
         if count > 0:
-            early = np.geomspace(1, count, EARLY_POINTS) - 1 if number else []
-            places = np.concatenate([early, np.linspace(0, count, EVEN_POINTS + 1)])
+            places = np.linspace(0, count, EVEN_POINTS + 1)
+            if number:
+                places = np.append(places, np.geomspace(1, count, EARLY_POINTS) - 1)
             edges += list(first + np.unique(places.astype(int)))
         begin = end
     return np.unique(np.array([*edges, time.size], dtype=np.int64))
@@ -283,9 +286,9 @@ def _averaged(start: Array, end: Array, length: float) -> Array:
 def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
     """Fit a law to a record by least squares in the logarithms of a, b, D_c (and the stiffness).
 
-    Levenberg and Marquardt's way within bounds (`scipy.optimize.least_squares`), from the best of many starts.
-    The covariance is that of correlated residuals, (JᵀJ)⁻¹ Jᵀ C J (JᵀJ)⁻¹ with the correlation C of the noise; it
-    is multiplied by χ² where the law does not describe the record.
+    Levenberg and Marquardt's way within bounds (`scipy.optimize.least_squares`), from the best of
+    many starts. The covariance is that of correlated residuals, (JᵀJ)⁻¹ Jᵀ C J (JᵀJ)⁻¹ with the
+    correlation C of the noise; it is multiplied by χ² where the law does not describe the record.
 
     Raises
     ------
@@ -341,7 +344,9 @@ def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
     return _judged(record, best, model(best.x), scale, length, free, bound)
 
 
-def _starts(residuals: Callable[[Array, float], Array], size: int, record: Record) -> Iterator[Array]:
+def _starts(
+    residuals: Callable[[Array, float], Array], size: int, record: Record
+) -> Iterator[Array]:
     """Where to start from: the best of a net of rates and lengths, each with its best level."""
     tried = []
     for a in STARTS_OF_RATES:
@@ -405,7 +410,8 @@ def _judged(
 
 
 def _runs(residuals: Array, independent: float) -> float:
-    """Probability of so few changes of sign by chance (Wald and Wolfowitz), of independent residuals."""
+    """Probability of so few changes of sign by chance (Wald and Wolfowitz), of independent
+    residuals."""
     from scipy.special import ndtr
 
     step = max(1, math.ceil(residuals.size / independent))
@@ -505,7 +511,9 @@ def record_of(experiment: Experiment) -> Record | str:
     reference = stages[first]
     used = stages[first:]
     if any(sign != reference.direction for one in used for sign in _signs(one)):
-        return "the drive turns round, which a law with the logarithm of the velocity has no word for"
+        return (
+            "the drive turns round, which a law with the logarithm of the velocity has no word for"
+        )
     if math.isinf(experiment.stiffness) and not any(
         one.is_steady and one.velocity != reference.velocity for one in used
     ):

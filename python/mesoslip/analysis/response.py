@@ -49,9 +49,7 @@ STEADY = Group(
     sample_count=Meaning("1", "samples after it, of all realizations", np.int64),
     effective_sample_count=Meaning("1", "independent samples that would have this error"),
     slip_share=Meaning("1", "part of the slider's motion that happens in slips"),
-    is_steady=Meaning(
-        "1", "whether the transient is over, and halves of the rest agree", np.int8
-    ),
+    is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
     is_resolved=Meaning("1", "whether the stage is long enough for its error", np.int8),
     note=_NOTE,
 )
@@ -134,8 +132,8 @@ class Line:
     Attributes
     ----------
     slope, slope_error, level
-        Slope, its standard error, and value at 0. The error is multiplied by √(χ²/degrees of freedom) if that is
-        more than 1; of two points it is that of their errors alone.
+        Slope, its standard error, and value at 0. The error is multiplied by √(χ²/degrees of
+        freedom) if that is more than 1; of two points it is that of their errors alone.
     chi_square, degrees_of_freedom
         χ² with the errors of the points; NaN where they have none.
     """
@@ -150,7 +148,8 @@ class Line:
 def line(x: Array, y: Array, error: Array) -> Line | None:
     """A line through points with errors; None if they have less than two places.
 
-    Points without a positive error are weighted alike, and the scatter about the line is their error.
+    Points without a positive error are weighted alike, and the scatter about the line is their
+    error.
     """
     good = np.isfinite(x) & np.isfinite(y)
     x, y, error = x[good], y[good], error[good]
@@ -239,9 +238,7 @@ def step_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _fill_step(
-    experiment: Experiment, before: Stage, after: Stage, row: dict[str, Any]
-) -> str:
+def _fill_step(experiment: Experiment, before: Stage, after: Stage, row: dict[str, Any]) -> str:
     """What is found of a step; returns what is not, and why."""
     if before.direction != after.direction:
         return "the drive turns round"
@@ -301,8 +298,8 @@ def _evolution_start(
 ) -> Peak | None:
     """The force from which the evolution after a step starts; None if it is not told from noise.
 
-    That is the peak beyond both steady forces. A slider that is not on a spring has the direct change at once, so
-    there it may lie between them too.
+    That is the peak beyond both steady forces. A slider that is not on a spring has the direct
+    change at once, so there it may lie between them too.
     """
     peak = experiment.peak(after, upward)
     if peak is None:
@@ -363,9 +360,7 @@ def _fill_relaxation(
     return []
 
 
-def decay(
-    way: Array, force: Array, correlation: float, noise: float
-) -> tuple[float, float] | None:
+def decay(way: Array, force: Array, correlation: float, noise: float) -> tuple[float, float] | None:
     """Length of an exponential decay of a force over a displacement, and its standard error.
 
     Parameters
@@ -528,7 +523,8 @@ def _dataset(group: Group, dimension: str, rows: Sequence[Mapping[str, Any]]) ->
 
 
 def steady_line(data: xr.Dataset) -> Line | None:
-    """The line of the steady force over ln V, of what is steady; None if there are no two velocities."""
+    """The line of the steady force over ln V, of what is steady; None if there are no two
+    velocities."""
     good = data["is_steady"].values == 1
     velocity = np.abs(data["velocity"].values[good])
     return line(
@@ -573,8 +569,8 @@ def response(
     experiments
         The outputs.
     normal_force
-        If it is given [N], forces are told over it too, with the suffix ``_coefficient``; else over the static
-        force, with the suffix ``_ratio``.
+        If it is given [N], forces are told over it too, with the suffix ``_coefficient``; else over
+        the static force, with the suffix ``_ratio``.
     with_fit
         Whether rate-and-state parameters are fitted.
     free_stiffness
@@ -583,8 +579,8 @@ def response(
     Returns
     -------
     xarray.DataTree
-        Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds`` (``hold``), and
-        ``rate_and_state`` (``fit``, one for each output and law).
+        Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
+        (``hold``), and ``rate_and_state`` (``fit``, one for each output and law).
 
     Raises
     ------
@@ -654,8 +650,8 @@ def scalars_of(tree: xr.DataTree, name: str) -> dict[str, Any]:
 def write_csv(tree: xr.DataTree, path: Path) -> None:
     """Write a response as one table: a row for each stage, with what is known of it.
 
-    A stage at one velocity has the columns of ``steady``, and those of ``steps`` if it starts with a step; a hold
-    has those of ``holds``. The notes of steps have a column of their own.
+    A stage at one velocity has the columns of ``steady``, and those of ``steps`` if it starts with
+    a step; a hold has those of ``holds``. The notes of steps have a column of their own.
 
     Raises
     ------

@@ -38,7 +38,8 @@ class SteadyMean:
     mean, error
         Mean, and its standard error; NaN if there are too few samples for it.
     half_width
-        Half the width of its 95 % interval, by Student's distribution for the blocks that there are.
+        Half the width of its 95 % interval, by Student's distribution for the blocks that there
+        are.
     standard_deviation
         That of the values about their mean.
     start
@@ -75,8 +76,8 @@ class SteadyMean:
 def transient(series: Array) -> int:
     """Samples of a transient at the start of a series, by the marginal standard error rule MSER-5.
 
-    That many are left out that (variance of the rest)/(number of the rest) of the means of five samples each is
-    least (White, Simulation 69, 323 (1997)); at most half of the series.
+    That many are left out that (variance of the rest)/(number of the rest) of the means of five
+    samples each is least (White, Simulation 69, 323 (1997)); at most half of the series.
     """
     batch = BATCH if series.size >= 4 * BATCH * BATCH else 1
     count = series.size // batch
@@ -99,17 +100,18 @@ def transient(series: Array) -> int:
 def steady_mean(values: Array) -> SteadyMean | None:
     """Mean of the steady part of a series, with its error.
 
-    The error is that of the means of blocks. Of the blocks of 1, 2, 4, ... samples those are taken whose error
-    lies on the flat part of the curve: the shortest ones with B³ > 2 n (e_B/e_1)⁴, at which what is left of the
-    correlation between blocks is less than the noise of the error itself (Lee et al., Phys. Rev. E 83, 066706
-    (2011)). As what is left makes it too small, the estimate for blocks three times shorter is used to take away
-    its first order in 1/B: e² = 2 e_B² - e²_(B/3) (Vats and Flegal, Biometrika 109, 735 (2022)), if that is more.
+    The error is that of the means of blocks. Of the blocks of 1, 2, 4, ... samples those are taken
+    whose error lies on the flat part of the curve: the shortest ones with B³ > 2 n (e_B/e_1)⁴, at
+    which what is left of the correlation between blocks is less than the noise of the error itself
+    (Lee et al., Phys. Rev. E 83, 066706 (2011)). As what is left makes it too small, the estimate
+    for blocks three times shorter is used to take away its first order in 1/B: e² = 2 e_B² -
+    e²_(B/3) (Vats and Flegal, Biometrika 109, 735 (2022)), if that is more.
 
     Parameters
     ----------
     values
-        Shape (realizations, samples) with the same times; realizations are independent. The transient is looked
-        for in their mean.
+        Shape (realizations, samples) with the same times; realizations are independent. The
+        transient is looked for in their mean.
 
     Returns
     -------

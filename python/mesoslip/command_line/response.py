@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,9 +45,7 @@ def response(
     if table is not None:
         write_csv(tree, table)
     groups = {str(name): rows_of(tree, str(name)) for name in tree.children}
-    scalars = {
-        name: value for group in groups for name, value in scalars_of(tree, group).items()
-    }
+    scalars = {name: value for group in groups for name, value in scalars_of(tree, group).items()}
     if as_json:
         names = {one: tree.attrs[one] for one in ("outputs", "normal_force") if one in tree.attrs}
         print_json(names | groups | scalars)
@@ -71,7 +70,7 @@ def _force(text: str) -> float:
 def _show(
     groups: dict[str, list[dict[str, Any]]],
     scalars: dict[str, Any],
-    attributes: dict[str, Any],
+    attributes: Mapping[Any, Any],
     several: bool,
 ) -> None:
     """Tables as those who measure friction have them."""
@@ -95,7 +94,8 @@ def _show(
         def shown(row: dict[str, Any]) -> str:
             text = _short(scale * row[name])
             error = row.get(f"{name}_error", math.nan)
-            return text if math.isnan(error) or text == "-" else f"{text} ± {scale * error:.2g}"
+                is_exact = math.isnan(error) or error == 0
+            return text if is_exact or text == "-" else f"{text} ± {scale * error:.2g}"
 
         return shown
 

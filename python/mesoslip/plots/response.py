@@ -24,10 +24,18 @@ MOST_DOTS = 20_000
 
 def _draw_record(axes: Axes, experiment: Experiment) -> None:
     """The force against the displacement of the load point, or against time if there are holds."""
-    step = max(1, experiment.time.size // MOST_DOTS)
+    shown = _dots(experiment)
     sign = next((one.direction for one in experiment.stages if one.direction), 1.0)
-    force = sign * experiment.force.mean(axis=0)[::step] / experiment.static_force
-    axes.plot(sign * experiment.drive[::step] * 1e6, force, color="black", linewidth=0.6)
+    force = sign * experiment.force.mean(axis=0) / experiment.static_force
+    axes.plot(sign * experiment.drive[shown] * 1e6, force[shown], color="black", linewidth=0.6)
+    steady = next((one for one in experiment.stages if experiment.mean_of(one) is not None), None)
+    if steady is not None and len(experiment.stages) > 1:
+        # What comes before steady sliding would make the rest small.
+        mean = experiment.mean_of(steady)
+        assert mean is not None
+        later = force[experiment.samples(steady).start + mean.start :]
+        margin = 0.15 * max(float(np.ptp(later)), 1e-3)
+        axes.set_ylim(later.min() - 2 * margin, later.max() + margin)
     axes.set_xlabel("displacement of the load point (µm)")
     axes.set_ylabel("force / $F_s$")
     for number, stage in enumerate(experiment.stages):
@@ -38,6 +46,17 @@ def _draw_record(axes: Axes, experiment: Experiment) -> None:
     _label_stages(axes, experiment, sign)
 
 
+def _dots(experiment: Experiment) -> NDArray[np.int64]:
+    """Samples that a line shows: so many evenly in time, and so many in the drive's displacement."""
+    count = experiment.time.size
+    if count <= 2 * MOST_DOTS:
+        return np.arange(count)
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(experiment.drive))))
+    even = np.linspace(0, count - 1, MOST_DOTS).astype(np.int64)
+    along = np.searchsorted(way, np.linspace(0, way[-1], MOST_DOTS)).astype(np.int64)
+    return np.union1d(even, np.minimum(along, count - 1))
+
+
 def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
     """The velocity of each stage, or how long the drive stands, above the record."""
     if len(experiment.stages) > 12:
@@ -45,10 +64,14 @@ def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
     for stage in experiment.stages:
         inside = experiment.samples(stage)
         if stage.is_hold or stage.is_steady:
-            place = experiment.at_start(stage) if stage.is_hold else (inside.start + inside.stop) // 2
+            place = (
+                experiment.at_start(stage) if stage.is_hold else (inside.start + inside.stop) // 2
+            )
             place = min(place, experiment.time.size - 1)
             text = (
-                f"{stage.duration:.3g} s" if stage.is_hold else f"{abs(stage.velocity) * 1e6:.3g} µm/s"
+                f"{stage.duration:.3g} s"
+                if stage.is_hold
+                else f"{abs(stage.velocity) * 1e6:.3g} µm/s"
             )
             axes.annotate(
                 text,
@@ -76,7 +99,8 @@ def _draw_law(axes: Axes, experiment: Experiment, record: Record, found: Fit) ->
 
 
 def draw_force(axes: Axes, tree: xr.DataTree) -> None:
-    """Draw the force against the displacement of the load point, and the law that is nearer to it."""
+    """Draw the force against the displacement of the load point, and the law that is nearer to
+    it."""
     experiment = Experiment(tree)
     _draw_record(axes, experiment)
     record = record_of(experiment)
@@ -93,6 +117,7 @@ def draw_force(axes: Axes, tree: xr.DataTree) -> None:
 
 def draw_steady(axes: Axes, data: xr.Dataset) -> None:
     """Draw the steady force against the logarithm of the velocity, with its line."""
+    data = data.isel(velocity_stage=np.isfinite(data["steady_force"].values))
     velocity = np.abs(data["velocity"].values)
     reference = float(velocity[0])
     scale = _scale(data, "steady_force")

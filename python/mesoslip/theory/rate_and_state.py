@@ -1,13 +1,13 @@
 """Rate-and-state friction: a slider on a spring whose friction has a memory.
 
-The force of friction is F = F_0 + a ln(V/V_0) + b ln(V_0 θ/D_c), with one state variable θ (Dieterich, J.
-Geophys. Res. 84, 2161 (1979); Ruina, J. Geophys. Res. 88, 10359 (1983)):
+The force of friction is F = F_0 + a ln(V/V_0) + b ln(V_0 θ/D_c), with one state variable θ
+(Dieterich, J. Geophys. Res. 84, 2161 (1979); Ruina, J. Geophys. Res. 88, 10359 (1983)):
 
 - ageing law: dθ/dt = 1 - V θ/D_c,
 - slip law: dθ/dt = -(V θ/D_c) ln(V θ/D_c).
 
-Forces may be in newtons, or over the normal force, in which case they are friction coefficients, a and b are
-numbers and a stiffness is one over a length.
+Forces may be in newtons, or over the normal force, in which case they are friction coefficients, a
+and b are numbers and a stiffness is one over a length.
 """
 
 from __future__ import annotations
@@ -115,19 +115,21 @@ def spring_slider(
 ) -> Motion:
     """Follow a slider on a spring through stages of its load point, from steady sliding on.
 
-    The logarithms of velocity and state are integrated by LSODA, which is stiff where it must be; without mass
-    k (X_lp - X) = F + η V gives (a + η V) d ln V/dt = k (V_lp - V) - b d ln θ/dt.
+    The logarithms of velocity and state are integrated by LSODA, which is stiff where it must be;
+    without mass k (X_lp - X) = F + η V gives (a + η V) d ln V/dt = k (V_lp - V) - b d ln θ/dt.
 
     Parameters
     ----------
     law
         The law of friction.
     stages
-        Stages of the load point one after another; the first starts with steady sliding at its velocity.
+        Stages of the load point one after another; the first starts with steady sliding at its
+        velocity.
     times
         Times in ascending order, from the start of the first stage on [s].
     stiffness
-        k of the spring, unit of force over metre; infinite for a slider that goes where the load point goes.
+        k of the spring, unit of force over metre; infinite for a slider that goes where the load
+        point goes.
     damping
         η of a damping (as by radiation), unit of force times s/m.
     mass
@@ -194,17 +196,14 @@ def spring_slider(
 def _evolution(law: RateAndState) -> Any:
     """d ln θ/dt of a velocity over V_0, its logarithm, and ln(V_0 θ/D_c)."""
     rate = law.reference_velocity / law.slip_distance
-    if law.law == "ageing":
 
-        def change(velocity: float, _: float, state: float) -> float:
-            return rate * (math.exp(min(-state, LARGEST_EXPONENT)) - velocity)
+    def ageing(velocity: float, _: float, state: float) -> float:
+        return rate * (math.exp(min(-state, LARGEST_EXPONENT)) - velocity)
 
-        return change
-
-    def change(velocity: float, logarithm: float, state: float) -> float:
+    def slip(velocity: float, logarithm: float, state: float) -> float:
         return -rate * velocity * (logarithm + state)
 
-    return change
+    return ageing if law.law == "ageing" else slip
 
 
 def _rigid(law: RateAndState) -> Any:

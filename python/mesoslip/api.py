@@ -224,6 +224,16 @@ def avalanche_summary(
     )
 
 
+def _several(
+    output: PathLike | xr.DataTree | Iterable[PathLike | xr.DataTree],
+) -> list[PathLike | xr.DataTree]:
+    import xarray as xr
+
+    if isinstance(output, str | os.PathLike | xr.DataTree):
+        return [output]
+    return list(output)
+
+
 def response(
     output: PathLike | xr.DataTree | Iterable[PathLike | xr.DataTree],
     *,
@@ -258,22 +268,15 @@ def response(
     FileError
         If an output cannot be read, is none of a run, or is driven by a force.
     """
-    import xarray as xr
-
     from mesoslip.analysis import response as responses
     from mesoslip.analysis.experiment import Experiment
 
-    several: list[PathLike | xr.DataTree]
-    if isinstance(output, str | os.PathLike | xr.DataTree):
-        several = [output]
-    else:
-        several = list(output)
     experiments = [
         Experiment(
             _as_tree(one),
             os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
         )
-        for number, one in enumerate(several)
+        for number, one in enumerate(_several(output))
     ]
     return responses.response(
         experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.layout import group_of
 
@@ -41,6 +42,8 @@ class Stage:
         Times [s].
     start_velocity, end_velocity
         Velocities of the drive [m/s].
+    is_uniform
+        Whether the velocity is constant or changes linearly; that of a measured history does not.
     exact
         What the output's group ``stages`` tells of it, from the motion itself, each of shape
         (realizations,); empty if the output has no such group.
@@ -51,6 +54,7 @@ class Stage:
     end: float
     start_velocity: float
     end_velocity: float
+    is_uniform: bool
     exact: Mapping[str, Array]
 
     @property
@@ -61,12 +65,12 @@ class Stage:
     @property
     def is_hold(self) -> bool:
         """Whether the drive stands."""
-        return self.start_velocity == 0 and self.end_velocity == 0
+        return self.is_uniform and self.start_velocity == 0 and self.end_velocity == 0
 
     @property
     def is_steady(self) -> bool:
         """Whether the drive moves at one velocity."""
-        return self.start_velocity == self.end_velocity and self.start_velocity != 0
+        return self.is_uniform and self.start_velocity == self.end_velocity != 0
 
     @property
     def velocity(self) -> float:
@@ -88,6 +92,11 @@ class Peak:
     time: Array
     displacement: Array
     is_exact: bool
+
+
+def _are_one(parts: Sequence[DrivePart]) -> bool:
+    """Whether parts of a stage go on at one velocity, or are one."""
+    return len(parts) < 2 or len({one[1:3] for one in parts} | {parts[0][1:2] * 2}) == 1
 
 
 class Experiment:
@@ -126,8 +135,8 @@ class Experiment:
             ) from None
         if self.config.drive.force_rate is not None:
             raise FileError(
-                f"{name}: is driven by a force (drive.force_rate); steady forces, velocity steps and "
-                "holds need a drive with velocities"
+                f"{name}: is driven by a force (drive.force_rate); steady forces, velocity steps "
+                "and holds need a drive with velocities"
             )
         self.name = name
         self.tree = tree
@@ -171,11 +180,19 @@ class Experiment:
     def _configured_stages(self, last: float) -> list[Stage]:
         """Stages as they were asked for, without what is known of them exactly."""
         found, start = [], 0.0
-        for number, one in enumerate(self.config.drive_stages):
-            end = start + one.duration
-            found.append(Stage(number, start, min(end, last), one.velocity, one.velocity, {}))
+        for number, parts in self._parts().items():
+            end = start + math.fsum(one.duration for one in parts)
+            speeds = (parts[0].start_velocity, parts[-1].end_velocity)
+            found.append(Stage(number, start, min(end, last), *speeds, _are_one(parts), {}))
             start = end
         return found
+
+    def _parts(self) -> dict[int, list[DrivePart]]:
+        """Parts of the drive by the number of their stage."""
+        parts: dict[int, list[DrivePart]] = {}
+        for one in self.config.drive_parts:
+            parts.setdefault(one.stage, []).append(one)
+        return parts
 
     def _recorded_stages(self) -> list[Stage]:
         """Stages as they were run, of those that all realizations came to."""
@@ -183,6 +200,7 @@ class Experiment:
         rows = {name: data[name].values for name in map(str, data.data_vars)}
         owner, numbers = rows["realization_index"], rows["stage_number"]
         realizations = self.force.shape[0]
+        parts = self._parts()
         found = []
         for number in np.unique(numbers):
             mine = np.flatnonzero(numbers == number)
@@ -196,7 +214,8 @@ class Experiment:
                 float(rows[f"drive_{which}_velocity"][mine[0]]) for which in ("start", "end")
             )
             exact = {name: values[mine] for name, values in rows.items()}
-            found.append(Stage(int(number), start, end, first, last, exact))
+            is_uniform = _are_one(parts.get(int(number), []))
+            found.append(Stage(int(number), start, end, first, last, is_uniform, exact))
         return found
 
     def samples(self, stage: Stage) -> slice:

@@ -17,6 +17,8 @@ from mesoslip.theory.rate_and_state import LAWS, Loading, RateAndState, spring_s
 
 Array = NDArray[np.float64]
 
+# Stages of a record at most; a measured history of the drive has thousands.
+MOST_STAGES = 200
 # Points of a stage that are compared: so many evenly in time, and so many in its logarithm.
 EVEN_POINTS = 60
 EARLY_POINTS = 60
@@ -341,7 +343,7 @@ def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
             break
     if best is None or not np.any(np.abs(best.fun) < FAR_OFF):
         raise RunError("the law has no motion along this record that can be followed")
-    return _judged(record, best, model(best.x), scale, length, free, bound)
+    return _judged(record, best, *model(best.x), free, bound)
 
 
 def _starts(
@@ -367,20 +369,13 @@ def _starts(
 
 
 def _judged(
-    record: Record,
-    found: Any,
-    parameters: tuple[RateAndState, float],
-    scale: float,
-    length: float,
-    free: bool,
-    bound: Array,
+    record: Record, found: Any, law: RateAndState, stiffness: float, free: bool, bound: Array
 ) -> Fit:
     """What the search found, with errors and what its residuals say."""
     from scipy.stats import chi2
 
-    law, stiffness = parameters
     # From logarithms to the parameters themselves.
-    factor = np.array([scale, law.a, law.b, law.slip_distance] + [stiffness] * free)
+    factor = np.array([record.force_scale, law.a, law.b, law.slip_distance] + [stiffness] * free)
     inverse = np.linalg.pinv(found.jac.T @ found.jac)
     covariance = inverse @ (found.jac.T @ record.correlation @ found.jac) @ inverse
     count = found.fun.size
@@ -507,9 +502,13 @@ def record_of(experiment: Experiment) -> Record | str:
     stages = experiment.stages
     first = next((place for place, one in enumerate(stages) if one.is_steady), None)
     if first is None or first == len(stages) - 1:
-        return "no velocity step and no hold after steady sliding: nothing tells a, b and D_c"
+        return "no step and no hold after sliding at one velocity: nothing tells a, b and D_c"
     reference = stages[first]
     used = stages[first:]
+    if not all(one.is_uniform for one in used):
+        return "the velocity of the drive has no simple course"
+    if len(used) > MOST_STAGES:
+        return f"more than {MOST_STAGES} stages of the drive"
     if any(sign != reference.direction for one in used for sign in _signs(one)):
         return (
             "the drive turns round, which a law with the logarithm of the velocity has no word for"
@@ -521,8 +520,8 @@ def record_of(experiment: Experiment) -> Record | str:
     for one in used:
         if experiment.sticks_and_slips(one):
             return (
-                f"sticks and slips at {abs(one.velocity):.3g} m/s: the law without inertia describes "
-                "no slips"
+                f"sticks and slips at {abs(one.velocity):.3g} m/s: the law without inertia "
+                "describes no slips"
             )
     mean = experiment.mean_of(reference)
     if mean is None:
@@ -556,7 +555,12 @@ def _signs(stage: Stage) -> Iterator[float]:
 
 
 def noise_of(experiment: Experiment, stages: Sequence[Stage]) -> Noise:
-    """Noise of the mean record of all realizations, from the steady parts of its stages."""
+    """Noise of the mean record of all realizations, from the steady parts of its stages.
+
+    Infinitely many contacts have none.
+    """
+    if not experiment.config.contact_kind.is_discrete:
+        return Noise(0.0, 0.0)
     interval = float(np.median(np.diff(experiment.time)))
     squares, lengths = [], []
     for stage in stages:

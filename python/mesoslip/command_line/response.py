@@ -94,7 +94,7 @@ def _show(
         def shown(row: dict[str, Any]) -> str:
             text = _short(scale * row[name])
             error = row.get(f"{name}_error", math.nan)
-                is_exact = math.isnan(error) or error == 0
+            is_exact = math.isnan(error) or error == 0
             return text if is_exact or text == "-" else f"{text} ± {scale * error:.2g}"
 
         return shown

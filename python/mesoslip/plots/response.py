@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 # Most dots of a line.
 MOST_DOTS = 20_000
+# Changes of the drive that are marked, and stages that are told above them.
+MOST_MARKS = 200
+MOST_LABELS = 12
 
 
 def _draw_record(axes: Axes, experiment: Experiment) -> None:
@@ -38,16 +41,14 @@ def _draw_record(axes: Axes, experiment: Experiment) -> None:
         axes.set_ylim(later.min() - 2 * margin, later.max() + margin)
     axes.set_xlabel("displacement of the load point (µm)")
     axes.set_ylabel("force / $F_s$")
-    for number, stage in enumerate(experiment.stages):
-        if number == 0:
-            continue
+    for stage in experiment.stages[1 : MOST_MARKS + 1]:
         at = sign * experiment.drive[experiment.at_start(stage)] * 1e6
         axes.axvline(at, color="tab:blue" if stage.is_hold else "0.8", linewidth=0.5, zorder=0)
     _label_stages(axes, experiment, sign)
 
 
 def _dots(experiment: Experiment) -> NDArray[np.int64]:
-    """Samples that a line shows: so many evenly in time, and so many in the drive's displacement."""
+    """Samples that a line shows: so many evenly in time, so many along the drive."""
     count = experiment.time.size
     if count <= 2 * MOST_DOTS:
         return np.arange(count)
@@ -59,7 +60,7 @@ def _dots(experiment: Experiment) -> NDArray[np.int64]:
 
 def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
     """The velocity of each stage, or how long the drive stands, above the record."""
-    if len(experiment.stages) > 12:
+    if len(experiment.stages) > MOST_LABELS:
         return
     for stage in experiment.stages:
         inside = experiment.samples(stage)

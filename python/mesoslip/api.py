@@ -375,6 +375,65 @@ def avalanche_summary(
     )
 
 
+def _several(
+    output: PathLike | xr.DataTree | Iterable[PathLike | xr.DataTree],
+) -> list[PathLike | xr.DataTree]:
+    import xarray as xr
+
+    if isinstance(output, str | os.PathLike | xr.DataTree):
+        return [output]
+    return list(output)
+
+
+def response(
+    output: PathLike | xr.DataTree | Iterable[PathLike | xr.DataTree],
+    *,
+    normal_force: float | None = None,
+    fit: bool = True,
+    free_stiffness: bool = False,
+) -> xr.DataTree:
+    """What those who measure friction read off an output, or several: see ``docs/response.md``.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or several of them.
+    normal_force
+        If it is given [N], forces are told over it too, as coefficients of friction; else over the
+        static force.
+    fit
+        Whether rate-and-state parameters are fitted, which takes some seconds.
+    free_stiffness
+        Whether the stiffness is fitted along with them, and not that of the run.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``steady``: the mean force of each stage at one velocity, with its error; ``steps``:
+        direct and evolving change and relaxation displacement of each velocity step; ``holds``:
+        relaxation, restart peak and healing of each hold; ``rate_and_state``: a, b, D_c of each
+        law, and whether it describes the output. Variables have units and long names.
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, is none of a run, or is driven by a force.
+    """
+    from mesoslip.analysis import response as responses
+    from mesoslip.analysis.experiment import Experiment
+
+    experiments = [
+        Experiment(
+            _as_tree(one),
+            os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+        )
+        for number, one in enumerate(_several(output))
+    ]
+    return responses.response(
+        experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
+    )
+
+
 def plot(
     output: PathLike | xr.DataTree,
     file: PathLike | None = None,
@@ -399,7 +458,8 @@ def plot(
         animation of the lattice: of the avalanche that spreads before a snapshot, or of all
         snapshots.
     view
-        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot.
+        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot, "response"
+        for steady forces, velocity steps and holds.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
     figure

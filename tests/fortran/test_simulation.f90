@@ -181,8 +181,8 @@ contains
       integer(i8) :: length
       integer :: number, segment, table
       character(len=:), allocatable :: name
-      character(len=10), parameter :: tables(3) = [character(len=10) :: &
-         & "trace", "slip_trace", "slips"]
+      character(len=10), parameter :: tables(4) = [character(len=10) :: &
+         & "trace", "slip_trace", "slips", "stages"]
 
       call prepare(whole, slider, law, width, delay, 0)
       call whole%start(initial_steady)

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, claims, pictures, run, sweep, theory
+from mesoslip.command_line import catalogues, claims, pictures, response, run, sweep, theory
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
@@ -24,6 +24,7 @@ COMMANDS = (
     catalogues.slips,
     catalogues.avalanches,
     catalogues.regime,
+    response.response,
     pictures.plot,
     pictures.figures,
     claims.claims,

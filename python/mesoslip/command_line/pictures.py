@@ -17,6 +17,7 @@ class View(StrEnum):
     RUN = "run"
     AVALANCHES = "avalanches"
     LATTICE = "lattice"
+    RESPONSE = "response"
 
 
 def plot(
@@ -33,7 +34,8 @@ def plot(
     view: Annotated[
         View | None,
         typer.Option(
-            help="Of a run: what happened, sizes of avalanches, contacts on their lattice"
+            help="Of a run: what happened, sizes of avalanches, contacts on their lattice, "
+            "steady forces, steps and holds"
         ),
     ] = None,
     snapshot: Annotated[

@@ -68,12 +68,6 @@ def drive_problems(config: Setting) -> Complaints:
                 else f"takes for ever at {drive.velocity:g} m/s",
                 way,
             )
-    if run.duration is not None and not drive.goes_on and run.duration > drive.length * (1 + 1e-9):
-        yield Complaint(
-            "run.duration",
-            f"is longer than the drive, which ends at {drive.length:g} s",
-            run.duration,
-        )
     if run.avalanches is not None:
         if not config.has_avalanches:
             yield Complaint(

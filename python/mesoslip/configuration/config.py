@@ -85,7 +85,9 @@ class Config(Table):
     def duration(self) -> float:
         """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
-            return self.run.duration
+            # What does not go on ends the run.
+            most = math.inf if self.drive.goes_on else self.drive.length
+            return min(self.run.duration, most)
         if self.run.drive_displacement is not None:
             return self.drive.time_for(self.run.drive_displacement)
         return self.drive.length

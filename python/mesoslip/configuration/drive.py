@@ -104,8 +104,8 @@ class DrivePart(NamedTuple):
 
 
 class Stage(Table):
-    """A stage of the drive: a constant velocity, of either sign or zero; a ramp from one velocity to
-    another; or a hold. It lasts for a time, or until the drive has gone a way."""
+    """A stage of the drive, for a time or until the drive has gone a way: a constant velocity, of
+    either sign or zero; a ramp from one velocity to another; or a hold."""
 
     duration: Annotated[Time, Field(gt=0)] | None = None
     displacement: Annotated[Length, Field(gt=0)] | None = None
@@ -160,7 +160,7 @@ class Stage(Table):
 
 
 class Cycle(Table):
-    """A drive that goes forth and back: from the start to the amplitude, to minus the amplitude, and
+    """A drive that goes forth and back: from the start to the amplitude, to minus the amplitude and
     back, so many times. Each stroke is a stage."""
 
     shape: Literal["triangle"] = "triangle"
@@ -193,8 +193,8 @@ class Cycle(Table):
 
 
 class History(Table):
-    """A measured history: displacements of the drive at times, from the first on, and straight lines
-    between them. A file is read once; what is kept are its points."""
+    """A measured history: displacements of the drive at times, from the first on, and straight
+    lines between them. A file is read once; what is kept are its points."""
 
     file: Text | None = None
     time: tuple[Time, ...] | None = None
@@ -314,8 +314,8 @@ def _columns(header: list[str]) -> dict[str, tuple[int, float]]:
 
 
 class Drive(Table):
-    """How the drive moves: at one velocity; in stages, which may be repeated; forth and back; along a
-    measured history; or as a force that grows."""
+    """How the drive moves: at one velocity; in stages, which may be repeated; forth and back; along
+    a measured history; or as a force that grows."""
 
     velocity: Velocity | None = None
     stage: tuple[Stage, ...] | None = None

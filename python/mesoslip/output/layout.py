@@ -50,8 +50,8 @@ class RealizationResults(Protocol):
     """What came out of a realization.
 
     Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
-    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_places", and
-    "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
+    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_places",
+    and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
     """
 
     @property

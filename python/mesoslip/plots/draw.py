@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, run, theory
+from mesoslip.plots import avalanches, response, run, theory
 from mesoslip.plots.style import Canvas, styled
 
-VIEWS = ("run", "avalanches", "lattice")
+VIEWS = ("run", "avalanches", "lattice", "response")
 
 
 class Picture(NamedTuple):
@@ -45,6 +45,8 @@ def picture(tree: xr.DataTree, view: str | None = None, snapshot: int | None = N
         if "avalanches" not in tree.children:
             raise FileError(NO_AVALANCHES)
         return Picture(avalanches.distribution, avalanches.draw_density)
+    if view == "response":
+        return Picture(response.overview, response.draw_force)
     if Config.from_toml(tree.attrs["configuration"]).slider.jumps:
         return Picture(avalanches.overview, avalanches.draw_force)
     return Picture(run.overview, run.draw_force)
@@ -65,7 +67,7 @@ def draw(
     tree
         The output.
     view
-        Of a run: "run", "avalanches" or "lattice"; by default what tells most.
+        Of a run: "run", "avalanches", "lattice" or "response"; by default what tells most.
     snapshot
         Number of the snapshot of a lattice; that after the largest avalanche by default.
     figure

@@ -122,8 +122,8 @@ class Kernel:
         end_velocity: Array,
         stage: NDArray[np.integer[Any]],
     ) -> None:
-        """Parts of the drive: when each ends [s], its velocities at the start and the end [m/s], and
-        the number of the stage that it is of, shape (parts)."""
+        """Parts of the drive, shape (parts): when each ends [s], its velocities at the start and at
+        the end [m/s], and the number of the stage that it is of."""
         self._call(_core.set_drive, part_end, start_velocity, end_velocity, stage)
 
     def set_recorder(

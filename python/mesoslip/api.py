@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
@@ -225,32 +227,45 @@ def avalanche_summary(
 
 
 def plot(
-    output: PathLike | xr.DataTree,
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
     file: PathLike | None = None,
     *,
     view: str | None = None,
     snapshot: int | None = None,
+    realization: int | None = None,
+    start: float = -math.inf,
+    end: float = math.inf,
+    x: str | None = None,
     figure: Figure | SubFigure | None = None,
     ax: Axes | None = None,
 ) -> Figure | SubFigure:
-    """Draw an output of any command.
+    """Draw an output of any command, or several of one command over each other.
 
-    Of a run: spring force with one slip in an inset, velocity, detached contacts; of a slider
+    Of a run: force, velocity and detached contacts, with the largest slip beside them; of a slider
     without inertia: force and avalanches; of a force curve: the force and its slope; of an onset of
-    slip: the drop of the spring force.
+    slip: the drop of the spring force. The title has what the run changes of what it is based on,
+    the legend of several outputs how they differ.
 
     Parameters
     ----------
     output
-        The output.
+        The output, or several.
     file
         Where to save the picture; nowhere by default. If its name ends in ``.gif`` it is an
         animation of the lattice: of the avalanche that spreads before a snapshot, or of all
         snapshots.
     view
-        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot.
+        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot, "layers"
+        for the waves in an elastic slider.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
+    realization
+        Number of the realization of a run; by default the first one, with others behind it.
+    start, end
+        Times of a run [s] between which it is drawn.
+    x
+        What a run is drawn against: "time", "displacement", or "drive" for the displacement of the
+        drive; by default the time, of a slider without inertia its displacement.
     figure
         Figure, or part of one, to draw into; a new one by default.
     ax
@@ -264,26 +279,40 @@ def plot(
     Raises
     ------
     FileError
-        If the output cannot be read or does not have what is to be drawn, or the picture cannot be
+        If an output cannot be read or does not have what is to be drawn, or the picture cannot be
         written.
     ConfigError
-        If there is no such view.
+        If there is no such view, or nothing to draw it against.
     """
     from mesoslip.plots import avalanches as avalanche_plots
     from mesoslip.plots.draw import draw
+    from mesoslip.plots.run import Extent
     from mesoslip.plots.style import save
 
-    if isinstance(output, str | os.PathLike):
-        with files.opened(Path(output)) as tree:
-            return plot(tree, file, view=view, snapshot=snapshot, figure=figure, ax=ax)
+    is_one = isinstance(output, str | os.PathLike) or not isinstance(output, Sequence)
+    outputs = cast("Sequence[PathLike | xr.DataTree]", [output] if is_one else output)
+    if not outputs:
+        raise FileError("there is no output to draw")
+    extent = Extent(realization, start, end, x)
     path = None if file is None else Path(file)
-    if path is not None and path.suffix == ".gif":
-        if view not in {None, "lattice"}:
-            raise FileError(f"{path}: only the lattice can be shown in motion, not {view!r}")
-        return avalanche_plots.animate(output, path, snapshot)
-    drawn = draw(output, view, snapshot, figure=figure, axes=ax)
-    if path is not None:
-        save(drawn, path)
+    is_moving = path is not None and path.suffix == ".gif"
+    if is_moving and (view not in {None, "lattice"} or len(outputs) > 1):
+        what = "of one output" if len(outputs) > 1 else f"not {view!r}"
+        raise FileError(f"{path}: only the lattice can be shown in motion, {what}")
+    with ExitStack() as stack:
+        trees, names = [], []
+        for number, one in enumerate(outputs):
+            if isinstance(one, str | os.PathLike):
+                names.append(str(one))
+                trees.append(stack.enter_context(files.opened(Path(one))))
+            else:
+                names.append(one.attrs.get("title", f"output {number}"))
+                trees.append(one)
+        if path is not None and is_moving:
+            return avalanche_plots.animate(trees[0], path, snapshot)
+        drawn = draw(trees, names, view, snapshot, extent=extent, figure=figure, axes=ax)
+        if path is not None:
+            save(drawn, path)
     return drawn
 
 

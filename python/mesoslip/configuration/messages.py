@@ -92,7 +92,7 @@ def _table_at(place: list[Any], slider: str, whole: type[Table]) -> type[Table]:
     table = whole
     for name in place:
         if isinstance(name, str):
-            inner = _tables_in(table.model_fields[name].annotation)
+            inner = tables_in(table.model_fields[name].annotation)
             table = SLIDERS[slider] if name == "slider" else next(inner)
     return table
 
@@ -101,13 +101,13 @@ def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
     """Dotted names of all keys."""
     for name, field in table.model_fields.items():
         yield outer + name
-        for inner in _tables_in(field.annotation):
+        for inner in tables_in(field.annotation):
             yield from all_keys(inner, f"{outer}{name}.")
 
 
-def _tables_in(annotation: Any) -> Iterator[type[Table]]:
+def tables_in(annotation: Any) -> Iterator[type[Table]]:
     """The tables that an annotation names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
     for part in get_args(annotation):
-        yield from _tables_in(part)
+        yield from tables_in(part)

@@ -226,6 +226,29 @@ def avalanche_summary(
     )
 
 
+def _several(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
+) -> Sequence[PathLike | xr.DataTree]:
+    """Outputs, of which there may be one."""
+    is_one = isinstance(output, str | os.PathLike) or not isinstance(output, Sequence)
+    return cast("Sequence[PathLike | xr.DataTree]", [output] if is_one else output)
+
+
+def _opened(
+    outputs: Sequence[PathLike | xr.DataTree], stack: ExitStack
+) -> tuple[list[xr.DataTree], list[str]]:
+    """Outputs, of which only what is used is read, and what they are called."""
+    trees, names = [], []
+    for number, one in enumerate(outputs):
+        if isinstance(one, str | os.PathLike):
+            names.append(str(one))
+            trees.append(stack.enter_context(files.opened(Path(one))))
+        else:
+            names.append(one.attrs.get("title", f"output {number}"))
+            trees.append(one)
+    return trees, names
+
+
 def plot(
     output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
     file: PathLike | None = None,
@@ -289,8 +312,7 @@ def plot(
     from mesoslip.plots.run import Extent
     from mesoslip.plots.style import save
 
-    is_one = isinstance(output, str | os.PathLike) or not isinstance(output, Sequence)
-    outputs = cast("Sequence[PathLike | xr.DataTree]", [output] if is_one else output)
+    outputs = _several(output)
     if not outputs:
         raise FileError("there is no output to draw")
     extent = Extent(realization, start, end, x)
@@ -300,20 +322,45 @@ def plot(
         what = "of one output" if len(outputs) > 1 else f"not {view!r}"
         raise FileError(f"{path}: only the lattice can be shown in motion, {what}")
     with ExitStack() as stack:
-        trees, names = [], []
-        for number, one in enumerate(outputs):
-            if isinstance(one, str | os.PathLike):
-                names.append(str(one))
-                trees.append(stack.enter_context(files.opened(Path(one))))
-            else:
-                names.append(one.attrs.get("title", f"output {number}"))
-                trees.append(one)
+        trees, names = _opened(outputs, stack)
         if path is not None and is_moving:
             return avalanche_plots.animate(trees[0], path, snapshot)
         drawn = draw(trees, names, view, snapshot, extent=extent, figure=figure, axes=ax)
         if path is not None:
             save(drawn, path)
     return drawn
+
+
+def report(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree], file: PathLike
+) -> None:
+    """Write a page about an output of any command, or about several of one command side by side.
+
+    What differs, pictures, slips or avalanches with their distributions, the balance of energy,
+    the configuration, and where it comes from. The page needs nothing else: no network, no scripts.
+
+    Parameters
+    ----------
+    output
+        The output, or several.
+    file
+        The page (HTML).
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, outputs are of different commands, or the page cannot be
+        written.
+    """
+    from mesoslip.reports.content import Subject
+    from mesoslip.reports.page import write
+
+    with ExitStack() as stack:
+        trees, names = _opened(_several(output), stack)
+        paths = [Path(name) for name in names]
+        stems = [path.stem for path in paths]
+        short = stems if len(set(stems)) == len(stems) else names
+        write([Subject(*one) for one in zip(short, trees, strict=True)], Path(file))
 
 
 def figures(

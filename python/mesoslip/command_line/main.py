@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, pictures, run, theory
+from mesoslip.command_line import catalogues, pictures, report, run, theory
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
@@ -24,6 +24,7 @@ COMMANDS = (
     catalogues.avalanches,
     pictures.plot,
     pictures.figures,
+    report.report,
 )
 
 app = typer.Typer(

@@ -88,7 +88,8 @@ def told(config: Config, base: Config) -> list[str]:
     defaults of new ones are not named.
     """
     own = dict(_flat(config.model_dump(exclude_none=True, exclude_defaults=True), ""))
-    texts, last = [], []
+    texts: list[str] = []
+    last: list[str] = []
     for key, (value, before) in differences([config, base]):
         if value == MISSING or (before == MISSING and key not in own):
             continue
@@ -107,8 +108,9 @@ def labels(configs: Sequence[Config], names: Sequence[str]) -> list[str]:
     found = [one for one in all_found if not is_bookkeeping(one.key)] or all_found
     texts = []
     for place, name in enumerate(names):
-        parts = [f"{one.key} = {one.values[place]}" for one in found[:3]]
-        parts += [f"and {len(found) - 3} more"] if len(found) > 3 else []
+        given = [one for one in found if one.values[place] != MISSING] or found
+        parts = [f"{one.key} = {one.values[place]}" for one in given[:3]]
+        parts += [f"and {len(given) - 3} more"] if len(given) > 3 else []
         texts.append(", ".join(parts) if parts else name)
     return [
         text if texts.count(text) == 1 or not found else f"{name}: {text}"

@@ -181,8 +181,8 @@ def draw_drops(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str]) 
         axes.plot(times / time.size, drop / force.size, **style)
         if name == "sequential":
             # Where S46 ends, which may be so early that its line is not seen.
-            place = times[-1] / time.size, drop[-1] / force.size
-            axes.plot(*place, ".", color=style["color"], markersize=3)
+            end = times[-1] / time.size, drop[-1] / force.size
+            axes.plot(*end, ".", color=style["color"], markersize=3)
     axes.set_xlabel(time.label("time $t - t_c$ since the onset"))
     axes.set_ylabel(force.label(r"change of the spring force $\Delta F_d$"))
 

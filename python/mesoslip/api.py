@@ -363,6 +363,35 @@ def report(
         write([Subject(*one) for one in zip(short, trees, strict=True)], Path(file))
 
 
+def example(name: str, file: PathLike | None = None) -> list[Path]:
+    """Write a run that comes with the program, and beside it what it is based on.
+
+    See `mesoslip.examples.examples` for those that there are.
+
+    Parameters
+    ----------
+    name
+        Such as "klein".
+    file
+        Where to write it; a file of that name with the ending ``.toml`` here by default.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files that were written; what it is based on is not if it is there already.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such run.
+    FileError
+        If there is a file of the name already, or it cannot be written.
+    """
+    from mesoslip import examples
+
+    return examples.example(name, Path(file or f"{Path(name).name}{examples.ENDING}"))
+
+
 def figures(
     names: Iterable[str] = (), *, outputs: PathLike = "out", folder: PathLike = "out/figures"
 ) -> list[Path]:

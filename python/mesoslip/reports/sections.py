@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.analysis import slips as slip_catalogue
@@ -63,6 +64,11 @@ PROVENANCE = {
     "advance_count": "steps of the slider",
     "wall_seconds": "computing time, s",
 }
+
+
+def _shown(value: float, unit: str) -> str:
+    """A number of a table; numbers of breaks to the last one."""
+    return with_unit(value, unit, 4 if unit != "1" else 8)
 
 
 def _named(subjects: Sequence[Subject], subject: Subject, text: str) -> str:
@@ -160,13 +166,19 @@ def slips(subjects: Sequence[Subject]) -> Section | None:
                 continue
             one = statistics[name]
             kinds = ("mean", "standard_deviation", "minimum", "maximum")
-            rows.append((told, *(with_unit(one[kind], unit) for kind in kinds)))
-        head = (f"{count} slips", "mean", "standard deviation", "least", "greatest")
+            rows.append((told, *(_shown(one[kind], unit) for kind in kinds)))
+        head = (
+            f"{count} slip{'s' if count > 1 else ''}",
+            "mean",
+            "standard deviation",
+            "least",
+            "greatest",
+        )
         note = "The first slip of relaxed contacts is larger than the others, and counts here."
         if len(subjects) > 1:
             blocks.append(Text(subject.name))
         blocks.append(Table(head, tuple(rows), note))
-    if blocks and any(group_of(one.tree, "slips").sizes["slip"] for one in there):
+    if any(group_of(one.tree, "slips").sizes["slip"] > 1 for one in there):
         blocks.append(drawn("Distributions of the slips", lambda: _histograms(there)))
     if len(subjects) == 1:
         blocks += _slip_rows(there[0])
@@ -200,6 +212,7 @@ def _histograms(subjects: Sequence[Subject]) -> Figure:
                 color=COLORS[number % len(COLORS)] if len(subjects) > 1 else "0.6",
                 label=subject.name,
             )
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     panels[0].set_ylabel("slips")
     if len(subjects) > 1:
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
@@ -214,7 +227,7 @@ def _slip_rows(subject: Subject) -> list[Block]:
     shown = []
     for row in rows[:MOST_ROWS]:
         values = (
-            "" if row[name] is None else with_unit(float(row[name]), unit)
+            "" if row[name] is None else _shown(float(row[name]), unit)
             for name, (_, unit) in SLIP_COLUMNS.items()
         )
         start = with_unit(row["start_time"], "s", 7)

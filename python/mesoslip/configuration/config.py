@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import ValidationError, model_validator
+from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from mesoslip.configuration import checks
@@ -21,7 +21,14 @@ from mesoslip.configuration.contacts import contact_kind
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
 from mesoslip.configuration.drive import Drive, DrivePart
-from mesoslip.configuration.files import Change, on_base, override, parse_toml, read_toml
+from mesoslip.configuration.files import (
+    Change,
+    base_of,
+    on_base,
+    override,
+    parse_toml,
+    read_toml,
+)
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
@@ -40,6 +47,27 @@ class Config(Table):
     interaction: Interaction | None = None
     output: Output = Output()
     curve: Curve = Curve()
+
+    # The tables that the configuration was laid over, for those who ask what it changes.
+    _base: Mapping[str, Any] | None = PrivateAttr(default=None)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another configuration is of the same run, whatever they were laid over."""
+        return isinstance(other, Config) and self.__dict__ == other.__dict__
+
+    @property
+    def base(self) -> Config | None:
+        """What the configuration was laid over, if that can be run by itself.
+
+        The file under its own, or without such a file that without the changes, or the
+        configuration that it replaces.
+        """
+        if self._base is None:
+            return None
+        try:
+            return self.model_validate(self._base)
+        except ValidationError:
+            return None
 
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
@@ -161,8 +189,10 @@ class Config(Table):
         ConfigError
             If anything in it is wrong.
         """
-        path = Path(path)
-        return cls._checked(override(read_toml(path), overrides), str(path))
+        path, overrides = Path(path), tuple(overrides)
+        tables = read_toml(path)
+        base = base_of(path) or (tables if overrides else None)
+        return cls._checked(override(tables, overrides), str(path), base)
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
@@ -182,14 +212,19 @@ class Config(Table):
         cls, text: str, source: str = "configuration", overrides: Iterable[Change] = ()
     ) -> Config:
         """Check a configuration given as the text of a TOML file, with changes laid over it."""
-        return cls._checked(override(parse_toml(text, source), overrides), source)
+        tables, overrides = parse_toml(text, source), tuple(overrides)
+        return cls._checked(override(tables, overrides), source, tables if overrides else None)
 
     @classmethod
-    def _checked(cls, tables: Mapping[str, Any], source: str) -> Config:
+    def _checked(
+        cls, tables: Mapping[str, Any], source: str, base: Mapping[str, Any] | None = None
+    ) -> Config:
         try:
-            return cls.model_validate(tables)
+            config = cls.model_validate(tables)
         except ValidationError as error:
             raise ConfigError(problems(error, source, cls)) from None
+        config._base = base
+        return config
 
     def replace(self, *changes: Change, **tables: Any) -> Config:
         """A configuration with changes, checked like any other.
@@ -206,7 +241,8 @@ class Config(Table):
         ConfigError
             If anything in it is wrong.
         """
-        return self._checked(override(self.to_dict(), (*changes, tables)), "configuration")
+        old = self.to_dict()
+        return self._checked(override(old, (*changes, tables)), "configuration", old)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; with other tables, if they can be run.

@@ -37,6 +37,12 @@ def read_toml(path: Path) -> dict[str, Any]:
     return _read(path, ())
 
 
+def base_of(path: Path) -> dict[str, Any] | None:
+    """Tables of the file that a file names as its base, if it names one; see `read_toml`."""
+    base = parse_toml(text_of(path, "a configuration file"), str(path)).get("base")
+    return None if base is None else _read(path.parent / base, (path,))
+
+
 def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> dict[str, Any]:
     """Tables laid over those of the file that their key ``base`` names, relative to a folder.
 

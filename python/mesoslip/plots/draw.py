@@ -193,7 +193,8 @@ def draw(
         The outputs, and what they are called where they do not differ. Several are drawn over each
         other.
     view
-        Of a run: "run", "avalanches", "lattice", "layers" or "response"; what tells most by default.
+        Of a run: "run", "avalanches", "lattice", "layers" or "response"; by default what tells
+        most.
     snapshot
         Number of the snapshot of a lattice; that after the largest avalanche by default.
     extent

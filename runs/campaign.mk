@@ -8,7 +8,8 @@ FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc $(ONSETS)
 # Claims have runs of their own, with several realizations, and use some of the figures'.
 CLAIM_OUTPUTS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/claims/*.toml runs/limit-*.toml)) \
   out/S18.curve.nc $(ONSETS)
-SWEEPS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/sweeps/*.toml))
+SWEEPS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/sweeps/*.toml runs/maps/*.toml))
+MAPS := $(patsubst runs/%.toml,out/%.png,$(wildcard runs/maps/*.toml))
 
 figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/figures
 	$(MESOSLIP) figures -o out/figures
@@ -16,7 +17,7 @@ figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/
 claims: $(CLAIM_OUTPUTS) | $(INSTALLED) ## Judge the source's claims into out/claims.md
 	$(MESOSLIP) claims -o out/claims.md
 
-campaign: $(SWEEPS) ## Run the sweeps of runs/sweeps
+campaign: $(SWEEPS) $(MAPS) ## Run the sweeps of runs/sweeps and runs/maps, and draw the maps
 
 # An output depends on its run and on what that is based on, not on the program: a build does not make
 # hours of outputs stale. Expanded a second time, when the name of the output is known.
@@ -28,7 +29,11 @@ bases = $(patsubst $(1)>%,%,$(filter $(1)>%,$(chains)))
 out/%.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) run $< -o $@
 
+# A sweep keeps its points beside its output: what was interrupted goes on.
 out/sweeps/%.nc: runs/sweeps/%.toml $$(call bases,runs/sweeps/$$*.toml) | $(INSTALLED)
+	$(MESOSLIP) sweep $< -o $@
+
+out/maps/%.nc: runs/maps/%.toml $$(call bases,runs/maps/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) sweep $< -o $@
 
 out/%.curve.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)

@@ -13,7 +13,7 @@ from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, response, run, theory
+from mesoslip.plots import avalanches, maps, response, run, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
 
@@ -24,6 +24,7 @@ KINDS = {
     "run": "a run",
     "curve": "a force curve",
     "onset": "an onset of slip",
+    "sweep": "a sweep",
 }
 
 
@@ -38,6 +39,8 @@ def kind_of(tree: xr.DataTree) -> str:
     """Which command an output is of, a name of `KINDS`."""
     if "spring_force" in tree.data_vars:
         return "run"
+    if "status" in tree.data_vars:
+        return "sweep"
     return "curve" if "slope" in tree.data_vars else "onset"
 
 
@@ -59,6 +62,11 @@ def picture(
         return Picture(
             lambda figure: theory.slip_onset(tree, figure),
             lambda axes: theory.draw_drop(axes, tree),
+        )
+    if kind == "sweep":
+        return Picture(
+            lambda figure: maps.overview(tree, figure, view),
+            lambda axes: maps.draw_panel(axes, tree),
         )
     if view == "lattice":
         chosen = avalanches.chosen_snapshot(tree, snapshot)
@@ -156,6 +164,8 @@ def _alone(panel: Callable[[Axes], None], entries: int) -> Picture:
 
 def _check_view(kind: str, view: str | None, extent: Extent) -> None:
     """Whether there is such a picture of an output of a kind."""
+    if kind == "sweep" and extent == EVERYTHING:
+        return
     if view not in {None, *VIEWS}:
         choice = ", ".join(VIEWS)
         raise ConfigError([Problem("", "view", f"no such picture; choose of {choice}", view)])

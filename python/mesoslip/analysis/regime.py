@@ -355,12 +355,13 @@ def _regime(judged: Judgement, halves: list[float], *, is_renewed: bool) -> int:
 def _stage(config: Config, reached: float) -> _Stage:
     """The last stage that moves, of those that a run came to."""
     begin, found = 0.0, _Stage(0.0, reached, 0.0)
-    for stage in config.drive_stages:
+    for part in config.drive_parts:
         if begin >= reached:
             break
-        end = min(begin + stage.duration, reached)
-        if stage.velocity != 0:
-            found = _Stage(begin, end, stage.velocity)
+        end = min(begin + part.duration, reached)
+        velocity = part.end_velocity or part.start_velocity
+        if velocity != 0:
+            found = _Stage(begin, end, velocity)
         begin = end
     return found
 

@@ -1,1 +1,1 @@
-"""Campaigns: many runs from one file, their measures in one dataset."""
+"""Campaigns: many runs at once, and what they say together."""

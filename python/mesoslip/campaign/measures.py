@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.regime import NAMES, REGIME, regimes
+from mesoslip.campaign import predictions
 from mesoslip.errors import ConfigError, Problem, RunError
 
 if TYPE_CHECKING:
@@ -198,6 +199,11 @@ def _judged(name: str) -> Function:
     return lambda run: run.judged[name]
 
 
+def _predicted(function: Callable[[xr.DataTree], float]) -> Function:
+    """What theory says of the configuration of a run."""
+    return lambda run: function(run.tree)
+
+
 MEASURES: dict[str, Measure] = {
     one.name: one
     for one in (
@@ -231,6 +237,24 @@ MEASURES: dict[str, Measure] = {
         Measure("avalanche_count", _avalanche_count, "1", "number of avalanches"),
         Measure("mean_avalanche_size", _mean_avalanche_size, "1", "mean size of avalanches"),
         Measure("largest_avalanche", _largest_avalanche, "1", "size of the greatest avalanche"),
+        Measure(
+            "growth_rate",
+            _predicted(predictions.growth_rate),
+            "s-1",
+            "growth rate of small perturbations of steady sliding with delay, by linear theory",
+        ),
+        Measure(
+            "critical_stiffness_ratio",
+            _predicted(predictions.critical_stiffness_ratio),
+            "1",
+            "K* of the master equation over the stiffness of the spring",
+        ),
+        Measure(
+            "waiting_over_damping",
+            _predicted(predictions.waiting_over_damping),
+            "1",
+            "mean time between slips times the damping rate of the setup, tau_ss eta_S",
+        ),
         *(
             Measure(
                 name,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show
+from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show, time_of
 
 # Scale and unit of the statistics of slips: those of the table above them.
 SHOWN = {
@@ -97,7 +97,7 @@ def avalanches(
     if table is not None:
         files.check_writable(table, [output])
     tree = files.read_run(output)
-    start = _time(after, "--after")
+    start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)
     if table is not None:
         avalanche_catalogue.write_csv(data, table)
@@ -129,17 +129,6 @@ def avalanches(
     warning = avalanche_catalogue.warning(statistics)
     if warning is not None:
         typer.echo(f"warning: {warning}")
-
-
-def _time(text: str, option: str) -> float:
-    """A time given to an option [s]."""
-    from mesoslip.configuration.units import to_si
-    from mesoslip.errors import ConfigError, Problem
-
-    try:
-        return to_si(text, "s", "2 s")
-    except ValueError as error:
-        raise ConfigError([Problem("", option, str(error), text)]) from None
 
 
 def regime(output: OutputArgument, as_json: JsonOption = False) -> None:

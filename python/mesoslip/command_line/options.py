@@ -13,6 +13,9 @@ ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
 ]
 OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metavar="OUT.nc")]
+OutputsArgument = Annotated[
+    list[Path], typer.Argument(help="Outputs of mesoslip", metavar="OUT.nc...")
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -54,3 +57,14 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(one) for one in value]
     return value
+
+
+def time_of(text: str, option: str) -> float:
+    """A time given to an option [s]."""
+    from mesoslip.configuration.units import to_si
+    from mesoslip.errors import ConfigError, Problem
+
+    try:
+        return to_si(text, "s", "2 s")
+    except ValueError as error:
+        raise ConfigError([Problem("", option, str(error), text)]) from None

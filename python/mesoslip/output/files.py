@@ -61,6 +61,7 @@ OLD_NAMES = {
 }
 GROUPS = {
     "slips": variables.SLIPS,
+    "stages": variables.STAGES,
     "slip_traces": variables.SLIP_TRACES,
     "avalanches": variables.AVALANCHES,
     "snapshots": variables.SNAPSHOTS,
@@ -72,6 +73,7 @@ GROUPS = {
 # it may have.
 ROOT_NEEDS = tuple(variables.TRACE)[:6]
 NEEDS = {
+    "stages": (("stage",), tuple(variables.STAGES)),
     "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
     "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
     "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:8]),

@@ -44,6 +44,7 @@ def program_attributes(config: Config, command: str) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"mesoslip {version('mesoslip')}"
     asked = COMMAND_LINE.get() or f"mesoslip.{command} in Python"
+    base = config.base
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": config.title or "Stick-slip of a multicontact interface",
@@ -53,6 +54,8 @@ def program_attributes(config: Config, command: str) -> dict[str, Any]:
         "history": f"{now} {program}: {asked}",
         "date_created": now,
         "configuration": config.to_toml(),
+        # What the configuration was laid over; of no consequence for the results.
+        **({} if base is None else {"base_configuration": base.to_toml()}),
         "program_version": version("mesoslip"),
         "commit": _build.COMMIT,
         "compiler": _build.COMPILER,

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import Contacts
+from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.table import Complaints, Table
-from mesoslip.configuration.tables import Drive, Output
+from mesoslip.configuration.tables import Output
 
 if TYPE_CHECKING:
     import numpy as np

@@ -512,3 +512,14 @@ def test_what_is_wrong_with_an_end_is_told(changes, words):
         Config.from_dict(klein_tables(**changes))
     for word in words:
         assert word in str(told.value)
+
+
+def test_info_knows_ramps_and_holds(klein):
+    """Their stages, duration, way, and the speed that stands for them elsewhere."""
+    derived = mesoslip.info(klein(run__duration=None, **RAMPS))
+    values = {name: derived[name].value for name in derived if name.startswith("drive_")}
+    expected = {"stages": 3, "duration": 0.1, "way": 4e-7 + 0.05 * (1e-10 + 4e-10) / 6e-5}
+    for name, value in expected.items():
+        assert values[f"drive_{name}"] == pytest.approx(value)
+    assert values["drive_speed"] == 2e-5
+    assert "drive_way" not in mesoslip.info(klein())

@@ -237,7 +237,7 @@ def test_a_cycle_is_stages_to_the_bit(speed):
 
 def test_a_history_is_stages_to_the_bit(tmp_path):
     """But for slips, which its points do not end, and for the stages themselves."""
-    points = [(2.0, 5e-7), (2.03, 8e-7), (2.04, 8e-7), (2.1, 1e-7)]
+    points = [(2.0, 5e-23), (2.03, 3e-7), (2.04, 3e-7), (2.1, -4e-7)]
     lines = [f"{time},x,{place}" for time, place in points]
     (tmp_path / "moved.csv").write_text("\n".join(["time [s],note,displacement [m]", *lines, ""]))
     case = tmp_path / "case.toml"

@@ -166,7 +166,8 @@ def _wrong_stages(tree: xr.DataTree, config: Config) -> Iterator[str]:
     stages = tree["stages"].to_dataset(inherit=False)
     yield from _wrong_owners(stages, tree, "stages")
     slack = ROUNDING * max(
-        config.contacts.static_force, float(np.max(np.abs(stages["greatest_force"]), initial=0.0))
+        config.contacts.static_force,
+        float(np.max(np.abs(stages["greatest_force"].values), initial=0.0)),
     )
     for _, mine in _owned(stages, tree):
         start, end = mine["stage_start_time"].values, mine["stage_end_time"].values

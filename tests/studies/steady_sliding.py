@@ -16,6 +16,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 from mesoslip import Config, SteadySliding
+from mesoslip.theory.steady_sliding import OUT_OF_STEP
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -142,8 +143,6 @@ def compare_growth() -> None:
         (400.0, 1e-3, 40e-6, 20e-6),
         (1600.0, 3e-4, 20e-6, 6e-6),
         (1600.0, 3e-4, 20e-6, 3e-6),
-        (25.0, 1e-4, 90e-6, 60e-6),
-        (25.0, 1e-4, 90e-6, 40e-6),
     ]:
         changes = {"slider": {"stiffness": stiffness}, "contacts": {"delay": delay}}
         alone = Config.from_dict(
@@ -214,29 +213,45 @@ def draw_map(file: str) -> None:
 
     figure, axes = plt.subplots(1, len(VELOCITIES), figsize=(12, 5), layout="constrained")
     for velocity, panel in zip(VELOCITIES, axes, strict=True):
-        growth = np.array(
-            [
-                [SteadySliding(at(velocity, delay, one)).growth_rate for delay in FINE_DELAYS]
-                for one in FINE_STIFFNESSES
-            ]
-        )
-        panel.contourf(
-            1e3 * FINE_DELAYS, FINE_STIFFNESSES, growth, [0, 1e9], colors=["tab:red"], alpha=0.15
-        )
-        panel.contour(1e3 * FINE_DELAYS, FINE_STIFFNESSES, growth, [0], colors=["tab:red"])
-        told: dict[tuple[bool, str], int] = {}
+        for width, style in ((WIDTH, "solid"), (OUT_OF_STEP, "dashed")):
+            growth = np.array(
+                [
+                    [
+                        SteadySliding(
+                            at(velocity, delay, stiffness), relative_width=width
+                        ).growth_rate
+                        for delay in FINE_DELAYS
+                    ]
+                    for stiffness in FINE_STIFFNESSES
+                ]
+            )
+            panel.contour(
+                *(1e3 * FINE_DELAYS, FINE_STIFFNESSES, growth, [0]),
+                colors=["tab:red"],
+                linestyles=style,
+            )
+            if width == WIDTH:
+                panel.contourf(
+                    *(1e3 * FINE_DELAYS, FINE_STIFFNESSES, growth, [0, 1e9]),
+                    colors=["tab:red"],
+                    alpha=0.15,
+                )
+        told: dict[tuple[str, str], int] = {}
         for delay in DELAYS:
             for stiffness in STIFFNESSES:
                 config = at(velocity, delay, stiffness)
                 data = mesoslip.regime(mesoslip.run(config, workers=1))
                 regime = int(data["regime"][0])
-                is_stable = SteadySliding(config).is_stable
+                sliding = SteadySliding(config)
+                stable = "stable" if sliding.is_stable else "unstable"
+                if sliding.is_stable != sliding.is_stable_out_of_step:
+                    stable += " in step only"
                 name = data["regime"].attrs["flag_meanings"].split()[regime]
-                told[is_stable, name] = told.get((is_stable, name), 0) + 1
-                if is_stable == (regime in {1, 2}):
+                told[stable, name] = told.get((stable, name), 0) + 1
+                if sliding.is_stable_out_of_step == (regime in {1, 2}):
                     print(
                         f"{1e6 * velocity:g} um/s, {1e3 * delay:.3g} ms, {stiffness:.3g} N/m: "
-                        f"{'stable' if is_stable else 'unstable'}, {name}, "
+                        f"{stable}, {name}, "
                         f"amplitude {float(data['relative_amplitude'][0]):.3f}",
                         flush=True,
                     )
@@ -253,8 +268,9 @@ def draw_map(file: str) -> None:
         panel.set(xlabel="delay, ms", ylabel="stiffness K, N/m", title=f"{1e6 * velocity:g} µm/s")
     for number, name in enumerate(("smooth", "stick-slip", "irregular", "transient")):
         axes[0].plot([], [], MARKERS[number], color=COLOURS[number], label=name)
+    axes[0].plot([], [], "--", color="tab:red", label="the same out of step")
     axes[0].fill_between([], [], color="tab:red", alpha=0.15, label="steady sliding unstable")
-    figure.legend(loc="outside lower center", ncols=5)
+    figure.legend(loc="outside lower center", ncols=6)
     figure.savefig(file, dpi=110)
 
 

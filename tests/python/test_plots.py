@@ -259,8 +259,9 @@ def test_several_outputs_say_how_they_differ(runs):
     assert texts == ["contacts.delay = 500 µs", "contacts.delay = 2 ms"]
     first, second = figure.axes[0].lines
     for line, name in ((first, "plain"), (second, "slow")):
-        top = runs[name]["spring_force"].values.max() * 1e6
-        assert line.get_ydata().max() == pytest.approx(top)
+        parts = runs[name]["spring_force"], runs[name]["slip_traces/spring_force"]
+        top = max(one.values.max() for one in parts)
+        assert line.get_ydata().max() == pytest.approx(top * 1e6)
     assert overlapping(figure) == []
     # Those that do not differ are told apart by their names.
     figure = mesoslip.plot([runs["plain"], runs["plain"]])
@@ -291,6 +292,12 @@ def test_what_cannot_be_drawn_is_told(runs, given, options, told):
 def test_outputs_of_different_commands_are_not_drawn_together(runs, klein):
     with pytest.raises(mesoslip.FileError, match=r"is a run.* is a force curve"):
         mesoslip.plot([runs["plain"], mesoslip.curve(klein())])
+
+
+def test_what_is_of_no_known_command_is_told(runs):
+    other = xr.DataTree(xr.Dataset(attrs={"configuration": runs["plain"].attrs["configuration"]}))
+    with pytest.raises(mesoslip.FileError, match="neither a run"):
+        mesoslip.plot(other)
 
 
 def test_waves_are_the_velocities_of_the_layers(runs):

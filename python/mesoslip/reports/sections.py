@@ -1,7 +1,7 @@
 """The sections that the report of each kind of output has.
 
 Adding one is adding a function to a list of `SECTIONS`; another kind of output adds a list, and
-what tells it apart to `mesoslip.plots.draw.kind_of`.
+what tells it apart to `mesoslip.plots.draw.KINDS`.
 """
 
 from __future__ import annotations

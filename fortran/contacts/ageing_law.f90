@@ -22,6 +22,20 @@ module mesoslip_contacts_ageing_law
    !> Ages over tau_a beyond which nothing relaxes any more, as exp(-40) is below rounding.
    real(wp), parameter :: old = 40.0_wp
 
+   !> Coefficients of exp(T(p)), where T = p exp(T) < 1, in powers of (1 - e p)^(1/2), in which it
+   !> is analytic; right to 5e-5.
+   real(wp), parameter :: tree_start(0:6) = [2.718238_wp, -3.839751_wp, 4.452257_wp, &
+      & -4.483397_wp, 3.511888_wp, -1.760118_wp, 0.400914_wp]
+   !> Speed times time beyond which thresholds do not change while a contact is stretched [m]
+   real(wp), parameter :: longest_scale = 1.0e30_wp
+   real(wp), parameter :: euler = 2.718281828459045235_wp
+   !> Step of an iteration of the fourth order after which nothing is left to correct
+   real(wp), parameter :: enough = 1.0e-4_wp
+   !> The same of Newton's method, relative
+   real(wp), parameter :: enough_of_newton = 1.0e-8_wp
+   !> Iterations, more than are ever needed but where a contact just does not break
+   integer, parameter :: most_iterations = 60
+
    !> A law of ageing.
    type :: ageing_law_type
       !> One of the ageing_ codes
@@ -39,12 +53,19 @@ module mesoslip_contacts_ageing_law
       procedure, non_overridable :: follow
       !> Threshold at an age
       procedure, non_overridable :: threshold
+      !> Threshold at which a contact breaks whose stretch grows at a steady speed
+      procedure, non_overridable :: meet
+      !> What the rate changes by in a second
+      procedure, non_overridable :: bend
       !> Configured threshold of the contacts that break at an age under a force
       procedure, non_overridable :: configured
       !> Whether the threshold falls with age
       procedure, non_overridable :: falls
-      !> Whether the threshold does not change any more
+      !> Whether any threshold changes with age, that of a contact, and whether it does so any more
+      procedure, non_overridable :: acts
+      procedure, non_overridable :: is_constant
       procedure, non_overridable :: is_old
+      procedure, non_overridable, private :: lack, meet_grown
    end type ageing_law_type
 
 contains
@@ -121,12 +142,33 @@ contains
          threshold = configured
          rate = 0.0_wp
       else
-         lack = (self%mean_lack * mean + self%width_lack * (configured - mean)) &
-            & * exp(-age / self%time)
+         lack = self%lack(configured, mean) * exp(-age / self%time)
          threshold = configured - lack
          rate = lack / self%time
       end if
    end subroutine follow
+
+   !> What the rate of a threshold changes by in a second.
+   elemental function bend(self, rate, age)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Rate of the threshold, in any unit for a second, and age [s]
+      real(wp), intent(in) :: rate, age
+      !> Its change in that unit for a second squared
+      real(wp) :: bend
+
+      bend = -rate / self%time
+      if (self%kind == ageing_log) bend = -rate / (self%time + age)
+   end function bend
+
+   !> What the threshold of a contact lacks at birth.
+   elemental function lack(self, configured, mean)
+      class(ageing_law_type), intent(in) :: self
+      real(wp), intent(in) :: configured, mean
+      real(wp) :: lack
+
+      lack = self%mean_lack * mean + self%width_lack * (configured - mean)
+   end function lack
 
    !> Threshold at an age.
    pure function threshold(self, configured, mean, age)
@@ -143,6 +185,120 @@ contains
 
       call self%follow(configured, mean, age, threshold, rate)
    end function threshold
+
+   !> Threshold at which a contact breaks whose stretch grows at a steady speed.
+   !>
+   !> It is the threshold that a slower contact at least has where it breaks, if thresholds grow.
+   !>
+   !> With the way w in units of s = speed times tau_a, the threshold is U - L exp(-w) and the
+   !> stretch is x + s w. Where both are the same the threshold is U - s T, with T = p exp(T) and
+   !> p = L/s exp(-(U - x)/s), of which the lesser solution is meant: T is the rate of the threshold
+   !> over the speed (R. Corless et al., Adv. Comput. Math. 5 (1996) 329).
+   pure function meet(self, configured, mean, age, stretch, speed) result(threshold)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Configured threshold of the contact, and the mean of all contacts, as stretches [m]
+      real(wp), intent(in) :: configured, mean
+      !> Age, not negative [s]
+      real(wp), intent(in) :: age
+      !> Stretch at this age [m], and the speed at which it grows, positive [m/s]
+      real(wp), intent(in) :: stretch, speed
+      !> Threshold where it breaks, that of now if the stretch is beyond it [m]
+      real(wp) :: threshold
+
+      real(wp) :: lack, scale, way, part
+
+      scale = speed * self%time
+      if (self%kind == ageing_log) then
+         threshold = self%meet_grown(configured, age / self%time, stretch, scale)
+         return
+      end if
+      lack = self%lack(configured, mean)
+      if (age > 0.0_wp) lack = lack * exp(-min(age / self%time, old))
+      threshold = configured - lack
+      if (threshold <= stretch .or. scale > longest_scale) return
+      way = (configured - stretch) / scale
+      if (lack > 0.0_wp) then
+         threshold = configured
+         if (way < old) threshold = configured - scale * tree(lack / scale * exp(-way))
+      else if (lack < 0.0_wp) then
+         part = lack / scale
+         threshold = configured - lack * exp(-fallen(way, part))
+      end if
+   end function meet
+
+   !> Solution below 1 of T = p exp(T).
+   pure function tree(p) result(t)
+      !> Not negative, and at most 1/e
+      real(wp), intent(in) :: p
+      real(wp) :: t
+
+      real(wp) :: q, grown, step, slope
+      integer :: iteration
+
+      q = sqrt(max(0.0_wp, 1.0_wp - euler * p))
+      associate (c => tree_start)
+         t = p * ((c(0) + q * c(1)) + q**2 * ((c(2) + q * c(3)) &
+            & + q**2 * ((c(4) + q * c(5)) + q**2 * c(6))))
+      end associate
+      do iteration = 1, most_iterations
+         grown = p * exp(t)
+         if (.not. grown < 1.0_wp) return
+         slope = 1.0_wp / (1.0_wp - grown)
+         step = (grown - t) * slope
+         slope = grown * slope
+         t = t + step * (1.0_wp + slope * step * (0.5_wp + (0.5_wp * slope + 1.0_wp / 6.0_wp) &
+            & * step))
+         if (abs(slope * step) <= enough) return
+      end do
+   end function tree
+
+   !> Way w after which a threshold that falls is met: w + part exp(-w) = way.
+   pure function fallen(way, part) result(w)
+      !> Way to the old threshold, and what is lacking at first, negative: way > part
+      real(wp), intent(in) :: way, part
+      real(wp) :: w
+
+      real(wp) :: grown, step
+      integer :: iteration
+
+      w = max(0.0_wp, way)
+      do iteration = 1, most_iterations
+         grown = part * exp(-min(w, old))
+         step = (way - w - grown) / (1.0_wp - grown)
+         w = w + step
+         if (abs(step) <= enough_of_newton * max(1.0_wp, w)) return
+      end do
+   end function fallen
+
+   !> The same as meet for the law `log`.
+   !>
+   !> With z = 1 + t/tau_a the stretch is x + s (z - z_0), the threshold U (1 + beta ln z): the
+   !> greater solution of z - kappa ln z = (U - x)/s + z_0 with kappa = U beta/s.
+   pure function meet_grown(self, configured, age, stretch, scale) result(threshold)
+      class(ageing_law_type), intent(in) :: self
+      !> Configured threshold [m], age over tau_a, stretch [m], speed times tau_a [m]
+      real(wp), intent(in) :: configured, age, stretch, scale
+      real(wp) :: threshold
+
+      real(wp) :: kappa, wanted, z, step
+      integer :: iteration
+
+      threshold = configured * (1.0_wp + self%growth * log(1.0_wp + age))
+      if (threshold <= stretch .or. scale > longest_scale .or. .not. self%growth > 0.0_wp) return
+      kappa = configured * self%growth / scale
+      z = 1.0_wp + age
+      wanted = (configured - stretch) / scale + z
+      ! To the right of the least value: from there Newton's method comes from one side.
+      if (wanted > z) z = wanted + kappa * log(wanted)
+      z = max(z, 2.0_wp * kappa)
+      do iteration = 1, most_iterations
+         step = (wanted + kappa * log(z) - z) / (1.0_wp - kappa / z)
+         z = z + step
+         if (abs(step) <= enough_of_newton * z) exit
+      end do
+      threshold = configured * (1.0_wp + self%growth * log(z))
+   end function meet_grown
 
    !> Configured threshold of the contacts that break at an age under a force.
    pure function configured(self, force, age)
@@ -178,8 +334,34 @@ contains
       !> Whether it does
       logical :: falls
 
-      falls = self%mean_lack * mean + self%width_lack * (configured - mean) < 0.0_wp
+      falls = self%lack(configured, mean) < 0.0_wp
    end function falls
+
+   !> Whether any threshold changes with age.
+   pure function acts(self)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Whether one does
+      logical :: acts
+
+      acts = abs(self%growth) + abs(self%mean_lack) + abs(self%width_lack) > 0.0_wp
+   end function acts
+
+   !> Whether the threshold of a contact is the same at any age.
+   pure function is_constant(self, configured, mean)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Configured threshold of the contact, and the mean of all contacts, in any unit
+      real(wp), intent(in) :: configured, mean
+      !> Whether it is
+      logical :: is_constant
+
+      if (self%kind == ageing_log) then
+         is_constant = .not. self%growth > 0.0_wp
+      else
+         is_constant = .not. abs(self%lack(configured, mean)) > 0.0_wp
+      end if
+   end function is_constant
 
    !> Whether the threshold does not change any more.
    pure function is_old(self, age)

@@ -57,10 +57,11 @@ module mesoslip_sliders_rigid
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
       real(wp) :: inverse_mass, stiffness, drag, spring
       !> Coefficients of the equation of the third order: 2 eta_S + C/M [1/s], (K + K_c)/M
-      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3], and eta_S K/M times the drive's velocity
-      real(wp) :: first, second, third, driving
-      !> How far the drive is ahead of the slider at the start of a step [m]
-      real(wp) :: drive_gap
+      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3], and eta_S K/M times the drive's velocity, with
+      !> K/M times its acceleration; eta_S K/M times its acceleration
+      real(wp) :: first, second, third, driving, driving_rate
+      !> How far the drive is ahead of the slider at the start of a step [m], and its velocity [m/s]
+      real(wp) :: drive_gap, drive_velocity
    end type system_type
 
    !> Velocity of the slider with derivatives, and the same of the damper.
@@ -181,12 +182,23 @@ contains
       system%first = 2.0_wp * self%damping + system%drag
       system%second = system%stiffness + system%drag * self%damping
       system%third = system%stiffness * self%damping
+      system%drive_velocity = self%drive_velocity
       system%driving = self%damping * system%spring * self%drive_velocity
+      system%driving_rate = 0.0_wp
       system%drive_gap = self%drive_displacement - self%displacement &
          & + self%drive_velocity * (self%time - self%drive_time)
-      early = rates(self, system, system%drive_gap)
-
-      call glide(self, system, window, early, is_done)
+      is_done = .false.
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         system%drive_velocity = self%drive_velocity_at(self%time)
+         system%driving = system%spring * (self%damping * system%drive_velocity &
+            & + self%drive_acceleration)
+         system%driving_rate = self%damping * system%spring * self%drive_acceleration
+         system%drive_gap = self%drive_at(self%time) - self%displacement
+         early = rates(self, system, system%drive_gap)
+      else
+         early = rates(self, system, system%drive_gap)
+         call glide(self, system, window, early, is_done)
+      end if
       if (.not. is_done) call move_on(self, system, window, early)
    end subroutine step_on
 
@@ -401,7 +413,20 @@ contains
 
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
 
-      extension = step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept
+      extension = step * (system%drive_gap + 0.5_wp * system%drive_velocity * step) - swept
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         extension = extension + self%drive_acceleration * step**3 / 6.0_wp
+         call self%stage_impulse%add(self%stiffness * extension)
+         call self%earlier_work%add(self%stiffness * (system%drive_velocity * extension &
+            & + self%drive_acceleration * (step**2 * (0.5_wp * system%drive_gap + step &
+            & * (system%drive_velocity / 3.0_wp + 0.125_wp * self%drive_acceleration * step)) &
+            & - lever(self%series, terms, step))))
+         drive_gap = self%drive_at(self%time) - self%displacement
+      else
+         call self%impulse%add(self%stiffness * extension)
+         drive_gap = self%drive_displacement - self%displacement &
+            & + self%drive_velocity * (self%time - self%drive_time)
+      end if
       ! From the balance of momentum, M dV + M dW = the impulse of spring and contacts.
       if (self%damping > 0.0_wp) then
          self%mean_velocity = self%mean_velocity - (self%velocity - early%velocity) &
@@ -410,12 +435,9 @@ contains
             & - self%law%stiffness * swept)
       end if
 
-      drive_gap = self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time)
       late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
       self%start_acceleration = early%acceleration
-      call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
       call add_losses(self, early, late, step, terms)
    end subroutine balance
 
@@ -433,7 +455,7 @@ contains
          & * (self%law%stiffness * self%displacement - self%law%offset) &
          & - system%drag * self%velocity - motion%damper
       motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
-      motion%jerk = system%spring * self%drive_velocity - system%stiffness * self%velocity &
+      motion%jerk = system%spring * system%drive_velocity - system%stiffness * self%velocity &
          & - system%drag * motion%acceleration - motion%damper_rate
    end function rates
 
@@ -461,6 +483,7 @@ contains
             & - (system%second * inverse(term - 1)) * series(term - 2) &
             & - system%first * series(term - 1))
          driving = 0.0_wp
+         if (term == 3) driving = system%driving_rate
       end do
    end subroutine expand
 
@@ -553,6 +576,7 @@ contains
       motion%displacement = self%origin + displacement
       motion%spring_force = self%stiffness * (drive - displacement)
       motion%elastic_force = motion%spring_force
+      motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity
    end function observe
@@ -612,6 +636,21 @@ contains
       end do
       value = time**2 * horner(twice, terms, time)
    end function second_integral
+
+   !> Integral of the way, the integral of a series from zero, times the time.
+   pure function lever(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: value
+
+      integer :: term
+
+      value = 0.0_wp
+      do term = terms - 1, 0, -1
+         value = value * time + series(term) * (inverse(term + 1) / (term + 3))
+      end do
+      value = value * time**3
+   end function lever
 
    include "motion_series.inc"
 

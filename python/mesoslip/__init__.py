@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mesoslip.api import (
         avalanche_summary,
         avalanches,
+        claims,
         curve,
         example,
         figures,
@@ -24,13 +25,17 @@ if TYPE_CHECKING:
         onset,
         plot,
         read,
+        regime,
         report,
+        response,
         run,
         slips,
+        sweep,
     )
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
     from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",
@@ -39,9 +44,11 @@ __all__ = [
     "ForceCurve",
     "MesoslipError",
     "RunError",
+    "SteadySliding",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "claims",
     "curve",
     "example",
     "figures",
@@ -50,18 +57,23 @@ __all__ = [
     "onset",
     "plot",
     "read",
+    "regime",
     "report",
+    "response",
     "run",
     "slips",
+    "sweep",
 ]
 
 # What takes long to import is imported when it is asked for.
 _LAZY = {
     "Config": "configuration.config",
     "ForceCurve": "theory.force_curve",
+    "SteadySliding": "theory.steady_sliding",
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",
+    "claims": "api",
     "curve": "api",
     "example": "api",
     "figures": "api",
@@ -70,9 +82,12 @@ _LAZY = {
     "onset": "api",
     "plot": "api",
     "read": "api",
+    "regime": "api",
     "report": "api",
+    "response": "api",
     "run": "api",
     "slips": "api",
+    "sweep": "api",
 }
 
 

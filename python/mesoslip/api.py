@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output import files, layout
 from mesoslip.simulation.checkpoint import Checkpoint
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.runner import Results, checked_workers, run_realizations
 from mesoslip.simulation.stop import StopFlag
 from mesoslip.theory.derived import Derived, derived_quantities
 
@@ -23,7 +23,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
+    from mesoslip.campaign.claims import Judgement
+    from mesoslip.campaign.plan import Plan
+    from mesoslip.campaign.runner import Sweep
+    from mesoslip.campaign.store import Store
+
 PathLike = str | os.PathLike[str]
+
+# What ends a sweep that somebody has stopped.
+INTERRUPTED = "interrupted"
 
 
 def as_config(
@@ -52,6 +60,7 @@ def run(
     config: PathLike | Mapping[str, Any] | Config,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.DataTree:
     """Simulate.
@@ -63,6 +72,8 @@ def run(
     workers
         Realizations at the same time; as many as there are processors by default. The result does
         not depend on it.
+    scheduler
+        Address of a Dask scheduler, whose workers are to run the realizations.
     progress
         Called now and then with the part of the work that is done, 0 to 1.
 
@@ -79,13 +90,15 @@ def run(
     RunError
         If the run fails.
     """
-    return layout.build_tree(simulate(as_config(config), workers=workers, progress=progress))
+    results = simulate(as_config(config), workers=workers, scheduler=scheduler, progress=progress)
+    return layout.build_tree(results)
 
 
 def simulate(
     config: Config,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
     stop: StopFlag | None = None,
     checkpoint: Checkpoint | None = None,
@@ -94,9 +107,124 @@ def simulate(
 
     See `run`, and `mesoslip.simulation.runner.run_realizations`.
     """
+    if scheduler is not None:
+        from mesoslip.campaign.cluster import connected
+        from mesoslip.campaign.ensemble import run_on_cluster
+
+        with connected(scheduler) as client:
+            return run_on_cluster(
+                config, client, progress=progress, stop=stop, checkpoint=checkpoint
+            )
     return run_realizations(
         config, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
     )
+
+
+def sweep(
+    plan: PathLike | Mapping[str, Any] | Plan,
+    *,
+    store: PathLike | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    pool: str = "both",
+    progress: Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Run a configuration over a range of parameters, and measure each run.
+
+    Parameters
+    ----------
+    plan
+        The file of a sweep, nested tables, or a `mesoslip.campaign.plan.Plan`.
+    store
+        Folder where each point is kept as soon as it is done, and taken from when the sweep is
+        called again; nowhere by default.
+    workers
+        Points at the same time; as many as there are processors by default. The result does not
+        depend on it.
+    scheduler
+        Address of a Dask scheduler, whose workers are to compute the points.
+    pool
+        What points are computed on: "threads", "processes", or "both", that is threads first and
+        processes in a sweep that takes long.
+    progress
+        Called now and then with the part of the points that are there, 0 to 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions: each swept key, and ``realization``; variables: ``status`` (0 ok, 1 failed, 2
+        missing) and the measures. Its attribute ``failures`` tells why points failed.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the sweep cannot be read or is wrong, or a combination cannot be run.
+    RunError
+        If the scheduler is gone, or workers cannot be started, before every point was computed.
+    """
+    from mesoslip.campaign.store import Store
+
+    checked = as_plan(plan)
+    kept = None if store is None else Store(Path(store))
+    with kept or nullcontext():
+        done = run_plan(
+            checked,
+            store=kept,
+            workers=workers,
+            scheduler=scheduler,
+            pool=pool,
+            progress=progress,
+        )
+    if done.missing and done.ending != INTERRUPTED:
+        raise RunError(done.ending)
+    return done.dataset
+
+
+def as_plan(plan: PathLike | Mapping[str, Any] | Plan, overrides: Iterable[str] = ()) -> Plan:
+    """A sweep from its file or from nested tables.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If the sweep is wrong.
+    """
+    from mesoslip.campaign.plan import Plan
+
+    if isinstance(plan, Plan):
+        return plan
+    if isinstance(plan, Mapping):
+        return Plan.from_dict(plan)
+    return Plan.load(plan, overrides)
+
+
+def run_plan(
+    plan: Plan,
+    *,
+    store: Store | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    pool: str = "both",
+    progress: Callable[[float], None] | None = None,
+    stop: StopFlag | None = None,
+) -> Sweep:
+    """Compute what is missing of a sweep; see `sweep` and `mesoslip.campaign.runner.run_sweep`."""
+    from mesoslip.campaign import cluster, execution, runner
+
+    count = checked_workers(workers)
+    if pool not in execution.POOLS:
+        raise ConfigError(
+            [Problem("", "pool", f"must be one of {', '.join(execution.POOLS)}", pool)]
+        )
+    # Before a cluster is asked.
+    _ = plan.combinations
+    if scheduler is None:
+        executor = execution.on_this_machine(count, pool)
+        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
+    with cluster.connected(scheduler) as client:
+        executor = cluster.on_dask(client)
+        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
@@ -175,6 +303,28 @@ def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
     return catalogue.slips(_as_tree(output))
 
 
+def regime(output: PathLike | xr.DataTree) -> xr.Dataset:
+    """Which motion each realization of an output shows: smooth, stick-slip, irregular, transient.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``realization``; ``regime`` is 0 smooth, 1 stick-slip, 2 irregular, 3 transient,
+        beside the numbers by which it is judged, see `mesoslip.analysis.regime`.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or is not of a run.
+    """
+    from mesoslip.analysis.regime import regimes
+
+    if isinstance(output, str | os.PathLike):
+        with files.opened_run(Path(output)) as tree:
+            return regimes(tree)
+    return regimes(output)
+
+
 def avalanches(
     output: PathLike | xr.DataTree, *, after: float = 0.0, force_above: float | None = None
 ) -> xr.Dataset:
@@ -249,6 +399,55 @@ def _opened(
     return trees, names
 
 
+def response(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
+    *,
+    normal_force: float | None = None,
+    fit: bool = True,
+    free_stiffness: bool = False,
+) -> xr.DataTree:
+    """What those who measure friction read off an output, or several: see ``docs/response.md``.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or several of them.
+    normal_force
+        If it is given [N], forces are told over it too, as coefficients of friction; else over the
+        static force.
+    fit
+        Whether rate-and-state parameters are fitted, which takes some seconds.
+    free_stiffness
+        Whether the stiffness is fitted along with them, and not that of the run.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``steady``: the mean force of each stage at one velocity, with its error; ``steps``:
+        direct and evolving change and relaxation displacement of each velocity step; ``holds``:
+        relaxation, restart peak and healing of each hold; ``rate_and_state``: a, b, D_c of each
+        law, and whether it describes the output. Variables have units and long names.
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, is none of a run, or is driven by a force.
+    """
+    from mesoslip.analysis import response as responses
+    from mesoslip.analysis.experiment import Experiment
+
+    experiments = [
+        Experiment(
+            _as_tree(one),
+            os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+        )
+        for number, one in enumerate(_several(output))
+    ]
+    return responses.response(
+        experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
+    )
+
+
 def plot(
     output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
     file: PathLike | None = None,
@@ -279,7 +478,7 @@ def plot(
         snapshots.
     view
         Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot, "layers"
-        for the waves in an elastic slider.
+        for the waves in an elastic slider, "response" for steady forces, velocity steps and holds.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
     realization
@@ -412,3 +611,23 @@ def figures(
     from mesoslip.plots import source_figures
 
     return source_figures.draw(names, Path(outputs), Path(folder))
+
+
+def claims(names: Iterable[str] = (), *, outputs: PathLike = "out") -> list[Judgement]:
+    """Judge claims of the source, all by default, from the outputs of their runs.
+
+    Returns
+    -------
+    list of mesoslip.campaign.claims.Judgement
+        Each with its claim, what was measured, and the verdict.
+
+    Raises
+    ------
+    FileError
+        If an output is missing.
+    ConfigError
+        If there is no claim of a name.
+    """
+    from mesoslip.campaign.claims import judge
+
+    return judge(names, Path(outputs))

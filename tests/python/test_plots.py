@@ -52,7 +52,7 @@ def test_pictures_of_the_theory(klein):
 
 
 def test_an_unknown_view_is_told(old):
-    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, lattice"):
+    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, "):
         mesoslip.plot(old, view="foo")
 
 

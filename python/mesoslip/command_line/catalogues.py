@@ -1,4 +1,4 @@
-"""``mesoslip slips`` and ``mesoslip avalanches``."""
+"""``mesoslip slips``, ``mesoslip avalanches`` and ``mesoslip regime``."""
 
 from __future__ import annotations
 
@@ -129,3 +129,27 @@ def avalanches(
     warning = avalanche_catalogue.warning(statistics)
     if warning is not None:
         typer.echo(f"warning: {warning}")
+
+
+def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
+    """Show which motion it is: smooth, stick-slip, irregular, or not settled yet."""
+    from mesoslip import api
+    from mesoslip.analysis.regime import NAMES, REGIME, judgements, told
+
+    data = api.regime(output)
+    judged = judgements(data)
+    if as_json:
+        names = [NAMES[one.regime] for one in judged]
+        columns = {str(name): data[name].values.tolist() for name in data.variables}
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        print_json([{**row, "regime": name} for row, name in zip(rows, names, strict=True)])
+        return
+    for number, one in zip(data["realization"].values.tolist(), judged, strict=True):
+        if len(judged) > 1:
+            typer.echo(f"realization {number}")
+        for name, meaning in REGIME.items():
+            if name != "regime":
+                show(name, getattr(one, name), meaning.units, meaning.attributes["long_name"])
+        typer.echo(one.told)
+    if len(judged) > 1:
+        typer.echo(told(judged))

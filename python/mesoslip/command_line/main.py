@@ -11,19 +11,33 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, example, pictures, report, run, theory
+from mesoslip.command_line import (
+    catalogues,
+    claims,
+    example,
+    pictures,
+    report,
+    response,
+    run,
+    sweep,
+    theory,
+)
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
 COMMANDS = (
     run.run,
+    sweep.sweep,
     theory.info,
     theory.curve,
     theory.onset,
     catalogues.slips,
     catalogues.avalanches,
+    catalogues.regime,
+    response.response,
     pictures.plot,
     pictures.figures,
+    claims.claims,
     report.report,
     example.example,
 )

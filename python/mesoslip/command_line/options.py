@@ -24,6 +24,12 @@ SetOption = Annotated[
         metavar="KEY=VALUE",
     ),
 ]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler", help="Dask scheduler whose workers do the computing", metavar="ADDRESS"
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
 
 

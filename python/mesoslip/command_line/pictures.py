@@ -12,15 +12,6 @@ import typer
 from mesoslip.command_line.options import OutputsArgument, time_of
 
 
-class View(StrEnum):
-    """Pictures of a run."""
-
-    RUN = "run"
-    AVALANCHES = "avalanches"
-    LATTICE = "lattice"
-    LAYERS = "layers"
-
-
 class Against(StrEnum):
     """What a run is drawn against."""
 
@@ -41,10 +32,12 @@ def plot(
         ),
     ] = None,
     view: Annotated[
-        View | None,
+        str | None,
         typer.Option(
-            help="Of a run: what happened, sizes of avalanches, contacts on their lattice, waves "
-            "in an elastic slider"
+            help="Of a run: run, what happened; avalanches, their sizes; lattice, the contacts on "
+            "it; layers, waves in an elastic slider; response, steady forces, steps and holds. Of "
+            "a sweep: a measure",
+            metavar="VIEW",
         ),
     ] = None,
     snapshot: Annotated[
@@ -86,7 +79,7 @@ def plot(
     api.plot(
         outputs,
         path,
-        view=None if view is None else view.value,
+        view=view,
         snapshot=snapshot,
         realization=realization,
         x=None if x is None else x.value,

@@ -9,6 +9,7 @@ import html
 import math
 import os
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,6 +20,7 @@ from mesoslip.configuration import checks
 from mesoslip.configuration.contacts import contact_kind
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
+from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
     Change,
     base_of,
@@ -30,7 +32,7 @@ from mesoslip.configuration.files import (
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
-from mesoslip.configuration.tables import Curve, Drive, DriveStage, Output, Run
+from mesoslip.configuration.tables import Curve, Output, Run
 from mesoslip.errors import ConfigError
 
 
@@ -107,29 +109,16 @@ class Config(Table):
         """Length of the force curve [m]; twenty mean breaking stretches unless given."""
         return self.curve.length or 20 * self.contacts.break_stretch
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
-            return self.run.duration
+            # What does not go on ends the run.
+            most = math.inf if self.drive.goes_on else self.drive.length
+            return min(self.run.duration, most)
         if self.run.drive_displacement is not None:
-            return self._time_for(self.run.drive_displacement)
-        if self.drive.stage is not None:
-            return math.fsum(stage.duration for stage in self.drive.stage)
-        return math.inf
-
-    def _time_for(self, way: float) -> float:
-        """Time in which the drive goes a way, there and back both counted [s]."""
-        time = speed = 0.0
-        for stage in self.drive.stage or ():
-            speed = abs(stage.velocity)
-            if speed * stage.duration >= way:
-                return time + way / speed
-            time += stage.duration
-            way -= speed * stage.duration
-        # The last stage lasts as long as the run.
-        speed = speed if self.drive.stage else abs(self.drive.velocity or 0.0)
-        return time + way / speed if speed > 0 else math.inf
+            return self.drive.time_for(self.run.drive_displacement)
+        return self.drive.length
 
     @property
     def expected_duration(self) -> float:
@@ -164,28 +153,18 @@ class Config(Table):
 
     @property
     def drive_speed(self) -> float:
-        """Speed of the first stage of the drive that moves [m/s]; 0 if none does."""
+        """Speed of the first stage of the drive that moves, the greatest of a ramp, the mean of a
+        measured history [m/s]; 0 if none moves."""
         if self.drive.force_rate is not None:
             return 0.0
-        return next((abs(one.velocity) for one in self.drive_stages if one.velocity), 0.0)
+        if self.drive.history is not None:
+            return math.fsum(part.way for part in self.drive_parts) / self.duration
+        return next((part.greatest_speed for part in self.drive_parts if part.way > 0), 0.0)
 
-    @property
-    def drive_stages(self) -> tuple[DriveStage, ...]:
-        """Stages of the drive; the last one ends with the run."""
-        if self.drive.stage is None:
-            rate = self.drive.velocity if self.drive.force_rate is None else self.drive.force_rate
-            return (DriveStage(self.duration, rate or 0.0),)
-        stages = []
-        left = self.duration
-        for stage, is_last in zip(
-            self.drive.stage, [False] * (len(self.drive.stage) - 1) + [True], strict=True
-        ):
-            length = left if is_last else min(stage.duration, left)
-            stages.append(DriveStage(length, stage.velocity))
-            left -= length
-            if left <= 0:
-                break
-        return tuple(stages)
+    @cached_property
+    def drive_parts(self) -> tuple[DrivePart, ...]:
+        """Parts of the drive until the end of the run."""
+        return self.drive.until(self.duration)
 
     @property
     def output_interval(self) -> float:

@@ -1,22 +1,20 @@
 """The tables of a configuration file that are nobody's kind; those of sliders and of contacts have
-rooms of their own. Adding a key is adding a field.
+rooms of their own, and so has the drive. Adding a key is adding a field.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import Field, StrictBool
 
 from mesoslip.configuration.table import (
-    ForceRate,
     Length,
     Number,
     Table,
     Time,
     Velocity,
     Whole,
-    problem,
 )
 
 
@@ -33,43 +31,6 @@ class Run(Table):
     realizations: Annotated[Whole, Field(ge=1, lt=2**31)] = 1
     seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 1
     resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
-
-
-class Stage(Table):
-    """A stage of the drive: a constant velocity, of either sign or zero, for a time."""
-
-    duration: Annotated[Time, Field(gt=0)]
-    velocity: Velocity
-
-
-class Drive(Table):
-    """How the drive moves: one velocity, or stages one after another; or a force that grows."""
-
-    velocity: Velocity | None = None
-    stage: tuple[Stage, ...] | None = None
-    force_rate: ForceRate | None = None
-
-    @model_validator(mode="after")
-    def _one_of_them(self) -> Self:
-        if [self.velocity, self.stage, self.force_rate].count(None) != 2:
-            raise problem(
-                "velocity",
-                "give either a velocity or [[drive.stage]] tables, or a force_rate to a "
-                "quasistatic slider",
-            )
-        if self.force_rate == 0:
-            raise problem("force_rate", "must not be 0")
-        if self.stage is not None and not self.stage:
-            raise problem("stage", "must have at least one stage")
-        return self
-
-
-class DriveStage(NamedTuple):
-    """A stage of the drive as it is run: its duration [s], and its velocity [m/s] or, for a drive
-    by force, the rate of the force [N/s]."""
-
-    duration: float
-    velocity: float
 
 
 class Output(Table):

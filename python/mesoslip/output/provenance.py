@@ -5,7 +5,8 @@ from __future__ import annotations
 import platform
 from contextvars import ContextVar
 from datetime import UTC, datetime
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from mesoslip import _build
@@ -24,7 +25,15 @@ SUMMARIES = {
     "that moves forward slowly, from the master equation of multicontact friction",
     "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
     "contacts that break one after another and for a film that melts at once",
+    "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
+    "over a range of parameters",
 }
+
+
+@cache
+def version(package: str) -> str:
+    """Version of a package; looked up once, as a sweep asks for it a thousand times."""
+    return metadata.version(package)
 
 
 def program_attributes(config: Config, command: str) -> dict[str, Any]:

@@ -13,11 +13,11 @@ from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, run, theory
+from mesoslip.plots import avalanches, maps, response, run, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
 
-VIEWS = ("run", "avalanches", "lattice", "layers")
+VIEWS = ("run", "avalanches", "lattice", "layers", "response")
 
 
 class Kind(NamedTuple):
@@ -30,6 +30,7 @@ class Kind(NamedTuple):
 # Outputs of commands, the first that fits.
 KINDS = {
     "run": Kind("a run", lambda tree: "spring_force" in tree.data_vars),
+    "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
 }
@@ -91,6 +92,11 @@ def picture(
             lambda figure: theory.slip_onset(tree, figure),
             lambda axes: theory.draw_drop(axes, tree),
         )
+    if kind == "sweep":
+        return Picture(
+            lambda figure: maps.overview(tree, figure, view),
+            lambda axes: maps.draw_panel(axes, tree),
+        )
     if view == "lattice":
         chosen = avalanches.chosen_snapshot(tree, snapshot)
         return Picture(
@@ -107,6 +113,11 @@ def picture(
         return Picture(
             lambda figure: avalanches.distribution(tree, figure),
             lambda axes: avalanches.draw_density(axes, tree),
+        )
+    if view == "response":
+        return Picture(
+            lambda figure: response.overview(tree, figure),
+            lambda axes: response.draw_force(axes, tree),
         )
     room = avalanches if Config.from_toml(tree.attrs["configuration"]).slider.jumps else run
     return Picture(
@@ -178,6 +189,8 @@ def _alone(panel: Callable[[Axes], None], entries: int) -> Picture:
 
 def _check_view(kind: str, view: str | None, extent: Extent) -> None:
     """Whether there is such a picture of an output of a kind."""
+    if kind == "sweep" and extent == EVERYTHING:
+        return
     if view not in {None, *VIEWS}:
         choice = ", ".join(VIEWS)
         raise ConfigError([Problem("", "view", f"no such picture; choose of {choice}", view)])
@@ -215,7 +228,8 @@ def draw(
         The outputs, and what they are called where they do not differ. Several are drawn over each
         other.
     view
-        Of a run: "run", "avalanches", "lattice" or "layers"; by default what tells most.
+        Of a run: "run", "avalanches", "lattice", "layers" or "response"; by default what tells
+        most.
     snapshot
         Number of the snapshot of a lattice; that after the largest avalanche by default.
     extent

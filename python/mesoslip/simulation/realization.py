@@ -144,9 +144,11 @@ class Realization:
             self.number,
         )
         kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
-        stages = config.drive_stages
-        ends = np.minimum(np.cumsum([stage.duration for stage in stages]), NEVER)
-        kernel.set_drive(ends, np.array([stage.velocity for stage in stages]))
+        durations, start_velocities, end_velocities, stages = (
+            np.array(numbers) for numbers in zip(*config.drive_parts, strict=True)
+        )
+        ends = np.minimum(np.cumsum(durations), NEVER)
+        kernel.set_drive(ends, start_velocities, end_velocities, stages)
         kernel.set_recorder(
             interval=config.output_interval,
             slip_interval=output.slip_interval or 0.0,

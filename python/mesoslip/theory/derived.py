@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing
 from mesoslip.theory.lives import scales
+from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,38 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
     """
     return {
         name: Derived(value, unit, meaning)
-        for name, value, unit, meaning in (*_contacts(config), *config.slider.quantities(config))
+        for name, value, unit, meaning in (
+            *_contacts(config),
+            *config.slider.quantities(config),
+            *_stability(steady_sliding(config)),
+        )
         if math.isfinite(value)
     }
 
 
 def verdict(config: Config) -> str | None:
+    """What is known of the motion before it is run, and what is not; None without a spring."""
+    sliding = steady_sliding(config)
+    stability = sliding.told if sliding is not None and sliding.is_quick else None
+    told = [one for one in (_verdict_of_stiffness(config), stability) if one is not None]
+    return "\n".join(told) or None
+
+
+def _stability(sliding: SteadySliding | None) -> Iterator[tuple[str, float, str, str]]:
+    """How small perturbations of steady sliding grow or die away, where that is found quickly."""
+    if sliding is None or not sliding.is_quick:
+        return
+    yield (
+        "steady_growth_rate",
+        sliding.growth_rate,
+        "1/s",
+        "growth of small perturbations of steady sliding at the drive's velocity, with delay; "
+        "below 0 they die away",
+    )
+    yield "steady_frequency", sliding.frequency, "1/s", "their frequency"
+
+
+def _verdict_of_stiffness(config: Config) -> str | None:
     """What the estimate of K* says of the spring, and what it does not; None without a spring."""
     spring = config.spring_stiffness
     if not 0 < spring < math.inf:
@@ -42,12 +69,13 @@ def verdict(config: Config) -> str | None:
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
     if spring >= estimate:
         return (
-            "K is above the estimate of K*: smooth in slow sliding, unless delay or ageing weaken "
-            "faster contacts"
+            "K is above the estimate of K*: slow sliding has no slip that starts as the first one "
+            "does from rest; delay or ageing may weaken faster contacts all the same"
         )
     return (
-        "K is below the estimate of K*: stick-slip is possible, not certain. Delay and ageing "
-        "decide whether slips go on; mesoslip curve tells K* itself, a run the rest"
+        "K is below the estimate of K*: there is a first slip from rest. This is necessary for "
+        "stick-slip, not sufficient: delay and ageing decide whether slips go on or die away; "
+        "mesoslip curve tells K* itself, a run the rest"
     )
 
 

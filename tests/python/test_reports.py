@@ -9,8 +9,10 @@ from html.parser import HTMLParser
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT
+import xarray as xr
+from conftest import ROOT, klein_tables
 from kinds import KINDS, configuration
+from mesoslip.configuration.units import with_unit
 
 MOST_BYTES = 3_000_000
 # Elements of HTML that have no end.
@@ -75,6 +77,7 @@ def test_a_report_of_kleins_run(klein_run, tmp_path):
     for row in ("contacts.delay", "1 ms", "500 µs", "Energy", "work done by the drive", "100 %"):
         assert row in page.words
     assert klein_run.attrs["commit"] in page.words
+    assert any(word.startswith("Stick-slip: force amplitude") for word in page.words)
     drop = np.mean(klein_run["slips/force_drop"].values) * 1e6
     assert f"{drop:.4g} µN" in page.words
     # The whole configuration, to copy.
@@ -102,6 +105,32 @@ def test_reports_of_the_theory(klein, tmp_path):
     assert "slip_time_melting" in page.words
     _, page = written(mesoslip.onset(klein(slider__stiffness=1e6)), tmp_path / "c.html")
     assert any("there is no onset" in word for word in page.words)
+
+
+def test_a_report_of_a_sweep(tmp_path):
+    base = {key: value for key, value in klein_tables(run__duration=0.2).items()}
+    plan = {
+        **base,
+        "sweep": {
+            "realizations": 2,
+            "measures": ["regime", "mean_force"],
+            "grid": {"contacts.delay": [1e-4, 1e-3], "slider.stiffness": [50.0, 100.0, 200.0]},
+        },
+    }
+    tree = xr.DataTree(mesoslip.sweep(plan, threads=True))
+    _, page = written(tree, tmp_path / "sweep.html")
+    assert "12 runs: 12 ok." in page.words
+    assert page.tags.count("svg") == 2
+    assert "50 N/m, 100 N/m, 200 N/m" in page.words
+    mean = float(tree["mean_force"].mean())
+    assert with_unit(mean, "N") in page.words
+    # Fewer than there should be stand out.
+    tree["status"].values[0, 0, 0] = 2
+    text, page = written(tree, tmp_path / "missing.html")
+    assert "12 runs: 11 ok, 1 missing." in page.words
+    assert text.count('class="warns"') == 1
+    with pytest.raises(mesoslip.FileError, match="one at a time"):
+        mesoslip.plot([tree, tree])
 
 
 def test_outputs_side_by_side(klein_run, tmp_path, klein):

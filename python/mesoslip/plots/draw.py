@@ -134,6 +134,8 @@ def comparison(
 ) -> Picture:
     """The picture of several outputs of one command over each other; see `draw`."""
     kind = kind_of_all(trees, names)
+    if kind == "sweep":
+        raise FileError("sweeps are drawn one at a time")
     _check_view(kind, view, extent)
     labels = labels_of(trees, names)
     if kind == "curve":

@@ -108,16 +108,15 @@ def test_reports_of_the_theory(klein, tmp_path):
 
 
 def test_a_report_of_a_sweep(tmp_path):
-    base = {key: value for key, value in klein_tables(run__duration=0.2).items()}
     plan = {
-        **base,
+        **klein_tables(run__duration=0.2),
         "sweep": {
             "realizations": 2,
             "measures": ["regime", "mean_force"],
             "grid": {"contacts.delay": [1e-4, 1e-3], "slider.stiffness": [50.0, 100.0, 200.0]},
         },
     }
-    tree = xr.DataTree(mesoslip.sweep(plan, threads=True))
+    tree = xr.DataTree(mesoslip.sweep(plan, workers=1))
     _, page = written(tree, tmp_path / "sweep.html")
     assert "12 runs: 12 ok." in page.words
     assert page.tags.count("svg") == 2

@@ -73,7 +73,8 @@ def run(
         Realizations at the same time; as many as there are processors by default. The result does
         not depend on it.
     scheduler
-        Address of a Dask scheduler, whose workers are to run the realizations.
+        Address of a Dask scheduler, or its ``--scheduler-file``, whose workers are to run the
+        realizations.
     progress
         Called now and then with the part of the work that is done, 0 to 1.
 
@@ -142,7 +143,8 @@ def sweep(
         Points at the same time; as many as there are processors by default. The result does not
         depend on it.
     scheduler
-        Address of a Dask scheduler, whose workers are to compute the points.
+        Address of a Dask scheduler, or its ``--scheduler-file``, whose workers are to compute the
+        points.
     pool
         What points are computed on: "threads", "processes", or "both", that is threads first and
         processes in a sweep that takes long.

@@ -171,6 +171,38 @@ def test_regimes_are_those_of_the_run_itself(tmp_path):
     np.testing.assert_array_equal(back["regime"], data["regime"])
 
 
+def test_a_map_shows_each_value_where_it_belongs(tmp_path):
+    """Also of values in any order, and of choices the most frequent one."""
+    delays, stiffnesses = [2e-3, 1e-4, 5e-4], [200.0, 50.0]
+    force = np.arange(12.0).reshape(3, 2, 2)
+    regime = np.array([[[0, 0], [1, 1]], [[2, 2], [3, np.nan]], [[np.nan, np.nan], [1, 1]]])
+    dimensions = ("contacts.delay", "slider.stiffness", "realization")
+    flags = {"flag_meanings": "smooth stick_slip irregular transient"}
+    data = xr.Dataset(
+        {
+            "status": (dimensions, np.zeros((3, 2, 2))),
+            "mean_force": (dimensions, force, {"units": "N"}),
+            "regime": (dimensions, regime, flags),
+        },
+        {"contacts.delay": delays, "slider.stiffness": stiffnesses, "realization": [0, 1]},
+        {"configuration": ""},
+    )
+    figure = mesoslip.plot(xr.DataTree(data), tmp_path / "map.png")
+    maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    for axes, expected in zip(maps, (force.mean(-1), regime[..., 0]), strict=True):
+        mesh = axes.collections[0]
+        corners = mesh.get_coordinates()
+        shown = mesh.get_array().reshape(2, 3).filled(np.nan)
+        for row, column in np.ndindex(2, 3):
+            (left, low), (right, high) = corners[row, column], corners[row + 1, column + 1]
+            (i,) = np.flatnonzero((left < np.array(delays)) & (np.array(delays) < right))
+            (j,) = np.flatnonzero((low < np.array(stiffnesses)) & (np.array(stiffnesses) < high))
+            np.testing.assert_equal(shown[row, column], expected[i, j])
+    line = mesoslip.plot(xr.DataTree(data.isel({"slider.stiffness": 1})))
+    np.testing.assert_array_equal(line.axes[0].lines[-1].get_xdata(), sorted(delays))
+    np.testing.assert_array_equal(line.axes[0].lines[-1].get_ydata(), [6.5, 10.5, 2.5])
+
+
 def test_keys_together_and_a_latin_hypercube():
     sweep = {
         "measures": ["mean_force"],
@@ -220,6 +252,17 @@ def test_single_keys_of_the_configuration_are_known():
     assert key_kind("contacts.threshold.law").cf_units is None
     assert not key_kind("drive.stage").is_single
     assert key_kind("contacts.dely") is None
+
+
+def test_points_that_are_the_same_are_computed_once(tmp_path):
+    """Titles make no difference to the numbers."""
+    plan = Plan.from_dict(tables(grid={"title": ["one", "other"]}, realizations=2))
+    done = done_by(plan, tmp_path)
+    assert done.computed == 4
+    assert len(done_by(plan, tmp_path).failures) == 0
+    with Store(tmp_path) as store:
+        assert len(store.names()) == 2
+    np.testing.assert_array_equal(done.dataset["mean_force"][0], done.dataset["mean_force"][1])
 
 
 @pytest.fixture(scope="module")
@@ -426,7 +469,7 @@ def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
     np.testing.assert_array_equal(failed, [[False, True], [False, True]])
     assert told.count("failed: contacts.delay") == 2
     assert "failed: contacts.delay = 0.0001 s, realization = 1: measure sometimes" in told
-    assert "own.py, line 13: ValueError: too much" in told
+    assert "own.py, line 13): ValueError: too much" in told
     np.testing.assert_array_equal(np.isnan(data["mean_force"].values), failed)
     assert data.attrs["failures"].count("too much") == 2
     status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
@@ -440,7 +483,7 @@ WRONG = {
     'measures = ["mean_forc"]': "did you mean 'mean_force'",
     'measures = ["nothing.py:here"]': "nothing.py cannot be read: No such file",
     'measures = ["bad.py:here"]': "bad.py, line 2: ZeroDivisionError: division by zero",
-    'measures = ["good.py:ther"]': "has no function 'ther'; did you mean 'there'",
+    'measures = ["good.py:thera"]': "has no function 'thera'; did you mean 'there'",
     "measures = []": "must name at least one measure",
     'measures = ["breaks", "breaks"]': "is named twice",
     'measure = ["breaks"]': "sweep.measure: unknown key; did you mean 'measures'",
@@ -503,7 +546,10 @@ def test_many_points_that_cannot_be_run_are_counted(sweep_file, command):
 def test_a_sweep_needs_a_sweep(tmp_path, command):
     (tmp_path / "base.toml").write_text(Config.from_dict(TINY).to_toml())
     status, _, told = command("sweep", tmp_path / "base.toml")
-    assert (status, "sweep: missing" in told) == (2, True)
+    assert (status, "sweep: missing; this table says" in told) == (2, True)
+    (tmp_path / "sweep.toml").write_text('base = "base.toml"\n[sweep]')
+    status, _, told = command("run", tmp_path / "sweep.toml")
+    assert (status, "the command for it is mesoslip sweep" in told) == (2, True)
     with pytest.raises(ConfigError, match="pool"):
         mesoslip.sweep(tables(), pool="swimming")
 

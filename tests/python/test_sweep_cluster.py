@@ -15,8 +15,13 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config, FileError, RunError
+from mesoslip.campaign import ensemble
 from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.store import Store
+from mesoslip.output import layout
+from mesoslip.simulation.checkpoint import Checkpoint
+from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.stop import StopFlag
 from test_sweep import assert_same_numbers, tables
 
 pytest.importorskip("distributed")
@@ -113,7 +118,7 @@ def test_a_cluster_gives_the_same(cluster, tmp_path):
     # Realizations of a run too; the time that they take is their own.
     config = Config.from_dict(klein_tables(contacts__count=50, run__realizations=4))
     here = mesoslip.run(config)
-    there = mesoslip.run(config, scheduler=started.address)
+    there = mesoslip.run(config, scheduler=str(started.file))
     for group in here.groups:
         assert_same_numbers(
             here[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
@@ -158,10 +163,55 @@ def test_a_point_that_costs_workers_fails_alone(cluster, tmp_path):
 
 
 def test_no_scheduler_and_no_package(monkeypatch):
-    for address in ("nonsense", "tcp://127.0.0.1:1"):
+    for address in ("nonsense", "tcp://127.0.0.1:1", "there/is/none.json"):
         monkeypatch.setattr("mesoslip.campaign.cluster.PATIENCE", 0.5)
         with pytest.raises(FileError, match="there is no scheduler"):
             mesoslip.sweep(tables(), scheduler=address)
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(FileError, match="pip install 'mesoslip\\[distributed\\]'"):
         mesoslip.sweep(tables(), scheduler="tcp://127.0.0.1:1")
+
+
+def test_a_checkpoint_keeps_realizations_of_a_cluster(tmp_path, monkeypatch):
+    """Those that are done; those that are under way go on here only."""
+    config = Config.from_dict(klein_tables(contacts__count=50, run__realizations=4))
+    expected = mesoslip.run(config)
+    stop = StopFlag()
+
+    def two(_client, function, tasks, _stop):
+        for _, task in zip(range(2), tasks, strict=False):
+            yield task, function(task)
+
+    monkeypatch.setattr(ensemble, "on_cluster", two)
+    with Checkpoint(tmp_path / "done", config) as checkpoint:
+        part = ensemble.run_on_cluster(config, None, checkpoint=checkpoint)
+    assert [one.finished for one in part.realizations] == [True, True, False, False]
+    assert not part.complete
+    with Checkpoint(tmp_path / "done", config, resume=True) as checkpoint:
+        whole = run_realizations(config, checkpoint=checkpoint)
+        assert (
+            sum(
+                one.kernel_seconds == part.realizations[0].kernel_seconds
+                for one in whole.realizations
+            )
+            == 1
+        )
+        tree = layout.build_tree(whole)
+    for group in expected.groups:
+        assert_same_numbers(
+            expected[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
+            tree[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
+        )
+
+    def stop_early(part):
+        if part > 0:
+            stop.set()
+
+    long = config.replace("run.duration=1000")
+    with Checkpoint(tmp_path / "begun", long) as checkpoint:
+        run_realizations(long, checkpoint=checkpoint, stop=stop, progress=stop_early)
+    with (
+        Checkpoint(tmp_path / "begun", long, resume=True) as checkpoint,
+        pytest.raises(FileError, match="under way"),
+    ):
+        ensemble.run_on_cluster(long, None, checkpoint=checkpoint)

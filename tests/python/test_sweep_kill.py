@@ -29,6 +29,35 @@ def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     assert study.sweep_kills + study.worker_kills > 1
 
 
+def test_workers_end_with_their_sweep_in_the_midst_of_a_point(tmp_path, sweep_file):
+    (tmp_path / "own.py").write_text("import time\ndef slow(tree):\n    time.sleep(100)\n")
+    path = sweep_file(SIMPLE.replace("mean_force", "own.py:slow"))
+    process = begin(path, tmp_path / "sweep.nc", "--pool", "processes", "--workers", "2")
+    # So that both are at work, and not still on their way to it.
+    deadline = time.monotonic() + 60
+    while len(children := workers_of(process.pid)) < 2 or not all(map(seems_idle, children)):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 10
+    while any(map(is_alive, children)):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    # Workers have it too, and it would be waited for them.
+    process.communicate()
+
+
+def seems_idle(process: int) -> bool:
+    """Whether a process has imported all that it needs, and sleeps."""
+    used = []
+    for _ in range(2):
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        used.append(int(fields[11]) + int(fields[12]))
+        time.sleep(0.5)
+    return used[0] == used[1] > 20
+
+
 def begin(path: Path, output: Path, *more: str) -> subprocess.Popen[str]:
     """Start the command as a group of processes of its own."""
     return subprocess.Popen(
@@ -130,6 +159,7 @@ def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
     assert "no space left on the disk" in told
     kept = points_of(output)
     assert 5 < len(kept) < 60
+    assert f"{len(kept)} points are kept: the same command goes on" in told
     assert not output.exists()
     assert not list(small_disk.rglob(".*"))
     remount = ["mount", "-o", "remount,size=4m", str(small_disk)]

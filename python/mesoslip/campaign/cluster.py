@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import queue
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from mesoslip.campaign.execution import LOOK_SECONDS, Executor, Finished
@@ -31,6 +33,12 @@ Result = TypeVar("Result")
 def connected(address: str) -> Iterator[Client]:
     """A client of a scheduler.
 
+    Parameters
+    ----------
+    address
+        Such as "tcp://host:8786", or the file with which the scheduler was started
+        (``--scheduler-file``), whose name ends in ".json".
+
     Raises
     ------
     FileError
@@ -48,10 +56,12 @@ def connected(address: str) -> Iterator[Client]:
     # What becomes of connections is told by this program.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
+        if address.endswith(".json"):
+            address = str(json.loads(Path(address).read_text(encoding="utf-8"))["address"])
         # A client that finds nothing complains when it is thrown away: ask before.
         parse_host_port(parse_address(address)[1])
         client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
+    except (LookupError, OSError, TypeError, ValueError) as error:
         raise FileError(f"--scheduler {address}: there is no scheduler: {error}") from None
     try:
         yield client
@@ -138,8 +148,6 @@ def _result(client: Client, future: Future[Any]) -> Any:
     """
     from distributed import CancelledError
 
-    if future.status == "cancelled":
-        raise RunError("the scheduler is gone")
     try:
         return future.result(timeout=PATIENCE)
     except CancelledError:

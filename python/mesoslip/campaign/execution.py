@@ -37,7 +37,7 @@ THREAD_SECONDS = 10.0
 LOOK_SECONDS = 0.1
 # Workers that a point may cost before it is given up.
 MOST_DEATHS = 3
-# Time in which a process ends whose pipe is closed [s].
+# Time in which a worker ends whose pipe is closed [s].
 PATIENCE = 5.0
 
 # What a process runs: it finds the modules of this one, whatever this one has been started as.
@@ -92,7 +92,8 @@ class ThreadWorker:
     def end(self) -> None:
         self._halt.set()
         self.connection.close()
-        self._thread.join()
+        # Who wrote a measure that takes forever shall be able to stop it.
+        self._thread.join(PATIENCE)
 
     def ending(self) -> str:
         return "ended by itself"

@@ -170,9 +170,11 @@ class Plan:
 
     def __init__(self, tables: Mapping[str, Any], source: str, folder: Path) -> None:
         tables = dict(tables)
+        if "sweep" not in tables:
+            message = "missing; this table says what is varied, and what is measured"
+            raise ConfigError([Problem(source, "sweep", message)])
         try:
-            wanted = {"sweep": tables.pop("sweep")} if "sweep" in tables else {}
-            self.sweep = SweepFile.model_validate(wanted).sweep
+            self.sweep = SweepFile.model_validate({"sweep": tables.pop("sweep")}).sweep
         except ValidationError as error:
             raise ConfigError(problems(error, source, SweepFile)) from None
         self.tables: dict[str, Any] = tables

@@ -27,7 +27,9 @@ SetOption = Annotated[
 SchedulerOption = Annotated[
     str | None,
     typer.Option(
-        "--scheduler", help="Dask scheduler whose workers do the computing", metavar="ADDRESS"
+        "--scheduler",
+        help="Dask scheduler whose workers do the computing, or its --scheduler-file",
+        metavar="ADDRESS",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]

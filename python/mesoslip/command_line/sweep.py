@@ -10,6 +10,7 @@ import typer
 from mesoslip.command_line.options import SchedulerOption, SetOption
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.command_line.signals import Stop, stopped_by_signals
+from mesoslip.errors import WriteError
 
 if TYPE_CHECKING:
     from mesoslip.campaign.plan import Plan
@@ -67,16 +68,22 @@ def sweep(
     _ = plan.combinations
     files.check_writable(path, [file])
     with Store(folder) as store, stopped_by_signals() as stop:
-        with progress_shown(quiet) as progress:
-            done = api.run_plan(
-                plan,
-                store=store,
-                workers=workers,
-                scheduler=scheduler,
-                pool=pool,
-                progress=progress,
-                stop=stop,
-            )
+        try:
+            with progress_shown(quiet) as progress:
+                done = api.run_plan(
+                    plan,
+                    store=store,
+                    workers=workers,
+                    scheduler=scheduler,
+                    pool=pool,
+                    progress=progress,
+                    stop=stop,
+                )
+        except WriteError as error:
+            kept = len(store.names())
+            raise WriteError(
+                f"{error}; {kept} points are kept: the same command goes on"
+            ) from error
         status = _write(done, path, stop)
     _tell(done, path, quiet)
     if status:

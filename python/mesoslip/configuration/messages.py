@@ -75,6 +75,8 @@ def _about_unknown(place: list[Any], slider: str, whole: type[Table]) -> str:
     table, name = _dotted(place[:-1]), str(place[-1])
     if (table, name) == ("", "base"):
         return "names the file under another one, and cannot be laid over it"
+    if (table, name) == ("", "sweep"):
+        return "is of many runs; the command for it is mesoslip sweep"
     kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
     if table == "slider" and kinds:
         named = " or ".join(f'"{kind}"' for kind in kinds)

@@ -13,7 +13,7 @@ from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, maps, response, run, theory
+from mesoslip.plots import avalanches, response, run, sweep, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
 
@@ -94,8 +94,8 @@ def picture(
         )
     if kind == "sweep":
         return Picture(
-            lambda figure: maps.overview(tree, figure, view),
-            lambda axes: maps.draw_panel(axes, tree),
+            lambda figure: sweep.overview(tree, figure, view),
+            lambda axes: sweep.draw_measure(axes, tree, view),
         )
     if view == "lattice":
         chosen = avalanches.chosen_snapshot(tree, snapshot)

@@ -50,7 +50,9 @@ def test_pictures_of_the_theory(klein):
 
 
 def test_an_unknown_view_is_told(old):
-    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, lattice, response"):
+    with pytest.raises(
+        mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, lattice, response"
+    ):
         mesoslip.plot(old, view="foo")
 
 

@@ -27,9 +27,16 @@ Array = NDArray[np.float64]
 
 LAWS = ("ageing", "slip")
 
+UNSTABLE = (
+    "the motion of the spring and slider cannot be followed: it is unstable, or its parameters are "
+    "out of any scale"
+)
+
 # Steps of the integration between two times, at most.
 MOST_STEPS = 20_000
-# Exponents beyond which a trial step of the integration is held, before it overflows.
+# Logarithm of a velocity over V_0 that no motion reaches but one that is unstable without a mass.
+RUNAWAY = 100.0
+# Exponent of the state that a trial step of the integration is held at, before it overflows.
 LARGEST_EXPONENT = 300.0
 # Integration's tolerance, relative, and absolute in logarithms of velocity and state.
 TOLERANCE = 1e-10
@@ -225,7 +232,9 @@ def _on_spring(law: RateAndState, stiffness: float, damping: float, mass: float)
 
     def derivative(time: float, at: Array, start: float, acceleration: float) -> list[float]:
         logarithm, state = at[0], at[1]
-        ratio = math.exp(min(logarithm, LARGEST_EXPONENT))
+        if not logarithm < RUNAWAY:
+            raise RunError(UNSTABLE)
+        ratio = math.exp(logarithm)
         velocity = reference * ratio
         change = evolution(ratio, logarithm, state)
         loading = stiffness * (start + acceleration * time - velocity)
@@ -271,9 +280,6 @@ def _integrate(
             full_output=True,
         )
     if told["message"] != "Integration successful." or not np.all(np.isfinite(path)):
-        raise RunError(
-            "the motion of the spring and slider cannot be followed: it is unstable, or the "
-            f"parameters are out of any scale ({told['message']})"
-        )
+        raise RunError(UNSTABLE)
     result: Array = path
     return result

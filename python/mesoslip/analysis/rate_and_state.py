@@ -355,7 +355,7 @@ def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
 
 
 def _starts(
-    residuals: Callable[[Array, float], Array], size: int, record: Record
+    residuals: Callable[[Array, float], Array], far_off: Array, size: int, record: Record
 ) -> Iterator[Array]:
     """Where to start from: the best of a net of rates and lengths, each with its best level."""
     tried = []

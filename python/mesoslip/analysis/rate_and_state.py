@@ -334,9 +334,16 @@ def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
         middle = residuals(at)
         columns = [-scale / record.deviation]
         for place in range(1, at.size):
-            moved = at.copy()
-            moved[place] += DERIVATIVE_STEP
-            columns.append((residuals(moved) - middle) / DERIVATIVE_STEP)
+            column = np.zeros_like(middle)
+            # On one side there may be no motion that can be followed.
+            for step in (DERIVATIVE_STEP, -DERIVATIVE_STEP):
+                moved = at.copy()
+                moved[place] += step
+                beside = residuals(moved)
+                if not np.array_equal(beside, far_off):
+                    column = (beside - middle) / step
+                    break
+            columns.append(column)
         return np.stack(columns, axis=1)
 
     best = None

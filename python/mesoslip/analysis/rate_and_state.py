@@ -40,8 +40,9 @@ AGREEMENT = 1e-3
 FAR_OFF = 10.0
 # Noise that is taken to be there at least, over the range of the record.
 LEAST_NOISE = 1e-5
-# Least probability of the residuals of a law that describes a record.
-DESCRIBES = 0.01
+# Least probability of the residuals of a law that describes a record. Small, as their noise is
+# known only as well as the steady parts of the record tell it.
+DESCRIBES = 0.001
 # Of a record without noise: residuals over its variation that are small enough.
 SMALL_MISFIT = 0.01
 

@@ -23,7 +23,8 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import scale_for, with_unit
 from mesoslip.output import variables
 from mesoslip.output.layout import group_of
-from mesoslip.plots import draw, maps, run
+from mesoslip.plots import draw, run
+from mesoslip.plots import sweep as sweep_plots
 from mesoslip.plots.run import Extent
 from mesoslip.plots.style import COLORS
 from mesoslip.reports.content import (
@@ -44,9 +45,8 @@ from mesoslip.theory import force_curve, slip_onset
 MOST_ROWS = 60
 # Bins of a histogram.
 BINS = 24
-# Measures of a sweep that are drawn, and the keys that there may be.
+# Measures of a sweep that are drawn.
 MOST_MAPS = 12
-MOST_AXES = 3
 # Values of a swept key that are told one by one.
 MOST_VALUES = 10
 # What the codes of a sweep mean.
@@ -143,7 +143,7 @@ def sweep(subjects: Sequence[Subject]) -> Section | None:
         keys = [(str(name), data[name].values) for name in data.coords]
         rows = tuple((name, str(values.size), _listed(name, values)) for name, values in keys)
         blocks.append(Table(("key", "values", ""), rows))
-        measured = tuple(_measured(data[name]) for name in maps.measures(data))
+        measured = tuple(_measured(data[name]) for name in sweep_plots.measures(data))
         blocks.append(Table(("measure", "least", "mean", "greatest"), measured))
         for title in ("configuration", "sweep"):
             if title in subject.tree.attrs:
@@ -183,11 +183,7 @@ def maps_of_sweep(subjects: Sequence[Subject]) -> Section | None:
     blocks: list[Block] = []
     for subject in subjects:
         data = subject.tree.to_dataset()
-        if not 1 <= len(maps.swept(data)) <= MOST_AXES:
-            told = f"Sweeps of one to {MOST_AXES} keys of several values are drawn."
-            blocks.append(Text(_named(subjects, subject, told)))
-            continue
-        for name in maps.measures(data)[:MOST_MAPS]:
+        for name in sweep_plots.measures(data)[:MOST_MAPS]:
             blocks.append(_picture(subjects, subject, name, name, run.EVERYTHING))
     return Section("Pictures", tuple(blocks))
 

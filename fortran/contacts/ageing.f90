@@ -24,7 +24,7 @@ module mesoslip_contacts_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
-   use mesoslip_contacts_record, only: row_limit, row_origin, row_renewal, row_stiffness, &
+   use mesoslip_contacts_record, only: row_limit, row_next, row_origin, row_renewal, row_stiffness, &
       & ahead_coordinate, behind_coordinate
    use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set
    implicit none
@@ -50,6 +50,8 @@ module mesoslip_contacts_ageing
    !> Speed of the queue over that of the slider, when it is set and when it comes to be too little
    !> or too much; speed over that of ageing below which contacts are old where they break.
    real(wp), parameter :: ample = 2.0_wp, scant = 1.3_wp, lavish = 8.0_wp, least_ratio = 0.05_wp
+   !> Time within which a slider becomes faster, if it does at all [s]
+   real(wp), parameter :: longest_time = 1.0e9_wp
    !> Number of contacts whose thresholds fall that are all near.
    integer, parameter :: few = 32
 
@@ -61,6 +63,12 @@ module mesoslip_contacts_ageing
    integer, parameter :: life_length = 3
    integer, parameter :: life_birth = 1, life_limit = 2, life_motion = 3
    real(wp), parameter :: no_motion = -1.0_wp, any_motion = huge(1.0_wp)
+
+   !> Numbers of the next life of a contact
+   integer, parameter :: next_length = 2
+   integer, parameter :: next_limit = 1, next_speed = 2
+   !> Next lives that are solved together, of which some are not drawn
+   integer, parameter :: solved_together = 64
 
    !> A list of contacts.
    type :: list_type
@@ -88,6 +96,11 @@ module mesoslip_contacts_ageing
       !> Numbers of their lives, shape (life_length, count)
       real(wp), allocatable, private :: life(:, :)
       type(contact_queue_type), private :: queue
+      !> Limit of the next life of each contact if it is born at a speed in the direction of motion
+      !> [m], and that speed [m/s]; shape (next_length, count). It is known ahead, or not
+      real(wp), allocatable, private :: next(:, :)
+      !> Contacts for which it is still to be found
+      integer, private :: unsolved_count = 0, unsolved(solved_together) = 0
       !> Contacts that lead, whose thresholds fall, and those of them that are near
       type(list_type), private :: lead, falling, near
       !> Where each contact is kept, shape (count)
@@ -116,7 +129,7 @@ module mesoslip_contacts_ageing
       procedure :: rebuild
       procedure, private, non_overridable :: see_motion, begin_steady, end_steady, keep_faster, &
          & order, order_all, is_due, refresh, break_due, break_steady, break_near, break_leaders, &
-         & attach_due, enter, face, foresee, foresee_fall, lead_on, watch_near, time_to_outrun, &
+         & attach_due, enter, bear_newborn, solve_next, face, foresee, foresee_fall, lead_on, watch_near, time_to_outrun, &
          & scan, scan_if_due, farthest_behind, behind_of, note_late
    end type contact_ageing_type
 
@@ -151,6 +164,7 @@ contains
       if (allocated(error)) return
       associate (count => common%count)
          allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
+         if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%seat(count), source=seat_queue, stat=stat)
          if (stat == 0) allocate (self%lead%contact(count), source=0, stat=stat)
          if (stat == 0) allocate (self%falling%contact(count), source=0, stat=stat)
@@ -326,16 +340,12 @@ contains
       room = 0.5_wp * (self%speed - abs(pose%velocity))
       pull = abs(pose%acceleration)
       jolt = caution * self%jolt
-      time = huge(1.0_wp)
-      if (pull > room / time) time = room / pull
-      if (time * (pull + jolt) <= room) return
+      time = longest_time
+      if (longest_time * (pull + jolt) <= room) return
       time = room / (pull + jolt)
       ! Over a longer time than the last one, the acceleration may change by more.
-      if (time > self%duration .and. self%duration > 0.0_wp) then
-         time = self%duration
-         if (pull * time < room) time = max(time, min((room - pull * time) / pull, &
-            & sqrt((room - pull * time) * self%duration / jolt)))
-      end if
+      if (time > self%duration .and. self%duration > 0.0_wp) time = max(self%duration, &
+         & min(time, sqrt(room * self%duration / (pull + jolt))))
    end function time_to_outrun
 
    !> Solve where a contact breaks at the speed of the queue.
@@ -720,13 +730,87 @@ contains
          call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
          self%life(life_birth, contact) = pose%time
          self%life(life_limit, contact) = self%record(row_limit, contact)
-         call self%enter(contact, pose%displacement, pose%time)
+         if (pose%sense * self%direction > 0.0_wp .and. .not. self%jumps) then
+            call self%bear_newborn(contact)
+         else
+            self%next(next_speed, contact) = 0.0_wp
+            call self%enter(contact, pose%displacement, pose%time)
+         end if
          if (self%seat(contact) == seat_queue) then
             call put(self, contact)
             self%behind = max(self%behind, self%behind_of(contact, pose%time))
          end if
       end do
    end subroutine attach_due
+
+   !> Find the place of a contact that is born in the direction of motion.
+   subroutine bear_newborn(self, contact)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      real(wp) :: stretch, solved(next_length)
+
+      stretch = self%parameters%back_force_ratio * self%stretch
+      solved = self%next(:, contact)
+      self%next(next_speed, contact) = 0.0_wp
+      associate (life => self%life(:, contact))
+         if (self%ageing%is_constant(life(life_limit), self%stretch)) then
+            self%seat(contact) = seat_queue
+            life(life_motion) = any_motion
+            return
+         end if
+         if (.not. self%is_steady) then
+            if (self%ageing%falls(life(life_limit), self%stretch)) then
+               call self%enter(contact, 0.0_wp, life(life_birth))
+               return
+            end if
+         end if
+         self%seat(contact) = seat_queue
+         life(life_motion) = merge(self%motion, no_motion, self%is_steady)
+         if (abs(solved(next_speed) - self%speed) > 0.0_wp) then
+            self%record(row_limit, contact) = self%ageing%meet(life(life_limit), self%stretch, &
+               & 0.0_wp, stretch, self%speed)
+         else
+            self%record(row_limit, contact) = solved(next_limit)
+         end if
+      end associate
+      self%solved = self%solved + 1
+      self%unsolved_count = self%unsolved_count + 1
+      self%unsolved(self%unsolved_count) = contact
+      if (self%unsolved_count == solved_together) call self%solve_next(stretch)
+   end subroutine bear_newborn
+
+   !> Solve ahead where contacts will break in their next lives, of those whose thresholds are drawn.
+   subroutine solve_next(self, stretch)
+      class(contact_ageing_type), intent(inout) :: self
+      !> Stretch at birth [m]
+      real(wp), intent(in) :: stretch
+
+      real(wp), dimension(solved_together) :: configured, limit
+      integer :: contact(solved_together), place, number, left
+
+      number = 0
+      left = 0
+      do place = 1, self%unsolved_count
+         associate (one => self%unsolved(place))
+            if (self%record(row_next, one) > 0.0_wp) then
+               number = number + 1
+               contact(number) = one
+               configured(number) = self%record(row_next, one) * self%parameters%static_force &
+                  & / self%parameters%stiffness
+            else
+               left = left + 1
+               self%unsolved(left) = one
+            end if
+         end associate
+      end do
+      self%unsolved_count = left
+      call self%ageing%meet_newborn(configured(:number), self%stretch, stretch, self%speed, &
+         & limit(:number))
+      do place = 1, number
+         self%next(:, contact(place)) = [limit(place), self%speed]
+      end do
+   end subroutine solve_next
 
    !> Find the place of a contact that is born or drawn.
    subroutine enter(self, contact, displacement, time)

@@ -129,7 +129,7 @@ module mesoslip_contacts_ageing
       procedure :: rebuild
       procedure, private, non_overridable :: see_motion, begin_steady, end_steady, keep_faster, &
          & order, order_all, is_due, refresh, break_due, break_steady, break_near, break_leaders, &
-         & attach_due, enter, bear_newborn, solve_next, face, foresee, foresee_fall, lead_on, watch_near, time_to_outrun, &
+         & attach_due, enter, bear_newborn, solve_next, face, foresee, foresee_fall, lead_on, watch_near, keep_slower, &
          & scan, scan_if_due, farthest_behind, behind_of, note_late
    end type contact_ageing_type
 
@@ -223,9 +223,7 @@ contains
       if (self%is_steady) then
          upper = self%queue%first_key
       else
-         if (self%may_outrun) then
-            window%end_time = min(window%end_time, pose%time + self%time_to_outrun(pose))
-         end if
+         if (self%may_outrun) call self%keep_slower(pose, window%end_time)
          call self%scan_if_due(pose)
          call self%lead_on(pose, upper)
          call self%watch_near(pose, upper, lower, window%end_time)
@@ -329,48 +327,61 @@ contains
       end if
    end subroutine keep_faster
 
-   !> How long the slider is not faster than the speed of the queue, by what is known of its motion.
-   pure function time_to_outrun(self, pose) result(time)
+   !> End a window before the slider may become faster than the speed of the queue, by what is known
+   !> of its motion.
+   pure subroutine keep_slower(self, pose, end_time)
       class(contact_ageing_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
-      real(wp) :: time
+      real(wp), intent(inout) :: end_time
 
-      real(wp) :: room, pull, jolt
+      real(wp) :: room, pull, jolt, time
 
-      room = 0.5_wp * (self%speed - abs(pose%velocity))
+      room = self%speed - abs(pose%velocity)
       pull = abs(pose%acceleration)
       jolt = caution * self%jolt
-      time = longest_time
-      if (longest_time * (pull + jolt) <= room) return
-      time = room / (pull + jolt)
-      ! Over a longer time than the last one, the acceleration may change by more.
-      if (time > self%duration .and. self%duration > 0.0_wp) time = max(self%duration, &
-         & min(time, sqrt(room * self%duration / (pull + jolt))))
-   end function time_to_outrun
+      time = min(end_time - pose%time, longest_time)
+      if (2.0_wp * (pull + jolt) * time <= room) return
+      time = 0.5_wp * room / (pull + jolt)
+      if (time > self%duration .and. self%duration > 0.0_wp) then
+         ! Over a longer time than the last one, the acceleration may change by more.
+         time = longest_time
+         if (2.0_wp * pull * time > 0.5_wp * room) time = 0.25_wp * room / pull
+         if (2.0_wp * jolt * time**2 > 0.5_wp * room * self%duration) then
+            time = sqrt(0.25_wp * room * self%duration / jolt)
+         end if
+         time = max(time, self%duration)
+      end if
+      end_time = min(end_time, max(pose%time + time, nearest(pose%time, 1.0_wp)))
+   end subroutine keep_slower
 
-   !> Solve where a contact breaks at the speed of the queue.
+   !> Solve where a contact breaks at the speed of the queue, or a bound on it.
    subroutine order(self, contact, displacement, time)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact
       !> Where the slider is [m], and when that is [s]
       real(wp), intent(in) :: displacement, time
 
-      real(wp) :: age
+      real(wp) :: age, stretch
 
-      associate (life => self%life(:, contact))
+      self%solved = self%solved + 1
+      associate (life => self%life(:, contact), limit => self%record(row_limit, contact))
          age = time - life(life_birth)
          if (self%ageing%is_old(age) .or. self%ageing%is_constant(life(life_limit), &
             & self%stretch)) then
-            self%record(row_limit, contact) = life(life_limit)
+            limit = life(life_limit)
             life(life_motion) = any_motion
+            return
+         end if
+         stretch = self%direction * (displacement - self%record(row_origin, contact))
+         if (self%is_steady) then
+            life(life_motion) = self%motion
+            limit = self%ageing%meet(life(life_limit), self%stretch, age, stretch, self%speed)
          else
-            self%record(row_limit, contact) = self%ageing%meet(life(life_limit), self%stretch, &
-               & age, self%direction * (displacement - self%record(row_origin, contact)), &
+            life(life_motion) = no_motion
+            limit = self%ageing%meet_least(life(life_limit), self%stretch, age, stretch, &
                & self%speed)
-            life(life_motion) = merge(self%motion, no_motion, self%is_steady)
          end if
       end associate
-      self%solved = self%solved + 1
    end subroutine order
 
    !> Solve anew where contacts break, of all that are not in the list of those that fall.
@@ -730,7 +741,7 @@ contains
          call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
          self%life(life_birth, contact) = pose%time
          self%life(life_limit, contact) = self%record(row_limit, contact)
-         if (pose%sense * self%direction > 0.0_wp .and. .not. self%jumps) then
+         if (self%is_steady) then
             call self%bear_newborn(contact)
          else
             self%next(next_speed, contact) = 0.0_wp
@@ -743,7 +754,7 @@ contains
       end do
    end subroutine attach_due
 
-   !> Find the place of a contact that is born in the direction of motion.
+   !> Queue a contact that is born in a steady motion.
    subroutine bear_newborn(self, contact)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -759,14 +770,8 @@ contains
             life(life_motion) = any_motion
             return
          end if
-         if (.not. self%is_steady) then
-            if (self%ageing%falls(life(life_limit), self%stretch)) then
-               call self%enter(contact, 0.0_wp, life(life_birth))
-               return
-            end if
-         end if
          self%seat(contact) = seat_queue
-         life(life_motion) = merge(self%motion, no_motion, self%is_steady)
+         life(life_motion) = self%motion
          if (abs(solved(next_speed) - self%speed) > 0.0_wp) then
             self%record(row_limit, contact) = self%ageing%meet(life(life_limit), self%stretch, &
                & 0.0_wp, stretch, self%speed)

@@ -33,6 +33,8 @@ module mesoslip_contacts_ageing_law
    real(wp), parameter :: enough = 1.0e-4_wp
    !> Rate over speed up to which there is one step only
    real(wp), parameter :: most_plain = 0.9_wp
+   !> Change of the rate of a threshold, relative, up to which a parabola is a close bound
+   real(wp), parameter :: most_bent = 0.2_wp
    !> The same of Newton's method, relative
    real(wp), parameter :: enough_of_newton = 1.0e-8_wp
    !> Iterations, more than are ever needed but where a contact just does not break
@@ -57,7 +59,8 @@ module mesoslip_contacts_ageing_law
       procedure, non_overridable :: threshold
       !> Threshold at which a contact breaks whose stretch grows at a steady speed
       procedure, non_overridable :: meet
-      !> The same at birth, of many contacts
+      !> A bound on it from below; the same at birth, of many contacts
+      procedure, non_overridable :: meet_least
       procedure, non_overridable :: meet_newborn
       !> What the rate changes by in a second
       procedure, non_overridable :: bend
@@ -146,7 +149,8 @@ contains
          threshold = configured
          rate = 0.0_wp
       else
-         lack = self%lack(configured, mean) * exp(-age / self%time)
+         lack = self%lack(configured, mean)
+         if (age > 0.0_wp) lack = lack * exp(-age / self%time)
          threshold = configured - lack
          rate = lack / self%time
       end if
@@ -230,6 +234,35 @@ contains
          threshold = configured - lack * exp(-fallen(way, part))
       end if
    end function meet
+
+   !> A bound from below on that threshold, which takes less time where it is near, if it grows.
+   pure function meet_least(self, configured, mean, age, stretch, speed) result(threshold)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Configured threshold of the contact, and the mean of all contacts, as stretches [m]
+      real(wp), intent(in) :: configured, mean
+      !> Age, not negative [s]
+      real(wp), intent(in) :: age
+      !> Stretch at this age [m], and the speed at which it grows, positive [m/s]
+      real(wp), intent(in) :: stretch, speed
+      !> Threshold that the contact has where it breaks, or a lower one [m]
+      real(wp) :: threshold
+
+      real(wp) :: rate, bend, gap, time
+
+      call self%follow(configured, mean, age, threshold, rate)
+      gap = threshold - stretch
+      if (.not. (gap > 0.0_wp .and. rate > 0.0_wp) .or. speed * self%time > longest_scale) return
+      bend = 0.5_wp * self%bend(rate, age)
+      if (2.0_wp * gap * abs(bend) < most_bent * rate * speed .and. 2.0_wp * rate < speed) then
+         ! The third derivatives of thresholds are positive: a parabola is below.
+         time = gap / speed
+         time = (gap + (rate + bend * time) * time) / speed
+         threshold = threshold + (rate + bend * time) * time
+      else
+         threshold = self%meet(configured, mean, age, stretch, speed)
+      end if
+   end function meet_least
 
    !> The same as meet for many contacts at birth: together they take less time.
    pure subroutine meet_newborn(self, configured, mean, stretch, speed, threshold)

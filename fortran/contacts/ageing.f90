@@ -458,6 +458,7 @@ contains
       real(wp) :: coordinate
 
       real(wp) :: age, limit, rate, bend, here, gap, speed, pull, grown, step, excess, slope, doubt
+      real(wp) :: held
       integer :: number
 
       coordinate = ahead_coordinate(self%record(:, contact), self%direction)
@@ -474,9 +475,10 @@ contains
       if (.not. step > 0.0_wp) return
       pull = 0.5_wp * self%direction * pose%acceleration
       doubt = 0.5_wp * caution * self%jolt * step
-      if (self%duration > 0.0_wp) doubt = doubt * max(1.0_wp, step / self%duration)
+      if (step > self%duration .and. self%duration > 0.0_wp) doubt = doubt * step / self%duration
       if (.not. (doubt < 0.5_wp * speed .and. abs(pull) * step < 0.25_wp * speed)) return
 
+      held = max(0.0_wp, 1.0_wp - doubt * slope)
       bend = 0.5_wp * self%ageing%bend(rate, age)
       excess = (pull - bend) * step * slope
       if (abs(excess) <= most_excess .and. abs(bend) * step**3 &
@@ -498,7 +500,7 @@ contains
          end do
          grown = max(grown, 0.0_wp)
       end if
-      coordinate = max(coordinate, here + (1.0_wp - doubt / speed) * grown)
+      coordinate = max(coordinate, here + held * grown)
    end function foresee
 
    !> Find until where and when the slider may go before a contact breaks whose threshold falls.

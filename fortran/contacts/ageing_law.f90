@@ -46,6 +46,8 @@ module mesoslip_contacts_ageing_law
       integer :: kind = ageing_relax
       !> Time tau_a [s]
       real(wp) :: time = 1.0_wp
+      !> One over it [1/s]
+      real(wp), private :: inverse_time = 1.0_wp
       !> Age of the contacts at the start of a run [s]
       real(wp) :: initial_age = 0.0_wp
       !> What the young lack, over the mean: of the mean, and of each deviation from it
@@ -101,6 +103,7 @@ contains
             & // "age below 0")
          return
       end if
+      self%inverse_time = 1.0_wp / self%time
       select case (self%kind)
       case (ageing_relax)
          call parameters%take("young_force_ratio", force_ratio, error)
@@ -150,9 +153,9 @@ contains
          rate = 0.0_wp
       else
          lack = self%lack(configured, mean)
-         if (age > 0.0_wp) lack = lack * exp(-age / self%time)
+         if (age > 0.0_wp) lack = lack * exp(-age * self%inverse_time)
          threshold = configured - lack
-         rate = lack / self%time
+         rate = lack * self%inverse_time
       end if
    end subroutine follow
 
@@ -165,7 +168,7 @@ contains
       !> Its change in that unit for a second squared
       real(wp) :: bend
 
-      bend = -rate / self%time
+      bend = -rate * self%inverse_time
       if (self%kind == ageing_log) bend = -rate / (self%time + age)
    end function bend
 
@@ -248,7 +251,7 @@ contains
       !> Threshold that the contact has where it breaks, or a lower one [m]
       real(wp) :: threshold
 
-      real(wp) :: rate, bend, gap, time
+      real(wp) :: rate, bend, gap, time, slowness
 
       call self%follow(configured, mean, age, threshold, rate)
       gap = threshold - stretch
@@ -256,8 +259,9 @@ contains
       bend = 0.5_wp * self%bend(rate, age)
       if (2.0_wp * gap * abs(bend) < most_bent * rate * speed .and. 2.0_wp * rate < speed) then
          ! The third derivatives of thresholds are positive: a parabola is below.
-         time = gap / speed
-         time = (gap + (rate + bend * time) * time) / speed
+         slowness = 1.0_wp / speed
+         time = gap * slowness
+         time = (gap + (rate + bend * time) * time) * slowness
          threshold = threshold + (rate + bend * time) * time
       else
          threshold = self%meet(configured, mean, age, stretch, speed)
@@ -292,9 +296,14 @@ contains
          if (is_plain(contact)) p(contact) = lack / scale * exp(-way)
       end do
       t = first_tree(p)
-      slope = p * exp(t)
-      is_plain = is_plain .and. slope < most_plain
-      where (.not. is_plain) slope = 0.0_wp
+      do contact = 1, size(configured)
+         ! Under a condition, as the exponential function of vectors has another last digit.
+         slope(contact) = 0.0_wp
+         if (is_plain(contact)) slope(contact) = p(contact) * exp(t(contact))
+         if (slope(contact) < most_plain) cycle
+         is_plain(contact) = .false.
+         slope(contact) = 0.0_wp
+      end do
       call improve_tree(slope, t, step)
       threshold = configured - scale * t
       do contact = 1, size(configured)

@@ -24,8 +24,8 @@ module mesoslip_contacts_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
-   use mesoslip_contacts_record, only: row_limit, row_next, row_origin, row_renewal, row_stiffness, &
-      & ahead_coordinate, behind_coordinate
+   use mesoslip_contacts_record, only: row_limit, row_next, row_origin, row_renewal, &
+      & row_stiffness, ahead_coordinate, behind_coordinate
    use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set
    implicit none
    private
@@ -129,7 +129,8 @@ module mesoslip_contacts_ageing
       procedure :: rebuild
       procedure, private, non_overridable :: see_motion, begin_steady, end_steady, keep_faster, &
          & order, order_all, is_due, refresh, break_due, break_steady, break_near, break_leaders, &
-         & attach_due, enter, bear_newborn, solve_next, face, foresee, foresee_fall, lead_on, watch_near, keep_slower, &
+         & attach_due, enter, bear_newborn, solve_next, &
+         & face, foresee, foresee_fall, lead_on, watch_near, keep_slower, &
          & scan, scan_if_due, farthest_behind, behind_of, note_late
    end type contact_ageing_type
 
@@ -787,7 +788,7 @@ contains
       if (self%unsolved_count == solved_together) call self%solve_next(stretch)
    end subroutine bear_newborn
 
-   !> Solve ahead where contacts will break in their next lives, of those whose thresholds are drawn.
+   !> Solve ahead where contacts will break in their next lives, if their thresholds are drawn.
    subroutine solve_next(self, stretch)
       class(contact_ageing_type), intent(inout) :: self
       !> Stretch at birth [m]

@@ -36,7 +36,7 @@ help: ## Show the targets
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
 	@printf '\nWhat uses what, from left to right (README, "Develop", tells what to touch to add something):\n'
 	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
-	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign, command_line\n' | expand -t 16
+	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign and reports, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build
 	@:

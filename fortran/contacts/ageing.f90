@@ -24,8 +24,8 @@ module mesoslip_contacts_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
-   use mesoslip_contacts_record, only: row_limit, row_origin, row_renewal, row_stiffness, &
-      & ahead_coordinate, behind_coordinate
+   use mesoslip_contacts_record, only: row_limit, row_next, row_origin, row_renewal, &
+      & row_stiffness, ahead_coordinate, behind_coordinate
    use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set
    implicit none
    private
@@ -50,6 +50,8 @@ module mesoslip_contacts_ageing
    !> Speed of the queue over that of the slider, when it is set and when it comes to be too little
    !> or too much; speed over that of ageing below which contacts are old where they break.
    real(wp), parameter :: ample = 2.0_wp, scant = 1.3_wp, lavish = 8.0_wp, least_ratio = 0.05_wp
+   !> Time within which a slider becomes faster, if it does at all [s]
+   real(wp), parameter :: longest_time = 1.0e9_wp
    !> Number of contacts whose thresholds fall that are all near.
    integer, parameter :: few = 32
 
@@ -61,6 +63,12 @@ module mesoslip_contacts_ageing
    integer, parameter :: life_length = 3
    integer, parameter :: life_birth = 1, life_limit = 2, life_motion = 3
    real(wp), parameter :: no_motion = -1.0_wp, any_motion = huge(1.0_wp)
+
+   !> Numbers of the next life of a contact
+   integer, parameter :: next_length = 2
+   integer, parameter :: next_limit = 1, next_speed = 2
+   !> Next lives that are solved together, of which some are not drawn
+   integer, parameter :: solved_together = 64
 
    !> A list of contacts.
    type :: list_type
@@ -88,6 +96,11 @@ module mesoslip_contacts_ageing
       !> Numbers of their lives, shape (life_length, count)
       real(wp), allocatable, private :: life(:, :)
       type(contact_queue_type), private :: queue
+      !> Limit of the next life of each contact if it is born at a speed in the direction of motion
+      !> [m], and that speed [m/s]; shape (next_length, count). It is known ahead, or not
+      real(wp), allocatable, private :: next(:, :)
+      !> Contacts for which it is still to be found
+      integer, private :: unsolved_count = 0, unsolved(solved_together) = 0
       !> Contacts that lead, whose thresholds fall, and those of them that are near
       type(list_type), private :: lead, falling, near
       !> Where each contact is kept, shape (count)
@@ -116,7 +129,8 @@ module mesoslip_contacts_ageing
       procedure :: rebuild
       procedure, private, non_overridable :: see_motion, begin_steady, end_steady, keep_faster, &
          & order, order_all, is_due, refresh, break_due, break_steady, break_near, break_leaders, &
-         & attach_due, enter, face, foresee, foresee_fall, lead_on, watch_near, time_to_outrun, &
+         & attach_due, enter, bear_newborn, solve_next, &
+         & face, foresee, foresee_fall, lead_on, watch_near, keep_slower, &
          & scan, scan_if_due, farthest_behind, behind_of, note_late
    end type contact_ageing_type
 
@@ -151,6 +165,7 @@ contains
       if (allocated(error)) return
       associate (count => common%count)
          allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
+         if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%seat(count), source=seat_queue, stat=stat)
          if (stat == 0) allocate (self%lead%contact(count), source=0, stat=stat)
          if (stat == 0) allocate (self%falling%contact(count), source=0, stat=stat)
@@ -209,9 +224,7 @@ contains
       if (self%is_steady) then
          upper = self%queue%first_key
       else
-         if (self%may_outrun) then
-            window%end_time = min(window%end_time, pose%time + self%time_to_outrun(pose))
-         end if
+         if (self%may_outrun) call self%keep_slower(pose, window%end_time)
          call self%scan_if_due(pose)
          call self%lead_on(pose, upper)
          call self%watch_near(pose, upper, lower, window%end_time)
@@ -315,52 +328,61 @@ contains
       end if
    end subroutine keep_faster
 
-   !> How long the slider is not faster than the speed of the queue, by what is known of its motion.
-   pure function time_to_outrun(self, pose) result(time)
+   !> End a window before the slider may become faster than the speed of the queue, by what is known
+   !> of its motion.
+   pure subroutine keep_slower(self, pose, end_time)
       class(contact_ageing_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
-      real(wp) :: time
+      real(wp), intent(inout) :: end_time
 
-      real(wp) :: room, pull, jolt
+      real(wp) :: room, pull, jolt, time
 
-      room = 0.5_wp * (self%speed - abs(pose%velocity))
+      room = self%speed - abs(pose%velocity)
       pull = abs(pose%acceleration)
       jolt = caution * self%jolt
-      time = huge(1.0_wp)
-      if (pull > room / time) time = room / pull
-      if (time * (pull + jolt) <= room) return
-      time = room / (pull + jolt)
-      ! Over a longer time than the last one, the acceleration may change by more.
+      time = min(end_time - pose%time, longest_time)
+      if (2.0_wp * (pull + jolt) * time <= room) return
+      time = 0.5_wp * room / (pull + jolt)
       if (time > self%duration .and. self%duration > 0.0_wp) then
-         time = self%duration
-         if (pull * time < room) time = max(time, min((room - pull * time) / pull, &
-            & sqrt((room - pull * time) * self%duration / jolt)))
+         ! Over a longer time than the last one, the acceleration may change by more.
+         time = longest_time
+         if (2.0_wp * pull * time > 0.5_wp * room) time = 0.25_wp * room / pull
+         if (2.0_wp * jolt * time**2 > 0.5_wp * room * self%duration) then
+            time = sqrt(0.25_wp * room * self%duration / jolt)
+         end if
+         time = max(time, self%duration)
       end if
-   end function time_to_outrun
+      end_time = min(end_time, max(pose%time + time, nearest(pose%time, 1.0_wp)))
+   end subroutine keep_slower
 
-   !> Solve where a contact breaks at the speed of the queue.
+   !> Solve where a contact breaks at the speed of the queue, or a bound on it.
    subroutine order(self, contact, displacement, time)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact
       !> Where the slider is [m], and when that is [s]
       real(wp), intent(in) :: displacement, time
 
-      real(wp) :: age
+      real(wp) :: age, stretch
 
-      associate (life => self%life(:, contact))
+      self%solved = self%solved + 1
+      associate (life => self%life(:, contact), limit => self%record(row_limit, contact))
          age = time - life(life_birth)
          if (self%ageing%is_old(age) .or. self%ageing%is_constant(life(life_limit), &
             & self%stretch)) then
-            self%record(row_limit, contact) = life(life_limit)
+            limit = life(life_limit)
             life(life_motion) = any_motion
+            return
+         end if
+         stretch = self%direction * (displacement - self%record(row_origin, contact))
+         if (self%is_steady) then
+            life(life_motion) = self%motion
+            limit = self%ageing%meet(life(life_limit), self%stretch, age, stretch, self%speed)
          else
-            self%record(row_limit, contact) = self%ageing%meet(life(life_limit), self%stretch, &
-               & age, self%direction * (displacement - self%record(row_origin, contact)), &
+            life(life_motion) = no_motion
+            limit = self%ageing%meet_least(life(life_limit), self%stretch, age, stretch, &
                & self%speed)
-            life(life_motion) = merge(self%motion, no_motion, self%is_steady)
          end if
       end associate
-      self%solved = self%solved + 1
    end subroutine order
 
    !> Solve anew where contacts break, of all that are not in the list of those that fall.
@@ -437,6 +459,7 @@ contains
       real(wp) :: coordinate
 
       real(wp) :: age, limit, rate, bend, here, gap, speed, pull, grown, step, excess, slope, doubt
+      real(wp) :: held
       integer :: number
 
       coordinate = ahead_coordinate(self%record(:, contact), self%direction)
@@ -453,9 +476,10 @@ contains
       if (.not. step > 0.0_wp) return
       pull = 0.5_wp * self%direction * pose%acceleration
       doubt = 0.5_wp * caution * self%jolt * step
-      if (self%duration > 0.0_wp) doubt = doubt * max(1.0_wp, step / self%duration)
+      if (step > self%duration .and. self%duration > 0.0_wp) doubt = doubt * step / self%duration
       if (.not. (doubt < 0.5_wp * speed .and. abs(pull) * step < 0.25_wp * speed)) return
 
+      held = max(0.0_wp, 1.0_wp - doubt * slope)
       bend = 0.5_wp * self%ageing%bend(rate, age)
       excess = (pull - bend) * step * slope
       if (abs(excess) <= most_excess .and. abs(bend) * step**3 &
@@ -477,7 +501,7 @@ contains
          end do
          grown = max(grown, 0.0_wp)
       end if
-      coordinate = max(coordinate, here + (1.0_wp - doubt / speed) * grown)
+      coordinate = max(coordinate, here + held * grown)
    end function foresee
 
    !> Find until where and when the slider may go before a contact breaks whose threshold falls.
@@ -720,13 +744,81 @@ contains
          call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
          self%life(life_birth, contact) = pose%time
          self%life(life_limit, contact) = self%record(row_limit, contact)
-         call self%enter(contact, pose%displacement, pose%time)
+         if (self%is_steady) then
+            call self%bear_newborn(contact)
+         else
+            self%next(next_speed, contact) = 0.0_wp
+            call self%enter(contact, pose%displacement, pose%time)
+         end if
          if (self%seat(contact) == seat_queue) then
             call put(self, contact)
             self%behind = max(self%behind, self%behind_of(contact, pose%time))
          end if
       end do
    end subroutine attach_due
+
+   !> Queue a contact that is born in a steady motion.
+   subroutine bear_newborn(self, contact)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      real(wp) :: stretch, solved(next_length)
+
+      stretch = self%parameters%back_force_ratio * self%stretch
+      solved = self%next(:, contact)
+      self%next(next_speed, contact) = 0.0_wp
+      associate (life => self%life(:, contact))
+         if (self%ageing%is_constant(life(life_limit), self%stretch)) then
+            self%seat(contact) = seat_queue
+            life(life_motion) = any_motion
+            return
+         end if
+         self%seat(contact) = seat_queue
+         life(life_motion) = self%motion
+         if (abs(solved(next_speed) - self%speed) > 0.0_wp) then
+            self%record(row_limit, contact) = self%ageing%meet(life(life_limit), self%stretch, &
+               & 0.0_wp, stretch, self%speed)
+         else
+            self%record(row_limit, contact) = solved(next_limit)
+         end if
+      end associate
+      self%solved = self%solved + 1
+      self%unsolved_count = self%unsolved_count + 1
+      self%unsolved(self%unsolved_count) = contact
+      if (self%unsolved_count == solved_together) call self%solve_next(stretch)
+   end subroutine bear_newborn
+
+   !> Solve ahead where contacts will break in their next lives, if their thresholds are drawn.
+   subroutine solve_next(self, stretch)
+      class(contact_ageing_type), intent(inout) :: self
+      !> Stretch at birth [m]
+      real(wp), intent(in) :: stretch
+
+      real(wp), dimension(solved_together) :: configured, limit
+      integer :: contact(solved_together), place, number, left
+
+      number = 0
+      left = 0
+      do place = 1, self%unsolved_count
+         associate (one => self%unsolved(place))
+            if (self%record(row_next, one) > 0.0_wp) then
+               number = number + 1
+               contact(number) = one
+               configured(number) = self%record(row_next, one) * self%parameters%static_force &
+                  & / self%parameters%stiffness
+            else
+               left = left + 1
+               self%unsolved(left) = one
+            end if
+         end associate
+      end do
+      self%unsolved_count = left
+      call self%ageing%meet_newborn(configured(:number), self%stretch, stretch, self%speed, &
+         & limit(:number))
+      do place = 1, number
+         self%next(:, contact(place)) = [limit(place), self%speed]
+      end do
+   end subroutine solve_next
 
    !> Find the place of a contact that is born or drawn.
    subroutine enter(self, contact, displacement, time)

@@ -31,6 +31,10 @@ module mesoslip_contacts_ageing_law
    real(wp), parameter :: euler = 2.718281828459045235_wp
    !> Step of an iteration of the fourth order after which nothing is left to correct
    real(wp), parameter :: enough = 1.0e-4_wp
+   !> Rate over speed up to which there is one step only
+   real(wp), parameter :: most_plain = 0.9_wp
+   !> Change of the rate of a threshold, relative, up to which a parabola is a close bound
+   real(wp), parameter :: most_bent = 0.2_wp
    !> The same of Newton's method, relative
    real(wp), parameter :: enough_of_newton = 1.0e-8_wp
    !> Iterations, more than are ever needed but where a contact just does not break
@@ -42,6 +46,8 @@ module mesoslip_contacts_ageing_law
       integer :: kind = ageing_relax
       !> Time tau_a [s]
       real(wp) :: time = 1.0_wp
+      !> One over it [1/s]
+      real(wp), private :: inverse_time = 1.0_wp
       !> Age of the contacts at the start of a run [s]
       real(wp) :: initial_age = 0.0_wp
       !> What the young lack, over the mean: of the mean, and of each deviation from it
@@ -55,6 +61,9 @@ module mesoslip_contacts_ageing_law
       procedure, non_overridable :: threshold
       !> Threshold at which a contact breaks whose stretch grows at a steady speed
       procedure, non_overridable :: meet
+      !> A bound on it from below; the same at birth, of many contacts
+      procedure, non_overridable :: meet_least
+      procedure, non_overridable :: meet_newborn
       !> What the rate changes by in a second
       procedure, non_overridable :: bend
       !> Configured threshold of the contacts that break at an age under a force
@@ -94,6 +103,7 @@ contains
             & // "age below 0")
          return
       end if
+      self%inverse_time = 1.0_wp / self%time
       select case (self%kind)
       case (ageing_relax)
          call parameters%take("young_force_ratio", force_ratio, error)
@@ -142,9 +152,10 @@ contains
          threshold = configured
          rate = 0.0_wp
       else
-         lack = self%lack(configured, mean) * exp(-age / self%time)
+         lack = self%lack(configured, mean)
+         if (age > 0.0_wp) lack = lack * exp(-age * self%inverse_time)
          threshold = configured - lack
-         rate = lack / self%time
+         rate = lack * self%inverse_time
       end if
    end subroutine follow
 
@@ -157,7 +168,7 @@ contains
       !> Its change in that unit for a second squared
       real(wp) :: bend
 
-      bend = -rate / self%time
+      bend = -rate * self%inverse_time
       if (self%kind == ageing_log) bend = -rate / (self%time + age)
    end function bend
 
@@ -227,31 +238,129 @@ contains
       end if
    end function meet
 
+   !> A bound from below on that threshold, which takes less time where it is near, if it grows.
+   pure function meet_least(self, configured, mean, age, stretch, speed) result(threshold)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Configured threshold of the contact, and the mean of all contacts, as stretches [m]
+      real(wp), intent(in) :: configured, mean
+      !> Age, not negative [s]
+      real(wp), intent(in) :: age
+      !> Stretch at this age [m], and the speed at which it grows, positive [m/s]
+      real(wp), intent(in) :: stretch, speed
+      !> Threshold that the contact has where it breaks, or a lower one [m]
+      real(wp) :: threshold
+
+      real(wp) :: rate, bend, gap, time, slowness
+
+      call self%follow(configured, mean, age, threshold, rate)
+      gap = threshold - stretch
+      if (.not. (gap > 0.0_wp .and. rate > 0.0_wp) .or. speed * self%time > longest_scale) return
+      bend = 0.5_wp * self%bend(rate, age)
+      if (2.0_wp * gap * abs(bend) < most_bent * rate * speed .and. 2.0_wp * rate < speed) then
+         ! The third derivatives of thresholds are positive: a parabola is below.
+         slowness = 1.0_wp / speed
+         time = gap * slowness
+         time = (gap + (rate + bend * time) * time) * slowness
+         threshold = threshold + (rate + bend * time) * time
+      else
+         threshold = self%meet(configured, mean, age, stretch, speed)
+      end if
+   end function meet_least
+
+   !> The same as meet for many contacts at birth: together they take less time.
+   pure subroutine meet_newborn(self, configured, mean, stretch, speed, threshold)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Configured thresholds of the contacts, and the mean of all contacts, as stretches [m]
+      real(wp), intent(in), contiguous :: configured(:)
+      real(wp), intent(in) :: mean
+      !> Stretch at birth [m], and the speed at which it grows, positive [m/s]
+      real(wp), intent(in) :: stretch, speed
+      !> Thresholds where they break, the same as those of meet to the bit; shape (contacts) [m]
+      real(wp), intent(out), contiguous :: threshold(:)
+
+      real(wp), dimension(size(configured)) :: p, t, step, slope
+      logical :: is_plain(size(configured))
+      real(wp) :: lack, scale, way
+      integer :: contact
+
+      scale = speed * self%time
+      is_plain = self%kind == ageing_relax .and. scale <= longest_scale
+      do contact = 1, size(configured)
+         lack = self%lack(configured(contact), mean)
+         way = (configured(contact) - stretch) / scale
+         is_plain(contact) = is_plain(contact) .and. lack > 0.0_wp .and. way < old &
+            & .and. configured(contact) - lack > stretch
+         p(contact) = 0.0_wp
+         if (is_plain(contact)) p(contact) = lack / scale * exp(-way)
+      end do
+      t = first_tree(p)
+      do contact = 1, size(configured)
+         ! Under a condition, as the exponential function of vectors has another last digit.
+         slope(contact) = 0.0_wp
+         if (is_plain(contact)) slope(contact) = p(contact) * exp(t(contact))
+         if (slope(contact) < most_plain) cycle
+         is_plain(contact) = .false.
+         slope(contact) = 0.0_wp
+      end do
+      call improve_tree(slope, t, step)
+      threshold = configured - scale * t
+      do contact = 1, size(configured)
+         if (is_plain(contact) .and. step(contact) <= enough) cycle
+         threshold(contact) = self%meet(configured(contact), mean, 0.0_wp, stretch, speed)
+      end do
+   end subroutine meet_newborn
+
    !> Solution below 1 of T = p exp(T).
    pure function tree(p) result(t)
       !> Not negative, and at most 1/e
       real(wp), intent(in) :: p
       real(wp) :: t
 
-      real(wp) :: q, grown, step, slope
+      real(wp) :: slope, step
       integer :: iteration
+
+      t = first_tree(p)
+      do iteration = 1, most_iterations
+         slope = p * exp(t)
+         if (.not. slope < 1.0_wp) return
+         call improve_tree(slope, t, step)
+         if (step <= enough) return
+      end do
+   end function tree
+
+   !> The same to a few digits.
+   elemental function first_tree(p) result(t)
+      real(wp), intent(in) :: p
+      real(wp) :: t
+
+      real(wp) :: q
 
       q = sqrt(max(0.0_wp, 1.0_wp - euler * p))
       associate (c => tree_start)
          t = p * ((c(0) + q * c(1)) + q**2 * ((c(2) + q * c(3)) &
             & + q**2 * ((c(4) + q * c(5)) + q**2 * c(6))))
       end associate
-      do iteration = 1, most_iterations
-         grown = p * exp(t)
-         if (.not. grown < 1.0_wp) return
-         slope = 1.0_wp / (1.0_wp - grown)
-         step = (grown - t) * slope
-         slope = grown * slope
-         t = t + step * (1.0_wp + slope * step * (0.5_wp + (0.5_wp * slope + 1.0_wp / 6.0_wp) &
-            & * step))
-         if (abs(slope * step) <= enough) return
-      end do
-   end function tree
+   end function first_tree
+
+   !> One step of the fourth order.
+   elemental subroutine improve_tree(grown, t, change)
+      !> p exp(t), below 1
+      real(wp), intent(in) :: grown
+      !> The solution
+      real(wp), intent(inout) :: t
+      !> Size of the step, over that to where the solution ends
+      real(wp), intent(out) :: change
+
+      real(wp) :: slope, step
+
+      slope = 1.0_wp / (1.0_wp - grown)
+      step = (grown - t) * slope
+      slope = grown * slope
+      t = t + step * (1.0_wp + slope * step * (0.5_wp + (0.5_wp * slope + 1.0_wp / 6.0_wp) * step))
+      change = abs(slope * step)
+   end subroutine improve_tree
 
    !> Way w after which a threshold that falls is met: w + part exp(-w) = way.
    pure function fallen(way, part) result(w)

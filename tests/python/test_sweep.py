@@ -173,33 +173,36 @@ def test_regimes_are_those_of_the_run_itself(tmp_path):
     np.testing.assert_array_equal(back["regime"], data["regime"])
 
 
-def test_a_map_shows_each_value_where_it_belongs():
+def test_a_map_shows_each_value_where_it_belongs(tmp_path):
     """Also of values in any order, and of choices the most frequent one."""
     delays, stiffnesses = [2e-3, 1e-4, 5e-4], [200.0, 50.0]
     force = np.arange(12.0).reshape(3, 2, 2)
     regime = np.array([[[0, 0], [1, 1]], [[2, 2], [3, np.nan]], [[np.nan, np.nan], [1, 1]]])
     dimensions = ("contacts.delay", "slider.stiffness", "realization")
-    flags = {"flag_meanings": "smooth stick_slip irregular transient", "long_name": "regime"}
+    flags = {"flag_meanings": "smooth stick_slip irregular transient"}
     data = xr.Dataset(
         {
             "status": (dimensions, np.zeros((3, 2, 2))),
-            "mean_force": (dimensions, force, {"units": "N", "long_name": "mean force"}),
+            "mean_force": (dimensions, force, {"units": "N"}),
             "regime": (dimensions, regime, flags),
         },
         {"contacts.delay": delays, "slider.stiffness": stiffnesses, "realization": [0, 1]},
         {"configuration": ""},
     )
-    for name, expected in (("mean_force", force.mean(-1)), ("regime", regime[..., 0])):
-        figure = mesoslip.plot(xr.DataTree(data), view=name)
-        mesh = figure.axes[0].collections[0]
+    figure = mesoslip.plot(xr.DataTree(data), tmp_path / "map.png")
+    maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    for axes, expected in zip(maps, (force.mean(-1), regime[..., 0]), strict=True):
+        mesh = axes.collections[0]
         corners = mesh.get_coordinates()
-        shown = np.ma.filled(mesh.get_array().reshape(2, 3).astype(float), np.nan)
+        shown = mesh.get_array().reshape(2, 3).filled(np.nan)
         for row, column in np.ndindex(2, 3):
-            cell = np.sort([corners[row, column], corners[row + 1, column + 1]], axis=0)
-            (left, low), (right, high) = cell
+            (left, low), (right, high) = corners[row, column], corners[row + 1, column + 1]
             (i,) = np.flatnonzero((left < np.array(delays)) & (np.array(delays) < right))
             (j,) = np.flatnonzero((low < np.array(stiffnesses)) & (np.array(stiffnesses) < high))
             np.testing.assert_equal(shown[row, column], expected[i, j])
+    line = mesoslip.plot(xr.DataTree(data.isel({"slider.stiffness": 1})))
+    np.testing.assert_array_equal(line.axes[0].lines[-1].get_xdata(), sorted(delays))
+    np.testing.assert_array_equal(line.axes[0].lines[-1].get_ydata(), [6.5, 10.5, 2.5])
 
 
 def test_names_can_be_drawn():

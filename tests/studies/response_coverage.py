@@ -167,7 +167,8 @@ def show_fits() -> None:
         mistaken = 100 * np.mean([one.p_value >= 0.01 for one in wrong])
         kind = "white" if length == 0 else "along the way"
         print(
-            f"| {law} | {kind} | {covers} | {within:.0f} % | {described:.0f} % | {mistaken:.0f} % |",
+            f"| {law} | {kind} | {covers} | {within:.0f} % "
+            f"| {described:.0f} % | {mistaken:.0f} % |",
             flush=True,
         )
 

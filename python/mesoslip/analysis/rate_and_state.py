@@ -24,7 +24,7 @@ EVEN_POINTS = 60
 EARLY_POINTS = 60
 # Relative tolerance of the motion while parameters are looked for.
 TOLERANCE = 1e-8
-# Relative step of a derivative by the logarithm of a parameter, well above that.
+# Step of a derivative by the logarithm of a parameter, well above that.
 DERIVATIVE_STEP = 1e-4
 # How far from the scales of the record parameters may lie.
 FARTHEST = 1e4
@@ -36,12 +36,13 @@ START_TOLERANCE = 1e-5
 # The best of them, which are followed to their ends, unless two of them agree.
 BEST_STARTS = 4
 AGREEMENT = 1e-3
-# What stands for a motion that cannot be followed, in standard deviations.
-FAR_OFF = 1e3
+# What stands for a motion that cannot be followed, in ranges of the record.
+FAR_OFF = 10.0
 # Noise that is taken to be there at least, over the range of the record.
 LEAST_NOISE = 1e-5
-# Least probability of the residuals of a law that describes a record.
-DESCRIBES = 0.01
+# Least probability of the residuals of a law that describes a record. Small, as their noise is
+# known only as well as the steady parts of the record tell it.
+DESCRIBES = 0.001
 # Of a record without noise: residuals over its variation that are small enough.
 SMALL_MISFIT = 0.01
 
@@ -303,6 +304,8 @@ def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
     free = free_stiffness and math.isfinite(record.stiffness)
     level = float(record.force[: max(1, record.force.size // 20)].mean())
 
+    far_off = FAR_OFF * scale / record.deviation
+
     def model(at: Array) -> tuple[RateAndState, float]:
         stiffness = record.stiffness * math.exp(at[4]) if free else record.stiffness
         a, b = scale * math.exp(at[1]), scale * math.exp(at[2])
@@ -318,36 +321,49 @@ def fit(record: Record, law: str, *, free_stiffness: bool = False) -> Fit:
                 parameters, record.stages, record.time, stiffness, tolerance=tolerance
             )
         except RunError:
-            return np.full(record.time.size, FAR_OFF)
-        left = (record.force - motion.force) / record.deviation
-        return np.clip(np.nan_to_num(left, nan=FAR_OFF), -1e6, 1e6)
+            return far_off
+        left: Array = (record.force - motion.force) / record.deviation
+        return left if np.all(np.abs(left) <= far_off) else far_off
 
     bound = np.full(5 if free else 4, math.log(FARTHEST))
     bound[0] = 100.0
     if free:
         bound[4] = math.log(100.0)
+
+    def jacobian(at: Array) -> Array:
+        """Differences well above the motion's tolerance; the reference force adds to the law."""
+        middle = residuals(at)
+        columns = [-scale / record.deviation]
+        for place in range(1, at.size):
+            column = np.zeros_like(middle)
+            # On one side there may be no motion that can be followed.
+            for step in (DERIVATIVE_STEP, -DERIVATIVE_STEP):
+                moved = at.copy()
+                moved[place] += step
+                beside = residuals(moved)
+                if not np.array_equal(beside, far_off):
+                    column = (beside - middle) / step
+                    break
+            columns.append(column)
+        return np.stack(columns, axis=1)
+
     best = None
-    for start in _starts(residuals, bound.size, record):
+    for start in _starts(residuals, far_off, bound.size, record):
         found = least_squares(
-            residuals,
-            start,
-            bounds=(-bound, bound),
-            x_scale="jac",
-            diff_step=DERIVATIVE_STEP,
-            max_nfev=60,
+            residuals, start, jacobian, bounds=(-bound, bound), x_scale="jac", max_nfev=60
         )
         agrees = best is not None and abs(found.cost - best.cost) <= AGREEMENT * best.cost
         if best is None or found.cost < best.cost:
             best = found
         if agrees:
             break
-    if best is None or not np.any(np.abs(best.fun) < FAR_OFF):
+    if best is None or np.array_equal(best.fun, far_off):
         raise RunError("the law has no motion along this record that can be followed")
     return _judged(record, best, *model(best.x), free, bound)
 
 
 def _starts(
-    residuals: Callable[[Array, float], Array], size: int, record: Record
+    residuals: Callable[[Array, float], Array], far_off: Array, size: int, record: Record
 ) -> Iterator[Array]:
     """Where to start from: the best of a net of rates and lengths, each with its best level."""
     tried = []
@@ -357,7 +373,7 @@ def _starts(
                 at = np.zeros(size)
                 at[1:4] = np.log([a, b, length])
                 left = residuals(at, START_TOLERANCE)
-                if np.all(left == FAR_OFF):
+                if np.array_equal(left, far_off):
                     continue
                 # The reference force adds to the law.
                 weight = 1 / record.deviation

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 # Standard deviations by which a peak must stand out of the steady force before it is one.
 OUTSTANDING = 4.0
+# Part of the evolution that an overshoot is of at least.
+LEAST_OVERSHOOT = 1e-3
 # Relaxation displacements after which an evolution is over.
 EVOLVED = 8.0
 # Most points that a decay is fitted to.
@@ -336,7 +338,7 @@ def _fill_relaxation(
     if force.size < 5 or abs(amplitude) < LEAST_AMPLITUDE * noise:
         return ["no evolution stands out of the noise"]
     past = -math.copysign(1.0, amplitude) * (force - steady.mean)
-    if past.max() > OUTSTANDING * noise:
+    if past.max() > max(OUTSTANDING * noise, LEAST_OVERSHOOT * abs(amplitude)):
         row["overshoot"] = -math.copysign(1.0, amplitude) * float(past.max())
     fit = decay(way, force, steady.correlation, noise)
     if fit is None:

@@ -16,8 +16,11 @@ Array = NDArray[np.float64]
 
 # Samples of a batch of the marginal standard error rule.
 BATCH = 5
-# Part of a series that may be transient.
+# Part of a series up to which the end of a transient is looked for.
 MOST_TRANSIENT = 0.5
+# What is left out, over the length of the transient by that rule, and part of a series at most.
+MARGIN = 2
+MOST_LEFT_OUT = 0.6
 # Samples that a mean needs, and blocks that its error needs.
 LEAST_SAMPLES = 20
 LEAST_BLOCKS = 6
@@ -43,7 +46,7 @@ class SteadyMean:
     standard_deviation
         That of the values about their mean.
     start
-        Samples of the transient before.
+        Samples that were left out before: twice the transient.
     count
         Samples of the steady part, all realizations together.
     block
@@ -123,13 +126,15 @@ def steady_mean(values: Array) -> SteadyMean | None:
     realizations, samples = values.shape
     if samples < LEAST_SAMPLES:
         return None
-    start = transient(values.mean(axis=0))
+    length = transient(values.mean(axis=0))
+    # What the rule leaves of a transient is as large as the error; twice as far on, its square.
+    start = min(MARGIN * length, int(MOST_LEFT_OUT * samples))
     steady = values[:, start:]
     count = steady.size
     mean = float(steady.mean())
     deviation = float(steady.std(ddof=1))
     is_quiet = deviation <= LEAST_DRIFT * abs(mean)
-    is_over = is_quiet or start < 0.95 * MOST_TRANSIENT * samples
+    is_over = is_quiet or length < 0.95 * MOST_TRANSIENT * samples
     if deviation <= ROUNDING * abs(mean):
         exact = (mean, 0.0, 0.0, deviation, start, count, 1, float(count))
         return SteadyMean(*exact, is_steady=is_over, is_resolved=True)

@@ -13,18 +13,26 @@ from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, maps, response, run, theory
+from mesoslip.plots import avalanches, response, run, sweep, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
 
 VIEWS = ("run", "avalanches", "lattice", "layers", "response")
 
-# What the outputs of commands are called.
+
+class Kind(NamedTuple):
+    """A kind of output: what it is called, and what tells it from others."""
+
+    told: str
+    is_of: Callable[[xr.DataTree], bool]
+
+
+# Outputs of commands, the first that fits.
 KINDS = {
-    "run": "a run",
-    "curve": "a force curve",
-    "onset": "an onset of slip",
-    "sweep": "a sweep",
+    "run": Kind("a run", lambda tree: "spring_force" in tree.data_vars),
+    "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
+    "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
+    "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
 }
 
 
@@ -36,12 +44,33 @@ class Picture(NamedTuple):
 
 
 def kind_of(tree: xr.DataTree) -> str:
-    """Which command an output is of, a name of `KINDS`."""
-    if "spring_force" in tree.data_vars:
-        return "run"
-    if "status" in tree.data_vars:
-        return "sweep"
-    return "curve" if "slope" in tree.data_vars else "onset"
+    """Which kind an output is of, a name of `KINDS`.
+
+    Raises
+    ------
+    FileError
+        If it is of none of them.
+    """
+    for name, kind in KINDS.items():
+        if kind.is_of(tree):
+            return name
+    *others, last = (kind.told for kind in KINDS.values())
+    raise FileError(f"the output is neither {', '.join(others)} nor {last}: it has no picture")
+
+
+def kind_of_all(trees: Sequence[xr.DataTree], names: Sequence[str]) -> str:
+    """Which kind outputs are of that go into one picture, or on one page.
+
+    Raises
+    ------
+    FileError
+        If they are of several kinds.
+    """
+    kinds = {kind_of(tree): name for tree, name in zip(trees, names, strict=True)}
+    if len(kinds) > 1:
+        found = ", ".join(f"{name} is {KINDS[kind].told}" for kind, name in kinds.items())
+        raise FileError(f"outputs of different commands do not go together: {found}")
+    return next(iter(kinds))
 
 
 def picture(
@@ -65,8 +94,8 @@ def picture(
         )
     if kind == "sweep":
         return Picture(
-            lambda figure: maps.overview(tree, figure, view),
-            lambda axes: maps.draw_panel(axes, tree),
+            lambda figure: sweep.overview(tree, figure, view),
+            lambda axes: sweep.draw_measure(axes, tree, view),
         )
     if view == "lattice":
         chosen = avalanches.chosen_snapshot(tree, snapshot)
@@ -104,11 +133,9 @@ def comparison(
     extent: Extent = EVERYTHING,
 ) -> Picture:
     """The picture of several outputs of one command over each other; see `draw`."""
-    kinds = {kind_of(tree): name for tree, name in zip(trees, names, strict=True)}
-    if len(kinds) > 1:
-        found = ", ".join(f"{name} is {KINDS[kind]}" for kind, name in kinds.items())
-        raise FileError(f"outputs of different commands do not go into one picture: {found}")
-    (kind,) = kinds
+    kind = kind_of_all(trees, names)
+    if kind == "sweep":
+        raise FileError("sweeps are drawn one at a time")
     _check_view(kind, view, extent)
     labels = labels_of(trees, names)
     if kind == "curve":

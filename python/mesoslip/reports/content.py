@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -16,6 +17,8 @@ from mesoslip.plots.style import Canvas, styled
 
 # A page shows fewer dots than a picture that is printed.
 PARTS = 1000
+# By how much pictures may be larger than they are printed.
+MAGNIFIED = 1.25
 # Dots of what a picture draws as dots.
 DOTS_PER_INCH = 150
 # Nothing of the machine or the time, so that a report is the same when it is made again.
@@ -104,4 +107,8 @@ def drawn(caption: str, draw: Callable[[], Canvas]) -> Picture:
             one.set_rasterized(True)
         whole.savefig(stream, format="svg", dpi=DOTS_PER_INCH, metadata=NO_METADATA)
     text = stream.getvalue()
+    # As wide as the page where that is not much more than the picture.
+    width = MAGNIFIED * whole.get_figwidth()
+    size = re.compile(r"<svg [^>]*?(?= xmlns| viewBox)", re.DOTALL)
+    text = size.sub(f'<svg style="width: 100%; max-width: {width:g}in"', text, count=1)
     return Picture(text[text.index("<svg") :], caption)

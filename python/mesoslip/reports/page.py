@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mesoslip.errors import FileError
 from mesoslip.output.files import written_whole
-from mesoslip.plots.draw import KINDS, kind_of
+from mesoslip.plots.draw import kind_of_all
 from mesoslip.reports import content
 from mesoslip.reports.content import Section, Subject
 from mesoslip.reports.sections import SECTIONS
@@ -24,11 +24,7 @@ def sections_of(subjects: Sequence[Subject]) -> list[Section]:
     """
     if not subjects:
         raise FileError("there is no output to report on")
-    kinds = {kind_of(one.tree): one.name for one in subjects}
-    if len(kinds) > 1:
-        found = ", ".join(f"{name} is {KINDS[kind]}" for kind, name in kinds.items())
-        raise FileError(f"outputs of different commands do not go into one report: {found}")
-    (kind,) = kinds
+    kind = kind_of_all([one.tree for one in subjects], [one.name for one in subjects])
     made = (write(subjects) for write in SECTIONS[kind])
     return [one for one in made if one is not None]
 

@@ -1,18 +1,22 @@
 """The sections that the report of each kind of output has.
 
 Adding one is adding a function to a list of `SECTIONS`; another kind of output adds a list, and
-what tells it apart to `mesoslip.plots.draw.kind_of`.
+what tells it apart to `mesoslip.plots.draw.KINDS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from mesoslip.analysis import avalanches as avalanche_catalogue
+from mesoslip.analysis import regime
 from mesoslip.analysis import slips as slip_catalogue
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
@@ -20,6 +24,7 @@ from mesoslip.configuration.units import scale_for, with_unit
 from mesoslip.output import variables
 from mesoslip.output.layout import group_of
 from mesoslip.plots import draw, run
+from mesoslip.plots import sweep as sweep_plots
 from mesoslip.plots.run import Extent
 from mesoslip.plots.style import COLORS
 from mesoslip.reports.content import (
@@ -40,6 +45,12 @@ from mesoslip.theory import force_curve, slip_onset
 MOST_ROWS = 60
 # Bins of a histogram.
 BINS = 24
+# Measures of a sweep that are drawn.
+MOST_MAPS = 12
+# Values of a swept key that are told one by one.
+MOST_VALUES = 10
+# What the codes of a sweep mean.
+STATUS = ("ok", "failed", "missing")
 
 # What is told of a catalogue of slips, and its unit.
 SLIP_COLUMNS = {
@@ -109,14 +120,72 @@ def changes(subjects: Sequence[Subject]) -> Section | None:
 
 def verdict(subjects: Sequence[Subject]) -> Section | None:
     """Which motion each run shows."""
-    told = [(one, regime(one)) for one in subjects]
-    blocks = tuple(Text(_named(subjects, one, text)) for one, text in told if text)
-    return Section("Regime", blocks) if blocks else None
+    told = [(one, regime.told(regime.judgements(regime.regimes(one.tree)))) for one in subjects]
+    blocks = tuple(
+        Text(_named(subjects, one, f"{text[:1].upper()}{text[1:]}.")) for one, text in told
+    )
+    return Section("Regime", blocks)
 
 
-def regime(subject: Subject) -> str:  # noqa: ARG001
-    """Verdict on the motion of a run; empty if there is none."""
-    return ""
+def sweep(subjects: Sequence[Subject]) -> Section | None:
+    """What was swept, what came of it, and what was measured."""
+    blocks: list[Block] = []
+    for subject in subjects:
+        data = subject.tree.to_dataset()
+        status = data["status"].values
+        counts = {name: int(np.sum(status == code)) for code, name in enumerate(STATUS)}
+        told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        is_whole = counts["ok"] == status.size
+        text = _named(subjects, subject, f"{status.size} runs: {told}.")
+        blocks.append(Text(text, warns=not is_whole))
+        if subject.tree.attrs.get("failures"):
+            blocks.append(Source("why runs failed", str(subject.tree.attrs["failures"])))
+        keys = [(str(name), data[name].values) for name in data.coords]
+        rows = tuple((name, str(values.size), _listed(name, values)) for name, values in keys)
+        blocks.append(Table(("key", "values", ""), rows))
+        measured = tuple(_measured(data[name]) for name in sweep_plots.measures(data))
+        blocks.append(Table(("measure", "least", "mean", "greatest"), measured))
+        for title in ("configuration", "sweep"):
+            if title in subject.tree.attrs:
+                blocks.append(Source(title, str(subject.tree.attrs[title])))
+    return Section("Sweep", tuple(blocks))
+
+
+def _measured(data: xr.DataArray) -> tuple[str, ...]:
+    """A row about a measure: its range, or how often there was which choice."""
+    values = data.values.astype(float)
+    there = values[np.isfinite(values)]
+    # As a configuration has it.
+    name, unit = str(data.name), str(data.attrs.get("units", "1")).replace(" s-1", "/s")
+    if "flag_meanings" in data.attrs:
+        meanings = str(data.attrs["flag_meanings"]).split()
+        codes = np.asarray(data.attrs["flag_values"]).tolist()
+        counts = [
+            f"{count} {meaning.replace('_', '-')}"
+            for code, meaning in zip(codes, meanings, strict=True)
+            if (count := np.count_nonzero(there == code))
+        ]
+        return name, "", ", ".join(counts), ""
+    if there.size == 0:
+        return name, "", "none", ""
+    shown = (with_unit(value, unit) for value in (there.min(), there.mean(), there.max()))
+    return name, *shown
+
+
+def _listed(key: str, values: NDArray[Any]) -> str:
+    """Values of a swept key: all of few, or the first and the last."""
+    texts = [differences.text_of(key, one) for one in values.tolist()]
+    return ", ".join(texts) if len(texts) <= MOST_VALUES else f"{texts[0]} … {texts[-1]}"
+
+
+def maps_of_sweep(subjects: Sequence[Subject]) -> Section | None:
+    """A map of each measure of a sweep."""
+    blocks: list[Block] = []
+    for subject in subjects:
+        data = subject.tree.to_dataset()
+        for name in sweep_plots.measures(data)[:MOST_MAPS]:
+            blocks.append(_picture(subjects, subject, name, name, run.EVERYTHING))
+    return Section("Pictures", tuple(blocks))
 
 
 def pictures(subjects: Sequence[Subject]) -> Section | None:
@@ -373,6 +442,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
         configuration,
         provenance,
     ),
+    "sweep": (sweep, maps_of_sweep, provenance),
     "curve": (changes, pictures, curve_numbers, configuration, provenance),
     "onset": (changes, pictures, onset_numbers, configuration, provenance),
 }

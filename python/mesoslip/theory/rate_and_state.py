@@ -27,10 +27,17 @@ Array = NDArray[np.float64]
 
 LAWS = ("ageing", "slip")
 
+UNSTABLE = (
+    "the motion of the spring and slider cannot be followed: it is unstable, or its parameters are "
+    "out of any scale"
+)
+
 # Steps of the integration between two times, at most.
 MOST_STEPS = 20_000
-# Exponents beyond which a trial step of the integration is held, before it overflows.
-LARGEST_EXPONENT = 300.0
+# Logarithm of a velocity over V_0 that no motion reaches but one that is unstable without a mass.
+RUNAWAY = 40.0
+# Exponents that trial steps of the integration are held at, before they overflow.
+LARGEST_EXPONENT = 100.0
 # Integration's tolerance, relative, and absolute in logarithms of velocity and state.
 TOLERANCE = 1e-10
 
@@ -157,8 +164,8 @@ def spring_slider(
     force = law.reference_force + (law.a - law.b) * start
     force += damping * stages[0].start_velocity
     at: list[float] = [-start] if is_rigid else [start, -start, 0.0]
-    if not is_rigid and mass > 0:
-        at.append(force)
+    if not is_rigid:
+        at.append(force if mass > 0 else 0.0)
     velocity, logarithm, displacement, load = (np.full(times.shape, np.nan) for _ in range(4))
     begin = way = 0.0
     for number, stage in enumerate(stages):
@@ -183,6 +190,11 @@ def spring_slider(
             if mass > 0:
                 load[here] = path[there, 3]
         at = list(path[-1])
+        # What a trial step of the integration alone has gone there is nothing.
+        if not is_rigid and mass == 0:
+            if at[3] > law.slip_distance:
+                raise RunError(UNSTABLE)
+            at[3] = 0.0
         way += 0.5 * (stage.start_velocity + stage.end_velocity) * stage.duration
         begin = end
     if is_rigid or mass == 0:
@@ -219,7 +231,8 @@ def _rigid(law: RateAndState) -> Any:
 
 
 def _on_spring(law: RateAndState, stiffness: float, damping: float, mass: float) -> Any:
-    """ln V/V_0, ln V_0 θ/D_c, and the slider's displacement; with a mass the spring's force too."""
+    """ln V/V_0, ln V_0 θ/D_c, the slider's displacement; with a mass the spring's force, without
+    one how far the slider ran away."""
     evolution, reference, a, b = _evolution(law), law.reference_velocity, law.a, law.b
     force_0 = law.reference_force
 
@@ -230,7 +243,8 @@ def _on_spring(law: RateAndState, stiffness: float, damping: float, mass: float)
         change = evolution(ratio, logarithm, state)
         loading = stiffness * (start + acceleration * time - velocity)
         if mass == 0:
-            return [(loading - b * change) / (a + damping * velocity), change, velocity]
+            rate = (loading - b * change) / (a + damping * velocity)
+            return [rate, change, velocity, velocity if logarithm > RUNAWAY else 0.0]
         friction = force_0 + a * logarithm + b * state + damping * velocity
         return [(at[3] - friction) / (mass * velocity), change, velocity, loading]
 
@@ -256,7 +270,7 @@ def _integrate(
             stage.duration * max(stage.start_velocity, stage.end_velocity), 1e-12
         )
     if len(at) > 3:
-        absolute[3] = tolerance * abs(at[3])
+        absolute[3] = tolerance * abs(at[3]) or math.inf
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", ODEintWarning)
         path, told = odeint(
@@ -271,9 +285,6 @@ def _integrate(
             full_output=True,
         )
     if told["message"] != "Integration successful." or not np.all(np.isfinite(path)):
-        raise RunError(
-            "the motion of the spring and slider cannot be followed: it is unstable, or the "
-            f"parameters are out of any scale ({told['message']})"
-        )
+        raise RunError(UNSTABLE)
     result: Array = path
     return result

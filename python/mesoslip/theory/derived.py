@@ -69,12 +69,12 @@ def _verdict_of_stiffness(config: Config) -> str | None:
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
     if spring >= estimate:
         return (
-            "K is above the estimate of K*: slow sliding has no slip that starts as the first one "
-            "does from rest; delay or ageing may weaken faster contacts all the same"
+            "K is above the estimate of K*: slow sliding from relaxed contacts has no slip, and is "
+            "smooth unless delay or ageing weaken faster contacts"
         )
     return (
-        "K is below the estimate of K*: there is a first slip from rest. This is necessary for "
-        "stick-slip, not sufficient: delay and ageing decide whether slips go on or die away; "
+        "K is below the estimate of K*: relaxed contacts lead to a first slip. This is necessary "
+        "for stick-slip, not sufficient: delay and ageing decide whether slips go on or die away; "
         "mesoslip curve tells K* itself, a run the rest"
     )
 

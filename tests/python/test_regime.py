@@ -116,6 +116,7 @@ def test_the_rebound_of_a_slip_is_no_cycle(klein):
     found = judged(klein(), force)
     assert found.regime == STICK_SLIP
     assert found.period == pytest.approx(1 / 40, rel=1e-3)
+    assert found.fall_irregularity < 0.01
 
 
 def test_spectra_say_the_same():

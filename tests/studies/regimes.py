@@ -9,7 +9,8 @@ at which the two disagree, and draws these on request::
 
     .venv/bin/python tests/studies/regimes.py [figure]
 
-The table is that of 360 points, which take three minutes. ``tests/python/test_regime.py`` has fewer.
+The table is that of 360 points, which take three minutes; ``tests/python/test_regime.py`` has
+fewer.
 """
 
 from __future__ import annotations

@@ -377,7 +377,7 @@ def _amplitude(force: Array) -> float:
 
 @dataclass(frozen=True)
 class _Cycles:
-    """Cycles of the force: their periods [s], falls from peak to trough [N], and peaks [N]."""
+    """Cycles of the force: their periods [s], falls after their peaks [N], and peaks [N]."""
 
     periods: Array
     falls: Array
@@ -390,7 +390,7 @@ def _cycles(time: Array, force: Array, clipped: Array, turning: float) -> _Cycle
     rises = np.diff(force) > 0
     extremes = np.flatnonzero(rises[1:] != rises[:-1]) + 1
     peaks: list[int] = []
-    troughs: list[int] = []
+    lows: list[int] = []
     best, is_rising = 0, None
     values = clipped.tolist()
     highest = lowest = 0
@@ -410,12 +410,12 @@ def _cycles(time: Array, force: Array, clipped: Array, turning: float) -> _Cycle
         elif value <= values[best]:
             best = place
         elif value > values[best] + turning:
-            # A trough before the first peak is the end of a cycle that is not seen.
+            # A low before the first peak is the end of a cycle that is not seen.
             if peaks:
-                troughs.append(best)
+                lows.append(best)
             is_rising, best = True, place
-    count = min(len(peaks), len(troughs))
-    falls: Array = clipped[peaks[:count]] - clipped[troughs[:count]]
+    count = min(len(peaks), len(lows))
+    falls: Array = clipped[peaks[:count]] - clipped[lows[:count]]
     return _Cycles(np.diff(time[peaks]), falls, force[peaks])
 
 

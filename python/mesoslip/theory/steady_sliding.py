@@ -53,6 +53,8 @@ STEPS, ROOT_TOLERANCE = 25, 1e-10
 # Candidates for roots that are followed.
 MOST_CANDIDATES = 40
 
+# Relative width of thresholds with which contacts do not break in step.
+OUT_OF_STEP = 0.5
 # Layers whose frequencies the points of the path still tell apart.
 MOST_LAYERS = 16
 # Points of the path times the slider's degree that take no longer than a tenth of a second.
@@ -107,6 +109,8 @@ class SteadySliding:
         What slides.
     velocity
         Velocity [m/s]; that of the drive by default.
+    relative_width
+        Relative width of the threshold law; that of the configuration by default.
 
     Raises
     ------
@@ -114,7 +118,13 @@ class SteadySliding:
         If contacts age or do not attach again, or there is no velocity.
     """
 
-    def __init__(self, config: Config, velocity: float | None = None) -> None:
+    def __init__(
+        self,
+        config: Config,
+        velocity: float | None = None,
+        *,
+        relative_width: float | None = None,
+    ) -> None:
         contacts = config.contacts
         problems = []
         if contacts.ageing is not None:
@@ -134,6 +144,7 @@ class SteadySliding:
         if problems:
             raise ConfigError(problems)
         self.config = config
+        self.relative_width = relative_width or contacts.threshold.relative_width
         self.delay = 0.0 if config.slider.ignores_delay else contacts.delay
         self._stretch = contacts.break_stretch
         # Displacement in units of the breaking stretch, for a second.
@@ -146,9 +157,7 @@ class SteadySliding:
         Legendre polynomials for density, stiffness, force at breaking and mass."""
         contacts = self.config.contacts
         back = contacts.back_force_ratio
-        law = ThresholdLaw(
-            contacts.threshold.law, contacts.threshold.relative_width, contacts.least_threshold
-        )
+        law = ThresholdLaw(contacts.threshold.law, self.relative_width, contacts.least_threshold)
         is_scaled = contacts.coupling == "scaled"
         weakest, strongest = law.quantile([1 - LEFT_OUT, LEFT_OUT])
 
@@ -378,6 +387,18 @@ class SteadySliding:
         return self.unstable_count == 0
 
     @cached_property
+    def is_stable_out_of_step(self) -> bool:
+        """Whether none grows of contacts whose lives differ by half a breaking stretch.
+
+        An oscillation that large makes lives differ so by itself: what needs contacts that break
+        in step stays smaller.
+        """
+        if self.relative_width >= OUT_OF_STEP:
+            return self.is_stable
+        other = SteadySliding(self.config, self.velocity, relative_width=OUT_OF_STEP)
+        return other.is_stable
+
+    @cached_property
     def leading_root(self) -> complex | None:
         """The root λ with the greatest real part [1/s], of those with an imaginary part ≥ 0.
 
@@ -478,12 +499,17 @@ class SteadySliding:
                 f"{-self.growth_rate:.2g} 1/s. Oscillations that are large already, as after the "
                 "first slip, may go on all the same"
             )
-        return (
+        grows = (
             f"{where} is unstable, with delay: an oscillation of {self._hertz} grows at "
-            f"{self.growth_rate:.2g} 1/s. To what size, the linear theory does not tell: to slips, "
-            "or to a few hundredths of the force only, where it grows by contacts that break in "
-            "step"
+            f"{self.growth_rate:.2g} 1/s"
         )
+        if self.is_stable_out_of_step:
+            return (
+                f"{grows}, but only while contacts break in step, which it ends itself: mostly it "
+                "comes to a few hundredths of the force and no more. Slips that have begun may "
+                "die away or, of stiff springs, go on"
+            )
+        return f"{grows}, also of contacts that break out of step: it comes to slips as a rule"
 
     @property
     def _hertz(self) -> str:

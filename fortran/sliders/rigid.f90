@@ -58,10 +58,11 @@ module mesoslip_sliders_rigid
    type :: system_type
       !> One over the mass [1/kg], and K/M [1/s2]
       real(wp) :: inverse_mass, spring
-      !> (K + K_c)/M [1/s2], C/M [1/s], and K/M times the drive's velocity [m/s3]
-      real(wp) :: stiffness, drag, driving
-      !> How far the drive is ahead of the slider at the start of a step [m]
-      real(wp) :: drive_gap
+      !> (K + K_c)/M [1/s2], C/M [1/s], and K/M times the drive's velocity at the start of a step
+      !> [m/s3] and times its acceleration [m/s4]
+      real(wp) :: stiffness, drag, driving, driving_rate
+      !> How far the drive is ahead of the slider at the start of a step [m], and its velocity [m/s]
+      real(wp) :: drive_gap, drive_velocity
    end type system_type
 
    !> Velocity and acceleration of the slider, and the same of the damper.
@@ -173,7 +174,9 @@ contains
 
       system%inverse_mass = 1.0_wp / self%mass
       system%spring = self%stiffness * system%inverse_mass
+      system%drive_velocity = self%drive_velocity
       system%driving = system%spring * self%drive_velocity
+      system%driving_rate = 0.0_wp
       system%stiffness = 0.0_wp
       system%drag = 0.0_wp
       system%drive_gap = 0.0_wp
@@ -195,11 +198,18 @@ contains
       system = constant
       system%stiffness = system%spring + self%law%stiffness * system%inverse_mass
       system%drag = self%law%drag * system%inverse_mass
-      system%drive_gap = self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time)
-      early = rates(self, system, system%drive_gap)
-
-      call glide(self, system, window, early, is_done)
+      is_done = .false.
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         system%drive_velocity = self%drive_velocity_at(self%time)
+         system%driving = system%spring * system%drive_velocity
+         system%driving_rate = system%spring * self%drive_acceleration
+         system%drive_gap = self%drive_at(self%time) - self%displacement
+         early = rates(self, system, system%drive_gap)
+      else
+         system%drive_gap = uniform_gap(self)
+         early = rates(self, system, system%drive_gap)
+         call glide(self, system, window, early, is_done)
+      end if
       if (.not. is_done) call move_on(self, system, window, early)
    end subroutine step_on
 
@@ -208,7 +218,8 @@ contains
    !> With p the time in which the way to the next break would be made at the present velocity, the
    !> series of the displacement is way/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion
    !> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), exact to
-   !> rounding or nearly so. Other steps, one in eight in Klein's case, are left to move_on.
+   !> rounding or nearly so. Other steps, one in eight in Klein's case, are left to move_on, as are
+   !> those under a drive that speeds up or slows down.
    subroutine glide(self, system, window, early, is_done)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
@@ -308,9 +319,10 @@ contains
       self%damper = early%damper + (step * early%damper_rate + inverse(2) * square &
          & * ((damper_2 + inverse(3) * step * damper_3) + inverse(12) * square * damper_4))
       ! A share of (rate times step)**2 of the balance: four terms do.
-      call arrive(self, system, early, step, inverse(2) * square * (early%velocity &
+      call pull(self, system, step, inverse(2) * square * (early%velocity &
          & + inverse(3) * step * (early%acceleration + inverse(4) * step * (jerk &
-         & + inverse(5) * step * snap))), late)
+         & + inverse(5) * step * snap))))
+      call arrive(self, system, early, uniform_gap(self), late)
       ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
       ! fastest rate, of terms that are a small part of the balance.
       velocity_loss = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
@@ -432,7 +444,14 @@ contains
       self%velocity = horner(series, terms, step)
       if (turns) self%velocity = 0.0_wp
       self%damper = horner(damper, terms, step)
-      call arrive(self, system, early, step, second_integral(series, terms, step), late)
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         call pull_unevenly(self, system, step, second_integral(series, terms, step), &
+            & lever(series, terms, step))
+         call arrive(self, system, early, self%drive_at(self%time) - self%displacement, late)
+      else
+         call pull(self, system, step, second_integral(series, terms, step))
+         call arrive(self, system, early, uniform_gap(self), late)
+      end if
       select case (terms)
       case (some_terms)
          call add_losses(self, damper, step, terms, point_3, weight_3)
@@ -443,26 +462,63 @@ contains
       end select
    end subroutine move
 
+   !> Add the drive's impulse of a step to the balance, its velocity being constant.
+   subroutine pull(self, system, step, swept)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> Length of the step [s], and integral of the way over the time [m s]
+      real(wp), intent(in) :: step, swept
+
+      call self%impulse%add(self%stiffness &
+         & * (step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept))
+   end subroutine pull
+
+   !> Add the drive's impulse and work of a step to the balance, under an acceleration.
+   subroutine pull_unevenly(self, system, step, swept, moment)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> Length of the step [s], integrals of the way [m s] and of the way times the time [m s2]
+      real(wp), intent(in) :: step, swept, moment
+
+      real(wp) :: extension
+
+      associate (velocity => system%drive_velocity, acceleration => self%drive_acceleration)
+         extension = step * (system%drive_gap + step * (0.5_wp * velocity &
+            & + inverse(6) * acceleration * step)) - swept
+         call self%stage_impulse%add(self%stiffness * extension)
+         call self%earlier_work%add(self%stiffness * (velocity * extension + acceleration &
+            & * (step**2 * (0.5_wp * system%drive_gap + step &
+            & * (inverse(3) * velocity + 0.125_wp * acceleration * step)) - moment)))
+      end associate
+   end subroutine pull_unevenly
+
    !> What there is to note at the end of any step.
-   subroutine arrive(self, system, early, step, swept, late)
+   subroutine arrive(self, system, early, drive_gap, late)
       !> The slider, where it is at the end of the step
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
-      !> Length of the step [s], and integral of the way over the time [m s]
-      real(wp), intent(in) :: step, swept
+      !> How far the drive is ahead of the slider at the end of the step [m]
+      real(wp), intent(in) :: drive_gap
       !> The motion at the end of the step
       type(motion_rates_type), intent(out) :: late
 
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
-      late = rates(self, system, self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time))
+      late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
       self%start_acceleration = early%acceleration
-      call self%drive_work%add(self%stiffness * self%drive_velocity &
-         & * (step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept))
    end subroutine arrive
+
+   !> How far a drive of constant velocity is ahead of the slider.
+   pure function uniform_gap(self) result(drive_gap)
+      type(slider_rigid_type), intent(in) :: self
+      !> The gap [m]
+      real(wp) :: drive_gap
+
+      drive_gap = self%drive_displacement - self%displacement &
+         & + self%drive_velocity * (self%time - self%drive_time)
+   end function uniform_gap
 
    !> Velocity and damper with their rates, from the equation of motion.
    pure function rates(self, system, drive_gap) result(motion)
@@ -505,6 +561,7 @@ contains
             & - damper(term - 1))
          damper(term) = damping * (series(term) - inverse(term) * damper(term - 1))
          driving = 0.0_wp
+         if (term == 2) driving = system%driving_rate
       end do
    end subroutine expand
 
@@ -571,6 +628,7 @@ contains
       motion%displacement = self%origin + displacement
       motion%spring_force = self%stiffness * (drive - displacement)
       motion%elastic_force = motion%spring_force
+      motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity
    end function observe
@@ -630,6 +688,21 @@ contains
       end do
       value = time**2 * horner(twice, terms, time)
    end function second_integral
+
+   !> Integral of the way, the integral of a series from zero, times the time.
+   pure function lever(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: value
+
+      integer :: term
+
+      value = 0.0_wp
+      do term = terms - 1, 0, -1
+         value = value * time + series(term) * (inverse(term + 1) / (term + 3))
+      end do
+      value = value * time**3
+   end function lever
 
    include "motion_series.inc"
 

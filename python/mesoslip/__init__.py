@@ -16,19 +16,26 @@ if TYPE_CHECKING:
     from mesoslip.api import (
         avalanche_summary,
         avalanches,
+        claims,
         curve,
+        example,
         figures,
         group,
         info,
         onset,
         plot,
         read,
+        regime,
+        report,
+        response,
         run,
         slips,
+        sweep,
     )
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
     from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",
@@ -37,36 +44,50 @@ __all__ = [
     "ForceCurve",
     "MesoslipError",
     "RunError",
+    "SteadySliding",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "claims",
     "curve",
+    "example",
     "figures",
     "group",
     "info",
     "onset",
     "plot",
     "read",
+    "regime",
+    "report",
+    "response",
     "run",
     "slips",
+    "sweep",
 ]
 
 # What takes long to import is imported when it is asked for.
 _LAZY = {
     "Config": "configuration.config",
     "ForceCurve": "theory.force_curve",
+    "SteadySliding": "theory.steady_sliding",
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",
+    "claims": "api",
     "curve": "api",
+    "example": "api",
     "figures": "api",
     "group": "api",
     "info": "api",
     "onset": "api",
     "plot": "api",
     "read": "api",
+    "regime": "api",
+    "report": "api",
+    "response": "api",
     "run": "api",
     "slips": "api",
+    "sweep": "api",
 }
 
 

@@ -17,7 +17,7 @@ def parameters(config: Config) -> tuple[float, ...]:
         slider.mass,
         slider.stiffness,
         getattr(slider, "damping_rate", 0.0),
-        config.drive_stages[0].velocity,
+        config.drive_parts[0].start_velocity,
         contacts.contact_static_force,
         contacts.contact_stiffness,
         contacts.contact_drag,

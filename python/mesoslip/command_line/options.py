@@ -13,12 +13,23 @@ ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
 ]
 OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metavar="OUT.nc")]
+OutputsArgument = Annotated[
+    list[Path], typer.Argument(help="Outputs of mesoslip", metavar="OUT.nc...")
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         help="Change one key, as in contacts.delay=1ms; may be repeated",
         metavar="KEY=VALUE",
+    ),
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        help="Dask scheduler whose workers do the computing, or its --scheduler-file",
+        metavar="ADDRESS",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
@@ -46,3 +57,14 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(one) for one in value]
     return value
+
+
+def time_of(text: str, option: str) -> float:
+    """A time given to an option [s]."""
+    from mesoslip.configuration.units import to_si
+    from mesoslip.errors import ConfigError, Problem
+
+    try:
+        return to_si(text, "s", "2 s")
+    except ValueError as error:
+        raise ConfigError([Problem("", option, str(error), text)]) from None

@@ -50,8 +50,8 @@ class RealizationResults(Protocol):
     """What came out of a realization.
 
     Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
-    of the slip as its last column), "slips", "layers", "avalanches", "snapshot_places", and
-    "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
+    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_places",
+    and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
     """
 
     @property
@@ -171,6 +171,7 @@ def describe(results: RunResults) -> dict[str, GroupLayout]:
     """The layout of the output of a run, by group; the root is ""."""
     config = results.config
     layout = {"": _root(results), "slips": _slips(results), "energy": _energy(results)}
+    layout["stages"] = _stages(results)
     if config.output.slip_interval is not None and config.slider.slip_velocity(config) > 0:
         layout["slip_traces"] = _slip_traces(results)
     if config.has_avalanches:
@@ -236,6 +237,7 @@ def _catalogue(results: RunResults, group: Group, table: str) -> _Form:
 # Dimension of the rows of a table in the group of its catalogue.
 DIMENSIONS = {
     "slips": "slip",
+    "stages": "stage",
     "slip_trace": "sample",
     "avalanches": "avalanche",
     "snapshot_places": "snapshot",
@@ -253,6 +255,13 @@ def _slips(results: RunResults) -> GroupLayout:
         if name in picks:
             writer.add(name, ("slip",), table="slips", pick=picks[name])
     return GroupLayout({"slip": _count(results, "slips")}, writer.entries, {})
+
+
+def _stages(results: RunResults) -> GroupLayout:
+    writer = _catalogue(results, variables.STAGES, "stages")
+    for place, name in enumerate(tables.STAGE_COLUMNS):
+        writer.add(name, ("stage",), table="stages", pick=column(place))
+    return GroupLayout({"stage": _count(results, "stages")}, writer.entries, {})
 
 
 def _slip_traces(results: RunResults) -> GroupLayout:

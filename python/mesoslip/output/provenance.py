@@ -5,7 +5,8 @@ from __future__ import annotations
 import platform
 from contextvars import ContextVar
 from datetime import UTC, datetime
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from mesoslip import _build
@@ -24,7 +25,15 @@ SUMMARIES = {
     "that moves forward slowly, from the master equation of multicontact friction",
     "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
     "contacts that break one after another and for a film that melts at once",
+    "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
+    "over a range of parameters",
 }
+
+
+@cache
+def version(package: str) -> str:
+    """Version of a package; looked up once, as a sweep asks for it a thousand times."""
+    return metadata.version(package)
 
 
 def program_attributes(config: Config, command: str) -> dict[str, Any]:
@@ -35,6 +44,7 @@ def program_attributes(config: Config, command: str) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"mesoslip {version('mesoslip')}"
     asked = COMMAND_LINE.get() or f"mesoslip.{command} in Python"
+    base = config.base
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": config.title or "Stick-slip of a multicontact interface",
@@ -44,6 +54,8 @@ def program_attributes(config: Config, command: str) -> dict[str, Any]:
         "history": f"{now} {program}: {asked}",
         "date_created": now,
         "configuration": config.to_toml(),
+        # What the configuration was laid over; of no consequence for the results.
+        **({} if base is None else {"base_configuration": base.to_toml()}),
         "program_version": version("mesoslip"),
         "commit": _build.COMMIT,
         "compiler": _build.COMPILER,

@@ -235,6 +235,20 @@ def test_the_law_of_a_record_is_found_and_judged():
     assert ageing["information_criterion"] < slip["information_criterion"]
 
 
+def test_the_law_starts_where_sliding_has_become_steady():
+    """A first stage that is all transient is left out."""
+    law = RateAndState(**{**LAW.__dict__, "law": "ageing"})
+    tree = record(law, STEP[:2] + HOLDS[:3], 4000.0, noise=1e-3 * FORCE)
+    inside = tree["time"].values <= 1.0
+    early = np.where(inside, 1 - tree["time"].values, 0.0)
+    tree["spring_force"] = tree["spring_force"] - 0.3 * FORCE * early
+    found = mesoslip.response(tree)
+    assert not rows_of(found, "steady")[0]["is_steady"]
+    ageing = rows_of(found, "rate_and_state")[0]
+    assert ageing["reference_velocity"] == pytest.approx(1e-6)
+    assert abs(ageing["b"] - law.b) < 4 * ageing["b_error"]
+
+
 def test_lines_have_errors():
     generator = np.random.default_rng(3)
     x, error = np.arange(8.0), np.full(8, 0.1)

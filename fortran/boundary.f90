@@ -95,8 +95,8 @@ subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stag
    use mesoslip_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Number of parts; when each ends [s], velocities of the drive at its start and end [m/s], and the
-   !> number of the stage that it is of
+   !> Number of parts; when each ends [s], velocities of the drive at its start and its end [m/s],
+   !> and the number of the stage that it is of
    integer, intent(in) :: parts
    real(8), intent(in) :: part_end(parts), start_velocity(parts), end_velocity(parts)
    integer, intent(in) :: stage(parts)
@@ -116,6 +116,38 @@ subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stag
    end if
    call report(error, status, message)
 end subroutine set_drive
+
+!> Tell a simulation when to stop before its drive ends.
+subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of slips, 0 for any
+   integer(8), intent(in) :: slips
+   !> Displacement of the slider to come to [m], 0 for any
+   real(8), intent(in) :: displacement
+   !> Way of the drive in a block whose mean force tells a steady state [m], 0 for none; blocks that
+   !> are compared with as many before; difference of the mean forces that counts as none [N]
+   real(8), intent(in) :: block_way
+   integer, intent(in) :: blocks
+   real(8), intent(in) :: tolerance
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      if (slips > 0) simulation%most_slips = slips
+      simulation%farthest = displacement
+      call simulation%steady%open(block_way, blocks, tolerance)
+   end if
+   call report(error, status, message)
+end subroutine set_stop
 
 !> Tell a simulation, which has its contacts, what to record of the motion.
 subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &

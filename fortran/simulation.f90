@@ -12,21 +12,25 @@ module mesoslip_simulation
    use mesoslip_sliders_base, only: slider_type
    use mesoslip_recording_recorder, only: recorder_type, most_samples_in_step
    use mesoslip_recording_stages, only: stage_recorder_type
+   use mesoslip_recording_steady, only: steady_recorder_type
    implicit none
    private
 
    public :: simulation_type
    public :: energy_length
-   public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides
+   public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides, &
+      & ending_slips, ending_displacement, ending_steady
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
    !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
    integer, parameter :: energy_length = 8
 
    !> Why a run is over: it is not; the drive came to its end; there were as many avalanches as
-   !> wanted; no contact is left to break; contacts break under a force without end
+   !> wanted; no contact is left to break; contacts break under a force without end; there were as
+   !> many slips as wanted; the slider came to its displacement; the state is steady
    integer, parameter :: ending_none = 0, ending_drive = 1, ending_avalanches = 2, &
-      & ending_broken = 3, ending_slides = 4
+      & ending_broken = 3, ending_slides = 4, ending_slips = 5, ending_displacement = 6, &
+      & ending_steady = 7
 
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
@@ -54,6 +58,12 @@ module mesoslip_simulation
       type(avalanche_recorder_type) :: avalanches
       !> The recorder of stages of the drive
       type(stage_recorder_type) :: stages
+      !> Whether the state is steady, in the last part of the drive
+      type(steady_recorder_type) :: steady
+      !> Slips after which the run is over
+      integer(i8) :: most_slips = huge(1_i8)
+      !> Displacement of the slider at which it is over [m]; 0 for none
+      real(wp) :: farthest = 0.0_wp
       !> Ends of the parts of the drive, in which its acceleration is constant, shape (parts) [s]
       real(wp), allocatable :: part_end(:)
       !> Its velocities at the start and at the end of each part, shape (parts) [m/s]
@@ -100,8 +110,9 @@ module mesoslip_simulation
       procedure :: restore
       !> Whether all parts are there
       procedure :: is_whole
-      procedure, private :: advance, advance_once, run_ahead, change_drive, take_part, acceleration, &
-         & follow, finish, is_broken, slides, longest_step
+      procedure, private :: advance, advance_once, run_ahead, change_drive, take_part, &
+         & acceleration, follow, finish, is_broken, slides, longest_step, stop_early, is_there, &
+         & look_for_steady
    end type simulation_type
 
 contains
@@ -115,7 +126,8 @@ contains
 
       is_whole = allocated(self%slider) .and. allocated(self%contacts) &
          & .and. allocated(self%stage_of_part) .and. allocated(self%recorder%trace%row) &
-         & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row)
+         & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row) &
+         & .and. allocated(self%recorder%slips%row)
    end function is_whole
 
    !> Prepare the start of a run: contacts drawn, slider at rest and in balance.
@@ -134,6 +146,7 @@ contains
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
       call self%stages%begin(self%slider, self%stage_of_part(1))
+      call self%look_for_steady()
       call self%recorder%record(self%slider, self%contacts%detached_count, 0.0_wp)
       call self%avalanches%see_response(self%slider, self%contacts, self%contacts%law())
       call self%avalanches%see_advance(self%slider, self%contacts)
@@ -206,6 +219,8 @@ contains
          & .and. .not. (self%avalanches%sees_each() &
          & .or. abs(self%slider%drive_acceleration) > 0.0_wp)) then
          call self%contacts%plan(self%slider%pose(), self%longest_schedule, self%schedule)
+         if (abs(self%farthest) > 0.0_wp) call stop_within(self%schedule, &
+            & self%farthest - self%slider%origin, sign(1.0_wp, self%farthest))
       end if
       if (self%schedule%is_over) then
          call self%advance_once(last, most_breaks)
@@ -225,7 +240,7 @@ contains
       type(interface_law_type) :: law
       logical :: turns
 
-      self%schedule%end_time = self%part_end(self%part)
+      self%schedule%end_time = min(self%part_end(self%part), self%steady%block_end)
       self%schedule%longest_step = self%longest_step()
       self%schedule%mean_stiffness = self%contacts%parameters%stiffness
       self%schedule%farthest_force = farthest_stretches * self%contacts%parameters%static_force
@@ -245,7 +260,7 @@ contains
             if (.not. turns) call self%schedule%pass(self%slider%time, self%slider%displacement)
          end if
          if (turns .or. self%schedule%is_over .or. self%advances >= last) exit
-         if (self%recorder%is_full()) exit
+         if (self%recorder%is_full() .or. self%recorder%slips_so_far() >= self%most_slips) exit
       end do
       call self%contacts%settle(self%schedule, self%slider%pose())
       call self%avalanches%pass_over(self%schedule%moments, self%contacts%breaks)
@@ -276,9 +291,16 @@ contains
          call self%finish(ending_broken)
          return
       end if
-      end_time = min(self%part_end(self%part), self%slider%drive_turn, &
+      end_time = min(self%part_end(self%part), self%slider%drive_turn, self%steady%block_end, &
          & self%slider%time + self%longest_step())
       window%end_time = min(window%end_time, end_time)
+      if (abs(self%farthest) > 0.0_wp .and. .not. self%slider%instant) then
+         if (self%farthest > 0.0_wp) then
+            window%upper = min(window%upper, self%farthest - self%slider%origin)
+         else
+            window%lower = max(window%lower, self%farthest - self%slider%origin)
+         end if
+      end if
 
       call self%slider%advance(law, window)
       self%advances = self%advances + 1
@@ -315,6 +337,11 @@ contains
          return
       end if
 
+      if (self%slider%instant .and. self%slider%settled .and. self%is_there()) then
+         call self%finish(ending_displacement)
+         return
+      end if
+
       call self%contacts%respond(before, self%slider%pose())
       call self%avalanches%see_response(self%slider, self%contacts, law)
       call self%change_drive()
@@ -336,6 +363,8 @@ contains
    subroutine change_drive(self)
       class(simulation_type), intent(inout) :: self
 
+      call self%stop_early()
+      if (self%ending /= ending_none) return
       ! An avalanche under a slider without inertia has to end before a part of the drive does.
       if (self%slider%time >= min(self%part_end(self%part), self%slider%drive_turn) &
          & .and. .not. self%avalanches%size > 0.0_wp) then
@@ -372,12 +401,69 @@ contains
       else
          call self%stages%mark(self%slider)
       end if
+      call self%look_for_steady()
       is_new = is_new .and. abs(self%start_velocity(part) - velocity) &
          & > tiny_part * max(abs(velocity), abs(self%start_velocity(part)))
       if (is_new .or. abs(self%slider%drive_sense - sense) > 0.0_wp) then
          self%recorder%drive_changes = .true.
       end if
    end subroutine take_part
+
+   !> In the last part of the drive, at a constant velocity, look for a steady state.
+   subroutine look_for_steady(self)
+      class(simulation_type), intent(inout) :: self
+
+      if (self%part < size(self%part_end) .or. abs(self%acceleration()) > 0.0_wp) return
+      call self%steady%begin(self%slider%time, self%start_velocity(self%part))
+   end subroutine look_for_steady
+
+   !> End the run where it is to stop before its drive ends.
+   subroutine stop_early(self)
+      class(simulation_type), intent(inout) :: self
+
+      logical :: is_steady
+
+      if (self%recorder%slips_so_far() >= self%most_slips) then
+         call self%finish(ending_slips)
+         return
+      end if
+      ! A slider without inertia jumps past a displacement: that is told where it comes to rest.
+      if (self%is_there() .and. .not. self%slider%instant) then
+         call self%finish(ending_displacement)
+         return
+      end if
+      if (self%slider%time < self%steady%block_end) return
+      call self%steady%see_block(self%slider%stage_impulse%total() &
+         & + self%slider%impulse%total(), is_steady)
+      if (is_steady) call self%finish(ending_steady)
+   end subroutine stop_early
+
+   !> Whether the slider has come to the displacement at which the run is over.
+   pure function is_there(self)
+      class(simulation_type), intent(in) :: self
+      logical :: is_there
+
+      is_there = abs(self%farthest) > 0.0_wp .and. sign(1.0_wp, self%farthest) &
+         & * (self%slider%displacement - (self%farthest - self%slider%origin)) >= 0.0_wp
+   end function is_there
+
+   !> Let a schedule end before a displacement.
+   pure subroutine stop_within(schedule, displacement, sense)
+      type(schedule_type), intent(inout) :: schedule
+      !> The displacement [m], and the sense in which it must not be passed, +1 or -1
+      real(wp), intent(in) :: displacement, sense
+
+      if (schedule%is_over) return
+      if (sense * schedule%direction > 0.0_wp) then
+         do while (schedule%breaks > 0)
+            if (schedule%break_coordinate(schedule%breaks) < sense * displacement) exit
+            schedule%breaks = schedule%breaks - 1
+         end do
+         schedule%is_over = schedule%breaks == 0
+      else
+         schedule%behind = max(schedule%behind, schedule%direction * displacement)
+      end if
+   end subroutine stop_within
 
    !> Acceleration of the drive in its part [m/s2].
    pure function acceleration(self)
@@ -480,6 +566,7 @@ contains
       call self%contacts%exchange(archive)
       call self%recorder%exchange(archive)
       call self%stages%exchange(archive)
+      call self%steady%exchange(archive)
       call self%avalanches%exchange(archive)
       call archive%finish()
       if (archive%saving .or. allocated(archive%failure)) return

@@ -125,6 +125,8 @@ module mesoslip_recording_recorder
       procedure :: open
       !> Whether so much waits that it should be taken away
       procedure :: is_full
+      !> Slips that are over
+      procedure :: slips_so_far
       !> Samples of slip traces that can be taken away
       procedure :: final_slip_samples
       !> Take samples of slip traces away
@@ -172,6 +174,16 @@ contains
       is_full = self%trace%count >= many_samples .or. self%final_slip_samples() >= many_samples &
          & .or. self%slips%count >= many_slips
    end function is_full
+
+   !> Slips that are over.
+   pure function slips_so_far(self) result(number)
+      !> The recorder
+      class(recorder_type), intent(in) :: self
+      !> Their number
+      integer(i8) :: number
+
+      number = self%slip
+   end function slips_so_far
 
    !> Samples of slip traces that can be taken away: not those of what may come to no slip.
    pure function final_slip_samples(self) result(number)
@@ -312,7 +324,8 @@ contains
       end do
    end subroutine take_samples
 
-   !> The drive took another velocity or direction at the start of the last advance, or the run started there.
+   !> The drive took another velocity or direction at the start of the last advance, or the run
+   !> started there.
    subroutine change_stage(self, slider, breaks)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider

@@ -1,5 +1,5 @@
-!> What the stages of a drive came to: where each started and ended, and the extremes and the mean of
-!> the drive's force in it.
+!> What the stages of a drive came to: where each started and ended, and the extremes and the mean
+!> of the drive's force in it.
 !>
 !> All of it is exact from the motion. The force of a spring has an extreme where the slider passes
 !> the drive's velocity, which is looked for in the step in which it does; sliders whose force jumps
@@ -18,9 +18,9 @@ module mesoslip_recording_stages
 
    public :: stage_recorder_type, stage_length
 
-   !> Numbers of a stage: its number, start time, end time, velocity of the drive at both, spring force
-   !> at both, displacement at both, displacement of the drive at the start; greatest spring force, its
-   !> time, displacement then; the same of the least; mean spring force
+   !> Numbers of a stage: its number, start time, end time, velocity of the drive at both, spring
+   !> force at both, displacement at both, displacement of the drive at the start; greatest spring
+   !> force, its time, displacement then; the same of the least; mean spring force
    integer, parameter :: stage_length = 17
    !> Stages that wait before the run pauses to have them taken away
    integer, parameter :: many_stages = 2000
@@ -90,7 +90,7 @@ contains
       self%start_time = motion%time
       self%start_velocity = slider%drive_velocity
       self%start_force = motion%spring_force
-      self%start_displacement = motion%displacement
+      self%start_displacement = slider%origin + slider%displacement
       self%drive_start_displacement = motion%drive_displacement
       slider%extremes = extremes_type()
       slider%stage_impulse = accumulator_type()
@@ -152,7 +152,8 @@ contains
       call note(slider, passage(slider))
    end subroutine record
 
-   !> Time at which the slider passed the drive's velocity in the last advance, by the rule of Illinois.
+   !> Time at which the slider passed the drive's velocity in the last advance, by the rule of
+   !> Illinois.
    pure function passage(slider) result(time)
       class(slider_type), intent(in) :: slider
       real(wp) :: time
@@ -217,7 +218,7 @@ contains
       associate (extremes => slider%extremes)
          call self%rows%add([real(self%number, wp), self%start_time, slider%time, &
             & self%start_velocity, slider%drive_velocity_at(slider%time), self%start_force, &
-            & motion%spring_force, self%start_displacement, motion%displacement, &
+            & motion%spring_force, self%start_displacement, slider%origin + slider%displacement, &
             & self%drive_start_displacement, extremes%greatest, extremes%greatest_time, &
             & extremes%greatest_displacement, extremes%least, extremes%least_time, &
             & extremes%least_displacement, mean])

@@ -83,10 +83,15 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      call step_on(self, law, window)
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         call speed_up(self, law, window)
+      else
+         call step_on(self, law, window)
+      end if
    end subroutine advance
 
-   !> Move through a schedule until it ends, or until a step is of interest.
+   !> Move through a schedule until it ends, or until a step is of interest; the drive has no
+   !> acceleration.
    subroutine run_ahead(self, schedule, watch)
       !> The slider
       class(slider_prescribed_type), intent(inout) :: self
@@ -104,7 +109,7 @@ contains
       end do
    end subroutine run_ahead
 
-   !> One step.
+   !> One step at a constant velocity.
    pure subroutine step_on(self, law, window)
       type(slider_prescribed_type), intent(inout) :: self
       type(interface_law_type), intent(in) :: law
@@ -112,10 +117,6 @@ contains
 
       real(wp) :: limit, start, step, arrival, middle, half
 
-      if (abs(self%drive_acceleration) > 0.0_wp) then
-         call speed_up(self, law, window)
-         return
-      end if
       self%law = law
       self%step_time = self%time
       self%velocity = self%drive_velocity
@@ -130,7 +131,8 @@ contains
          self%displacement = limit
       else
          self%time = window%end_time
-         self%displacement = self%drive_at(self%time)
+         self%displacement = self%drive_displacement &
+            & + self%velocity * (self%time - self%drive_time)
       end if
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
 

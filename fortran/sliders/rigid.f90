@@ -57,8 +57,8 @@ module mesoslip_sliders_rigid
       !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
       real(wp) :: inverse_mass, stiffness, drag, spring
       !> Coefficients of the equation of the third order: 2 eta_S + C/M [1/s], (K + K_c)/M
-      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3], and eta_S K/M times the drive's velocity, with
-      !> K/M times its acceleration; eta_S K/M times its acceleration
+      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3], and eta_S K/M times the drive's velocity
+      !> with K/M times its acceleration; eta_S K/M times its acceleration
       real(wp) :: first, second, third, driving, driving_rate
       !> How far the drive is ahead of the slider at the start of a step [m], and its velocity [m/s]
       real(wp) :: drive_gap, drive_velocity

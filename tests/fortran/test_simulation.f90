@@ -365,6 +365,7 @@ contains
       simulation%end_velocity = simulation%start_velocity
       simulation%stage_of_part = [0, 1, 2]
       call simulation%stages%open()
+      call simulation%steady%open(0.0_wp, 1, 0.0_wp)
       call simulation%recorder%open(recorder)
       call simulation%avalanches%open(avalanche_parameters_type(least_size=1.0_wp, &
          & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%followed())

@@ -50,6 +50,15 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
     "rigid, me": {"run__engine": "me"},
     "rigid, ramps": RAMPS,
+    "rigid, to a displacement": {"run__stop": {"displacement": 2.01e-7}},
+    "rigid, to a slip": {"run__stop": {"slips": 1}},
+    "rigid, to a steady state": {
+        "drive": {"velocity": 1e-5},
+        "run": {
+            "duration": 0.2,
+            "stop": {"steady": {"displacement": 1e-7, "blocks": 3, "tolerance": 0.3}},
+        },
+    },
     "rigid, ageing, ramps": AGEING | RAMPS,
     "prescribed, ramps": RAMPS | {"slider": {"kind": "prescribed"}},
     "prescribed, me, ramps": RAMPS | {"slider": {"kind": "prescribed"}, "run__engine": "me"},

@@ -185,8 +185,8 @@ def test_stages_are_what_fine_samples_show(kind):
         assert greatest - within.max() < 0.2 * size
         assert within.min() - least < 0.2 * size
         if not {"prescribed", "quasistatic"} & set(kind.split(", ")):
-            assert greatest - within.max() < 5e-3 * size
-            assert within.min() - least < 5e-3 * size
+            assert greatest - within.max() < 1e-2 * size
+            assert within.min() - least < 1e-2 * size
             for which in ("greatest", "least"):
                 at = float(stage[f"{which}_force_time"])
                 place = np.interp(at, time[inside], force[inside])
@@ -237,7 +237,7 @@ def test_a_cycle_is_stages_to_the_bit(speed):
 
 def test_a_history_is_stages_to_the_bit(tmp_path):
     """But for slips, which its points do not end, and for the stages themselves."""
-    points = [(2.0, 5e-7), (2.03, 8e-7), (2.04, 8e-7), (2.1, 1e-7)]
+    points = [(2.0, 5e-23), (2.03, 3e-7), (2.04, 3e-7), (2.1, -4e-7)]
     lines = [f"{time},x,{place}" for time, place in points]
     (tmp_path / "moved.csv").write_text("\n".join(["time [s],note,displacement [m]", *lines, ""]))
     case = tmp_path / "case.toml"
@@ -392,3 +392,134 @@ def test_a_drive_laid_over_another_replaces_it():
     cycle = config.replace(drive={"cycle": {"amplitude": 1e-6, "velocity": 1e-6, "cycles": 2}})
     assert cycle.replace("drive.cycle.cycles=5").drive.cycle.amplitude == 1e-6
     assert cycle.replace("drive.cycle.frequency=2").drive.cycle.velocity is None
+
+
+FAR = ["rigid", "rigid, me", "rigid, lattice", "rigid, ageing", "rigid, ramps", "prescribed"]
+FAR += ["prescribed, me", "layered", "layered, adams", "layered, me"]
+
+
+@pytest.mark.parametrize("kind", FAR)
+@pytest.mark.parametrize("way", [3.0000001e-8, 2.01e-7])
+def test_a_run_ends_at_a_displacement_to_the_bit(kind, way):
+    """For the first time, and until then it is the run that goes on."""
+    tree = mesoslip.run(configuration(kind, run__stop={"displacement": way}))
+    assert tree.attrs["ending"] == "the slider came to its displacement"
+    assert stages_of(tree)["end_displacement"].values[-1] == way
+    assert np.all(tree["displacement"].values < way)
+    whole = mesoslip.run(configuration(kind))
+    end = stages_of(tree)["stage_end_time"].values[-1]
+    until = whole["time"].values <= end
+    assert np.max(whole["displacement"].values[0, until]) <= way
+    assert np.max(whole["displacement"].values[0, : until.sum() + 1]) > way
+    bound = 1e-7 if {"adams", "me"} & set(kind.split(", ")) else 1e-12
+    assert tree["spring_force"].values[0] == pytest.approx(
+        whole["spring_force"].values[0, until], abs=bound
+    )
+
+
+def test_a_run_ends_at_a_displacement_backwards():
+    tree = mesoslip.run(configuration("rigid", run__stop={"displacement": -1.5e-8}))
+    assert stages_of(tree)["end_displacement"].values[-1] == -1.5e-8
+    assert stages_of(tree)["stage_number"].values.tolist() == [0, 1, 2]
+
+
+def test_without_inertia_a_run_ends_where_it_comes_to_rest():
+    tree = mesoslip.run(configuration("quasistatic", run__stop={"displacement": 1e-7}))
+    assert tree.attrs["ending"] == "the slider came to its displacement"
+    assert 1e-7 <= tree["end_displacement"].values[0] < 1.3e-7
+
+
+SLOW = {
+    "drive": {"velocity": 1e-6},
+    "run": {"duration": 4.0, "stop": {"slips": 3}},
+    "contacts__threshold__relative_width": 0.01,
+}
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_run_ends_with_a_slip(count):
+    """As soon as the last slip is over: half a period after its least force, or at the next."""
+    tables = SLOW | {"run": {"duration": 4.0, "stop": {"slips": count}}}
+    tree = mesoslip.run(configuration("rigid", **tables))
+    whole = mesoslip.run(configuration("rigid", **SLOW | {"run": {"duration": 4.0}}))
+    assert tree.attrs["ending"] == "as many slips as wanted"
+    slips, all_slips = mesoslip.group(tree, "slips"), mesoslip.group(whole, "slips")
+    assert slips.sizes["slip"] == count < all_slips.sizes["slip"]
+    assert np.array_equal(slips["end_time"], all_slips["end_time"][:count])
+    end = stages_of(tree)["stage_end_time"].values[-1]
+    assert slips["end_time"].values[-1] < end < all_slips["end_time"].values[count]
+    samples = tree.sizes["time"]
+    assert np.array_equal(tree["spring_force"], whole["spring_force"][:, :samples])
+
+
+@pytest.mark.parametrize("kind", ["prescribed", "prescribed, me", "rigid", "quasistatic"])
+def test_a_run_ends_in_a_steady_state(kind):
+    """Not before the rule of the documentation is met, computed here from the stages of a run whose
+    stages are the blocks."""
+    way = 2e-8 if "prescribed" in kind else 2e-7
+    blocks, speed = 6, 1e-5
+    run = {"engine": "me" if "me" in kind else "eq", "duration": 10.0}
+    steady = {"displacement": way, "blocks": blocks, "tolerance": 0.0}
+    tree = mesoslip.run(
+        configuration(kind, drive={"velocity": speed}, run=run | {"stop": {"steady": steady}})
+    )
+    assert tree.attrs["ending"] == "the state is steady"
+    end = stages_of(tree)["stage_end_time"].values[-1]
+    number = round(end * speed / way)
+    assert end == pytest.approx(number * way / speed, rel=1e-12)
+    stages = [{"duration": way / speed, "velocity": speed}] * number
+    means = stages_of(
+        mesoslip.run(configuration(kind, drive={"stage": stages}, output__slip_interval=1e-3))
+    )["mean_force"].values
+    for last in range(2 * blocks, number + 1):
+        early, late = means[last - 2 * blocks : last - blocks], means[last - blocks : last]
+        scatter = np.std(late, ddof=1)
+        is_steady = abs(late.mean() - early.mean()) <= scatter * math.sqrt(2 / blocks)
+        is_steady &= np.std(early, ddof=1) <= 2 * scatter
+        assert is_steady == (last == number)
+
+
+def test_a_loading_spring_is_not_steady():
+    """A force that grows evenly never is, whatever the length of blocks."""
+    for way in (1e-10, 1e-8):
+        steady = {"displacement": way, "blocks": 2, "tolerance": 0.0}
+        config = configuration(
+            "rigid",
+            drive={"velocity": 1e-7},
+            run={"duration": 1.0, "stop": {"steady": steady}},
+            contacts__static_force=1e-3,
+        )
+        assert mesoslip.run(config).attrs["ending"] == "the drive came to its end"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"run__stop": {"slips": 0}}, ["run.stop.slips"]),
+        (
+            {"run__stop": {"slips": 2}, "slider": {"kind": "prescribed"}},
+            ["run.stop.slips", "needs"],
+        ),
+        ({"run__stop": {"displacement": 0}}, ["run.stop.displacement", "must not be 0"]),
+        ({"run__stop": {"steady": 3}}, ["run.stop.steady", "must be a table"]),
+        ({"run__stop": {"steady": True}, "drive": {"velocity": 0}}, ["constant velocity"]),
+        ({"run__stop": {"steady": True}, **RAMPS, "run__duration": 0.1}, ["constant velocity"]),
+        ({"run__stop": {"steady": {"blocks": 1}}}, ["run.stop.steady.blocks"]),
+    ],
+)
+def test_what_is_wrong_with_an_end_is_told(changes, words):
+    with pytest.raises(ConfigError) as told:
+        Config.from_dict(klein_tables(**changes))
+    for word in words:
+        assert word in str(told.value)
+
+
+def test_info_knows_ramps_and_holds(klein):
+    """Their stages, duration, way, and the speed that stands for them elsewhere."""
+    derived = mesoslip.info(klein(run__duration=None, **RAMPS))
+    values = {name: derived[name].value for name in derived if name.startswith("drive_")}
+    expected = {"stages": 3, "duration": 0.1, "way": 4e-7 + 0.05 * (1e-10 + 4e-10) / 6e-5}
+    for name, value in expected.items():
+        assert values[f"drive_{name}"] == pytest.approx(value)
+    assert values["drive_speed"] == 2e-5
+    assert "drive_way" not in mesoslip.info(klein())

@@ -68,6 +68,7 @@ def drive_problems(config: Setting) -> Complaints:
                 else f"takes for ever at {drive.velocity:g} m/s",
                 way,
             )
+    yield from _stop_problems(config)
     if run.avalanches is not None:
         if not config.has_avalanches:
             yield Complaint(
@@ -85,6 +86,26 @@ def drive_problems(config: Setting) -> Complaints:
         yield Complaint("run.duration", "needed, as the drive has no stages")
     elif config.duration <= 0:
         yield Complaint("run.duration", "needed, as the drive has no stages")
+
+
+def _stop_problems(config: Setting) -> Complaints:
+    """What is wrong with what ends the run before its time."""
+    stop = config.run.stops
+    if stop.slips is not None and config.slider.slip_velocity(config) == 0:
+        yield Complaint(
+            "run.stop.slips",
+            "needs slips, which a slider with inertia has while the drive moves",
+            stop.slips,
+        )
+    if stop.steady is not None:
+        parts = config.drive_parts
+        last = parts[-1]
+        if not config.drive.goes_on or last.start_velocity != last.end_velocity or not last.way:
+            yield Complaint(
+                "run.stop.steady", "needs a drive that comes to a constant velocity, not 0"
+            )
+        elif config.drive.force_rate is not None:
+            yield Complaint("run.stop.steady", "has no meaning for a force that grows")
 
 
 def output_problems(config: Setting) -> Complaints:

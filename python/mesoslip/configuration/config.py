@@ -109,6 +109,16 @@ class Config(Table):
         return (loading + sliding) / abs(self.drive.velocity or math.nan)
 
     @property
+    def steady_block(self) -> float:
+        """Way of the drive whose mean force tells whether the state is steady [m]: unless given,
+        that which loads spring and contacts to the static force; 0 if it is not asked for."""
+        steady = self.run.stops.steady
+        if steady is None:
+            return 0.0
+        loading = self.contacts.break_stretch + self.contacts.static_force / self.spring_stiffness
+        return steady.displacement or loading
+
+    @property
     def bond_stiffness(self) -> float:
         """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without interaction."""
         return 0.0 if self.interaction is None else self.interaction.bond_stiffness(self.contacts)

@@ -21,6 +21,8 @@ from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.table import (
     ForceRate,
     Length,
+    MeasuredLength,
+    MeasuredTime,
     Rate,
     Table,
     Text,
@@ -197,8 +199,8 @@ class History(Table):
     lines between them. A file is read once; what is kept are its points."""
 
     file: Text | None = None
-    time: tuple[Time, ...] | None = None
-    displacement: tuple[Length, ...] | None = None
+    time: tuple[MeasuredTime, ...] | None = None
+    displacement: tuple[MeasuredLength, ...] | None = None
 
     @model_validator(mode="before")
     @classmethod

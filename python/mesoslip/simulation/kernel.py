@@ -126,6 +126,19 @@ class Kernel:
         the end [m/s], and the number of the stage that it is of."""
         self._call(_core.set_drive, part_end, start_velocity, end_velocity, stage)
 
+    def set_stop(
+        self,
+        *,
+        slips: int,
+        displacement: float,
+        block_way: float,
+        blocks: int,
+        tolerance: float,
+    ) -> None:
+        """What ends the run before its drive: slips, a displacement of the slider [m], a steady
+        state, told by blocks of so much way of the drive [m]; 0 for what does not."""
+        self._call(_core.set_stop, slips, displacement, block_way, blocks, tolerance)
+
     def set_recorder(
         self,
         *,

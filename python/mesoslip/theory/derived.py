@@ -25,13 +25,30 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
 
     What has no meaning for the configuration is left out: the setup's frequency of a prescribed
     slider, for example, or what refers to the drive's velocity if that is zero. With several stages
-    the first one that moves counts. Equation numbers are those of Braun's "Stick-slip kinetics".
+    the first one that moves counts, a ramp by its greatest speed. Equation numbers are those of
+    Braun's "Stick-slip kinetics".
     """
     return {
         name: Derived(value, unit, meaning)
-        for name, value, unit, meaning in (*_contacts(config), *config.slider.quantities(config))
+        for name, value, unit, meaning in (
+            *_contacts(config),
+            *config.slider.quantities(config),
+            *_drive(config),
+        )
         if math.isfinite(value)
     }
+
+
+def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
+    """What a drive that is not one velocity amounts to."""
+    parts = config.drive_parts
+    if not config.drive.parts:
+        return
+    yield "drive_stages", float(parts[-1].stage + 1), "1", "stages of the drive in the run"
+    yield "drive_duration", config.duration, "s", "duration of the run"
+    way = math.fsum(part.way for part in parts)
+    yield "drive_way", way, "m", "way of the drive, there and back both counted"
+    yield "drive_speed", config.drive_speed, "m/s", "speed that stands for the drive elsewhere"
 
 
 def verdict(config: Config) -> str | None:

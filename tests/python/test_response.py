@@ -106,11 +106,12 @@ HOLDS = (
 
 
 @pytest.mark.parametrize(
-    ("realizations", "count", "repeat"), [(1, 1000, 0.9), (4, 250, 0.5), (1, 2000, 0.0)]
+    ("realizations", "count", "repeat", "transient"),
+    [(1, 1000, 0.9, 0.0), (4, 250, 0.5, 0.0), (1, 2000, 0.0, 0.0), (1, 10_000, 0.0, 5.0)],
 )
-def test_errors_of_means_cover(realizations, count, repeat):
+def test_errors_of_means_cover(realizations, count, repeat, transient):
     """Of 120 means, 95 % within four standard errors of that part; more in docs/response.md."""
-    covers, ratio, _, among = steady_coverage(realizations, count, repeat, samples=120)
+    covers, ratio, _, among = steady_coverage(realizations, count, repeat, transient, samples=120)
     assert covers > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 120)
     assert among >= covers - 0.02
     assert 0.75 < ratio < 1.3

@@ -1,8 +1,8 @@
 !> Which of many contacts breaks first, when its place may change at any time.
 !>
-!> A tree with many branches at each node, which holds the least of its branches. A contact that changes is hardly ever the least of its node, before or
-!> after, so a change costs one comparison whatever the number of contacts. Contacts that are
-!> neighbours in number share lines of the cache.
+!> A tree with many branches at each node, which holds the least of its branches. A contact that
+!> changes is hardly ever the least of its node, before or after, so a change costs one comparison
+!> whatever the number of contacts. Contacts that are neighbours in number share lines of the cache.
 module mesoslip_contacts_break_tree
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_memory

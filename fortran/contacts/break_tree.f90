@@ -1,9 +1,8 @@
-!> Which of many contacts breaks first, forward and backward, when its place may change at any time.
+!> Which of many contacts breaks first, when its place may change at any time.
 !>
-!> A tree with many branches at each node, which holds the least of its branches, for either
-!> direction of motion. A contact that changes is hardly ever the least of its node, before or
-!> after, so a change costs one comparison whatever the number of contacts. Contacts that are
-!> neighbours in number share lines of the cache.
+!> A tree with many branches at each node, which holds the least of its branches. A contact that
+!> changes is hardly ever the least of its node, before or after, so a change costs one comparison
+!> whatever the number of contacts. Contacts that are neighbours in number share lines of the cache.
 module mesoslip_contacts_break_tree
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -16,19 +15,16 @@ module mesoslip_contacts_break_tree
    integer, parameter :: branches = 16
    !> Levels above that of 2**31 contacts
    integer, parameter :: most_levels = 8
-   !> Directions of motion
-   integer, parameter :: forward = 1, backward = 2
    !> Coordinate at which nothing breaks
    real(wp), parameter :: never = huge(1.0_wp)
 
-   !> Displacements at which contacts break.
+   !> Coordinates along a direction of motion at which contacts break.
    type :: break_tree_type
       private
       !> Number of levels of nodes, and the place before the first of each; level 0 is the contacts
       integer :: levels = 0, before(0:most_levels) = 0
-      !> Displacement at which a contact, or the first one below a node, breaks when the slider
-      !> moves forward, and minus that when it moves backward, shape (places, 2)
-      real(wp), allocatable :: least(:, :)
+      !> Coordinate at which a contact, or the first one below a node, breaks, shape (places)
+      real(wp), allocatable :: least(:)
    contains
       !> Put a contact in, or change it
       procedure, non_overridable :: set
@@ -40,11 +36,9 @@ module mesoslip_contacts_break_tree
       procedure, non_overridable :: put
       !> Make the tree anew from its contacts
       procedure, non_overridable :: arrange
-      !> Displacement above which a contact breaks
-      procedure, non_overridable :: upper
-      !> Displacement below which a contact breaks
-      procedure, non_overridable :: lower
-      !> A contact that breaks at a displacement
+      !> Coordinate at which the first contact breaks
+      procedure, non_overridable :: first
+      !> A contact that breaks at a coordinate
       procedure, non_overridable :: due
    end type break_tree_type
 
@@ -71,7 +65,7 @@ contains
          places = places + merge(1, branches * ((nodes + branches - 1) / branches), nodes == 1)
          if (nodes == 1) exit
       end do
-      allocate (self%least(places, 2), stat=stat)
+      allocate (self%least(places), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the order of breaking")
          return
@@ -80,18 +74,15 @@ contains
    end subroutine new_break_tree
 
    !> Put a contact in, or change it.
-   pure subroutine set(self, contact, upper, lower)
+   pure subroutine set(self, contact, coordinate)
       !> The tree
       class(break_tree_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Displacements at which it breaks, above and below [m]
-      real(wp), intent(in) :: upper, lower
+      !> Coordinate at which it breaks [m]
+      real(wp), intent(in) :: coordinate
 
-      associate (places => size(self%least, 1))
-         call change(places, self%least(:, forward), self%before, self%levels, contact, upper)
-         call change(places, self%least(:, backward), self%before, self%levels, contact, -lower)
-      end associate
+      call change(size(self%least), self%least, self%before, self%levels, contact, coordinate)
    end subroutine set
 
    !> Take a contact out.
@@ -101,7 +92,7 @@ contains
       !> Number of the contact
       integer, intent(in) :: contact
 
-      call self%set(contact, never, -never)
+      call self%set(contact, never)
    end subroutine remove
 
    !> Change a contact, and the nodes above for which that matters.
@@ -160,16 +151,15 @@ contains
    end subroutine clear
 
    !> Put a contact in, to be followed by arrange.
-   pure subroutine put(self, contact, upper, lower)
+   pure subroutine put(self, contact, coordinate)
       !> The tree
       class(break_tree_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Displacements at which it breaks, above and below [m]
-      real(wp), intent(in) :: upper, lower
+      !> Coordinate at which it breaks [m]
+      real(wp), intent(in) :: coordinate
 
-      self%least(contact, forward) = upper
-      self%least(contact, backward) = -lower
+      self%least(contact) = coordinate
    end subroutine put
 
    !> Make the tree anew from its contacts.
@@ -177,74 +167,48 @@ contains
       !> The tree
       class(break_tree_type), intent(inout) :: self
 
-      integer :: level, node, nodes, direction
+      integer :: level, node, nodes
 
-      do direction = forward, backward
-         nodes = self%before(1)
-         do level = 1, self%levels
-            nodes = (nodes + branches - 1) / branches
-            do node = 1, nodes
-               self%least(self%before(level) + node, direction) = least_of( &
-                  & self%least(self%before(level - 1) + (node - 1) * branches + 1:, direction))
-            end do
+      nodes = self%before(1)
+      do level = 1, self%levels
+         nodes = (nodes + branches - 1) / branches
+         do node = 1, nodes
+            self%least(self%before(level) + node) = least_of( &
+               & self%least(self%before(level - 1) + (node - 1) * branches + 1:))
          end do
       end do
    end subroutine arrange
 
-   !> Displacement above which a contact breaks.
-   pure function upper(self) result(displacement)
+   !> Coordinate at which the first contact breaks.
+   pure function first(self) result(coordinate)
       !> The tree
       class(break_tree_type), intent(in) :: self
-      !> Displacement, huge without contacts [m]
-      real(wp) :: displacement
+      !> The coordinate, huge without contacts [m]
+      real(wp) :: coordinate
 
-      displacement = self%least(size(self%least, 1), forward)
-   end function upper
+      coordinate = self%least(size(self%least))
+   end function first
 
-   !> Displacement below which a contact breaks.
-   pure function lower(self) result(displacement)
+   !> A contact that breaks at a coordinate: the first one, or of many the lowest in number.
+   pure function due(self, coordinate) result(contact)
       !> The tree
       class(break_tree_type), intent(in) :: self
-      !> Displacement, minus huge without contacts [m]
-      real(wp) :: displacement
-
-      displacement = -self%least(size(self%least, 1), backward)
-   end function lower
-
-   !> A contact that breaks at a displacement: the first one, or of many the lowest in number.
-   pure function due(self, displacement) result(contact)
-      !> The tree
-      class(break_tree_type), intent(in) :: self
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
+      !> Coordinate of the slider [m]
+      real(wp), intent(in) :: coordinate
       !> Number of the contact; 0 if none breaks
       integer :: contact
 
-      contact = 0
-      if (self%upper() <= displacement) then
-         contact = first_of(self%least(:, forward), self%before, self%levels)
-      else if (self%lower() >= displacement) then
-         contact = first_of(self%least(:, backward), self%before, self%levels)
-      end if
-   end function due
-
-   !> The contact that breaks first, in one direction.
-   pure function first_of(least, before, levels) result(contact)
-      real(wp), intent(in), contiguous :: least(:)
-      integer, intent(in) :: before(0:most_levels), levels
-      integer :: contact
-
       integer :: level
-      real(wp) :: wanted
 
+      contact = 0
+      if (self%first() > coordinate) return
       contact = 1
-      wanted = least(before(levels) + 1)
-      do level = levels - 1, 0, -1
+      do level = self%levels - 1, 0, -1
          contact = (contact - 1) * branches + 1
-         do while (least(before(level) + contact) > wanted)
+         do while (self%least(self%before(level) + contact) > self%first())
             contact = contact + 1
          end do
       end do
-   end function first_of
+   end function due
 
 end module mesoslip_contacts_break_tree

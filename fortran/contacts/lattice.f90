@@ -3,7 +3,8 @@
 !> The force that breaks a contact is f_i = k_i x_i + G sum_j (x_i - x_j) over its neighbours, with
 !> x_j = 0 for a detached one. While neighbours stay as they are it grows with the displacement at
 !> the rate k_i + G n_i, n_i of them being detached: breaks are events in the displacement, which
-!> move when a neighbour breaks or attaches.
+!> move when a neighbour breaks or attaches. Their order is kept for one direction of motion; what
+!> breaks on the way back is bounded, and the order made anew when the slider comes to the bound.
 module mesoslip_contacts_lattice
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -43,6 +44,10 @@ module mesoslip_contacts_lattice
       integer, allocatable, private :: neighbour(:, :)
       !> Contacts that let go together
       integer, allocatable, private :: generation(:)
+      !> Direction of motion for which the order of breaking is kept, +1 or -1
+      real(wp), private :: direction = 1.0_wp
+      !> Bound on the coordinates at which contacts break on the way back [m]
+      real(wp), private :: behind = -huge(1.0_wp)
       type(break_tree_type), private :: tree
    contains
       procedure :: initialize
@@ -52,7 +57,8 @@ module mesoslip_contacts_lattice
       procedure :: rebuild
       procedure :: snapshot
       procedure :: exchange
-      procedure, private, non_overridable :: cascade, attach_due, refresh, refresh_neighbours
+      procedure, private, non_overridable :: cascade, list_due, list_behind, attach_due, refresh, &
+         & refresh_neighbours
    end type contact_lattice_type
 
 contains
@@ -125,6 +131,7 @@ contains
 
       call self%draw(state)
       call self%rebuild(0.0_wp)
+      self%behind = farthest_behind(self)
       call self%respond(pose_type(), pose_type())
       call self%track%clear()
       self%breaks = 0.0_wp
@@ -140,13 +147,18 @@ contains
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds
+      !> Where it holds; a contact may break at the end that is behind
       type(window_type), intent(out) :: window
 
       law = law_set(self)
       window%end_time = self%next_attachment
-      window%upper = self%tree%upper()
-      window%lower = self%tree%lower()
+      if (self%direction > 0.0_wp) then
+         window%upper = self%tree%first()
+         window%lower = self%behind
+      else
+         window%upper = -self%behind
+         window%lower = -self%tree%first()
+      end if
    end subroutine offer
 
    !> Break all contacts that are due and those that they push over, then attach what is to attach.
@@ -160,7 +172,7 @@ contains
 
       breaks = self%breaks
       do
-         call self%cascade(after%displacement, after%time)
+         call self%cascade(after%displacement, after%time, after%sense)
          if (self%next_attachment > after%time) exit
          if (self%breaks - breaks > most_lives * self%parameters%count) then
             call raise(self%failure, status_stalled, "a cascade of contacts that break and " // &
@@ -174,21 +186,14 @@ contains
    end subroutine respond
 
    !> Break all contacts that are due, then those that they push over, until none is left.
-   subroutine cascade(self, displacement, time)
+   subroutine cascade(self, displacement, time, sense)
       class(contact_lattice_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement, time
+      real(wp), intent(in) :: displacement, time, sense
 
-      integer :: contact, number, place
+      integer :: number, place
 
       do
-         number = 0
-         do
-            contact = self%tree%due(displacement)
-            if (contact == 0) exit
-            call self%tree%remove(contact)
-            number = number + 1
-            self%generation(number) = contact
-         end do
+         call self%list_due(displacement, sense, number)
          if (number == 0) return
          self%track%generation = self%track%generation + 1
          do place = 1, number
@@ -199,6 +204,74 @@ contains
          end do
       end do
    end subroutine cascade
+
+   !> Take all contacts that are due out of the order of breaking.
+   subroutine list_due(self, displacement, sense, number)
+      class(contact_lattice_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement, sense
+      !> How many they are
+      integer, intent(out) :: number
+
+      integer :: contact
+
+      if (self%direction * sense < 0.0_wp .and. self%direction * displacement <= self%behind) then
+         self%direction = -self%direction
+         call self%rebuild(displacement)
+         self%behind = farthest_behind(self)
+      end if
+      number = 0
+      do
+         contact = self%tree%due(self%direction * displacement)
+         if (contact == 0) exit
+         call self%tree%remove(contact)
+         number = number + 1
+         self%generation(number) = contact
+      end do
+      if (self%direction * displacement <= self%behind) call self%list_behind(displacement, number)
+   end subroutine list_due
+
+   !> The same of contacts that their neighbours push over against the direction of motion.
+   subroutine list_behind(self, displacement, number)
+      class(contact_lattice_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement
+      !> How many are listed
+      integer, intent(inout) :: number
+
+      integer :: contact
+      real(wp) :: centre, limit
+
+      ! The bound may be that of a contact which has broken since, or breaks elsewhere now.
+      self%behind = -huge(1.0_wp)
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
+            & self%record, self%neighbour, self%bond, centre, limit)
+         if (self%direction * displacement <= self%direction * centre - limit) then
+            call self%tree%remove(contact)
+            number = number + 1
+            self%generation(number) = contact
+         else
+            self%behind = max(self%behind, self%direction * centre - limit)
+         end if
+      end do
+   end subroutine list_behind
+
+   !> Greatest coordinate at which a pinned contact breaks on the way back.
+   pure function farthest_behind(self) result(coordinate)
+      class(contact_lattice_type), intent(in) :: self
+      real(wp) :: coordinate
+
+      integer :: contact
+      real(wp) :: centre, limit
+
+      coordinate = -huge(1.0_wp)
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
+            & self%record, self%neighbour, self%bond, centre, limit)
+         coordinate = max(coordinate, self%direction * centre - limit)
+      end do
+   end function farthest_behind
 
    !> Attach all contacts that are to, in the order in which they broke.
    subroutine attach_due(self, displacement, time, sense)
@@ -231,10 +304,10 @@ contains
       ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
       if (size(self%neighbour, 1) == 6) then
          call refresh_all(self%neighbour(:, contact), 6, self%parameters%count, &
-            & self%record, self%neighbour, self%bond, self%tree)
+            & self%record, self%neighbour, self%bond, self%direction, self%tree, self%behind)
       else
          call refresh_all(self%neighbour(:, contact), 4, self%parameters%count, &
-            & self%record, self%neighbour, self%bond, self%tree)
+            & self%record, self%neighbour, self%bond, self%direction, self%tree, self%behind)
       end if
    end subroutine refresh_neighbours
 
@@ -247,17 +320,21 @@ contains
 
       call bearing(contact, size(self%neighbour, 1), self%parameters%count, self%record, &
          & self%neighbour, self%bond, centre, limit)
-      call self%tree%set(contact, centre + limit, centre - limit)
+      call self%tree%set(contact, self%direction * centre + limit)
+      self%behind = max(self%behind, self%direction * centre - limit)
    end subroutine refresh
 
    !> Find out where the pinned ones of some contacts break.
-   pure subroutine refresh_all(contact, sides, count, record, neighbour, bond, tree)
+   pure subroutine refresh_all(contact, sides, count, record, neighbour, bond, direction, tree, &
+      & behind)
       !> Contacts, as many as a contact has neighbours, of so many in all
       integer, intent(in) :: sides, count, contact(sides)
       real(wp), intent(in) :: record(record_length, count)
       integer, intent(in) :: neighbour(sides, count)
-      real(wp), intent(in) :: bond
+      real(wp), intent(in) :: bond, direction
       type(break_tree_type), intent(inout) :: tree
+      !> Bound on the coordinates at which contacts break on the way back [m]
+      real(wp), intent(inout) :: behind
 
       integer :: side
       real(wp) :: centre, limit
@@ -265,7 +342,8 @@ contains
       do side = 1, sides
          if (.not. record(row_stiffness, contact(side)) > 0.0_wp) cycle
          call bearing(contact(side), sides, count, record, neighbour, bond, centre, limit)
-         call tree%set(contact(side), centre + limit, centre - limit)
+         call tree%set(contact(side), direction * centre + limit)
+         behind = max(behind, direction * centre - limit)
       end do
    end subroutine refresh_all
 
@@ -307,6 +385,7 @@ contains
 
       call self%shift_records(shift)
       call self%rebuild(displacement)
+      self%behind = farthest_behind(self)
    end subroutine shift_origin
 
    !> Make the order of breaking anew, from the records.
@@ -324,7 +403,7 @@ contains
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
             & self%record, self%neighbour, self%bond, centre, limit)
-         call self%tree%put(contact, centre + limit, centre - limit)
+         call self%tree%put(contact, self%direction * centre + limit)
       end do
       call self%tree%arrange()
    end subroutine rebuild
@@ -360,6 +439,8 @@ contains
 
       call archive%section("contact lattice")
       call exchange_set(self, archive)
+      call archive%exchange("direction", self%direction)
+      call archive%exchange("behind", self%behind)
    end subroutine exchange
 
 end module mesoslip_contacts_lattice

@@ -356,9 +356,11 @@ contains
       rate = rate + (system%law%drag + 4.0_wp * system%dashpot) / system%layer_mass
    end function fastest_rate
 
-   !> Accelerations of base and layers without what acts from outside.
-   pure subroutine accelerate(system, displacement, velocity, acceleration)
+   !> Accelerations of base and layers, times a factor, without what acts from outside.
+   pure subroutine accelerate(system, factor, pull, displacement, velocity, acceleration)
       type(system_type), intent(in) :: system
+      !> The factor, and an acceleration that the last layer has besides [m/s2]
+      real(wp), intent(in) :: factor, pull
       real(wp), intent(in) :: displacement(0:), velocity(0:)
       real(wp), intent(out) :: acceleration(0:)
 
@@ -372,15 +374,17 @@ contains
          & + system%law%drag * (velocity(1) - velocity(0))
       if (dashpot > 0.0_wp) then
          do layer = 2, last - 1
-            acceleration(layer) = spring * ((displacement(layer + 1) - displacement(layer)) &
+            acceleration(layer) = factor &
+               & * (spring * ((displacement(layer + 1) - displacement(layer)) &
                & - (displacement(layer) - displacement(layer - 1))) &
                & + dashpot * ((velocity(layer + 1) - velocity(layer)) &
-               & - (velocity(layer) - velocity(layer - 1)))
+               & - (velocity(layer) - velocity(layer - 1))))
          end do
       else
          do layer = 2, last - 1
-            acceleration(layer) = spring * ((displacement(layer + 1) - displacement(layer)) &
-               & - (displacement(layer) - displacement(layer - 1)))
+            acceleration(layer) = factor &
+               & * (spring * ((displacement(layer + 1) - displacement(layer)) &
+               & - (displacement(layer) - displacement(layer - 1))))
          end do
       end if
       acceleration(last) = -spring * displacement(last)
@@ -392,10 +396,12 @@ contains
             & + dashpot * (velocity(2) - velocity(1))
       end if
       acceleration(1) = acceleration(1) - force / system%layer_mass
+      acceleration(last) = factor * (acceleration(last) + pull)
+      if (last > 1) acceleration(1) = factor * acceleration(1)
       acceleration(0) = 0.0_wp
       if (system%parameters%base_mass > 0.0_wp) then
-         acceleration(0) = (force - system%parameters%base_stiffness * displacement(0)) &
-            & / system%parameters%base_mass - system%parameters%base_damping * velocity(0)
+         acceleration(0) = factor * ((force - system%parameters%base_stiffness * displacement(0)) &
+            & / system%parameters%base_mass - system%parameters%base_damping * velocity(0))
       end if
    end subroutine accelerate
 
@@ -421,20 +427,19 @@ contains
    subroutine expand(self)
       class(slider_layered_type), intent(inout) :: self
 
-      integer :: term, last
+      real(wp) :: pull
+      integer :: term
 
-      last = self%parameters%layers
       self%series(:, :, 0) = self%state
       do term = 0, self%terms - 1
-         call accelerate(self%system, self%series(:, 1, term), self%series(:, 2, term), &
-            & self%series(:, 2, term + 1))
-         if (term == 0) call push(self%system, 0.0_wp, self%series(:, 2, 1))
-         if (term == 1) self%series(last, 2, 2) = self%series(last, 2, 2) &
-            & + self%system%spring * self%system%drive_velocity / self%system%layer_mass
-         if (term == 2) self%series(last, 2, 3) = self%series(last, 2, 3) &
-            & + 0.5_wp * self%system%spring * self%system%drive_acceleration &
+         pull = 0.0_wp
+         if (term == 1) pull = self%system%spring * self%system%drive_velocity &
             & / self%system%layer_mass
-         self%series(:, 2, term + 1) = self%series(:, 2, term + 1) * inverse(term + 1)
+         if (term == 2) pull = 0.5_wp * self%system%spring * self%system%drive_acceleration &
+            & / self%system%layer_mass
+         call accelerate(self%system, inverse(term + 1), pull, self%series(:, 1, term), &
+            & self%series(:, 2, term), self%series(:, 2, term + 1))
+         if (term == 0) call push(self%system, 0.0_wp, self%series(:, 2, 1))
          self%series(:, 1, term + 1) = self%series(:, 2, term) * inverse(term + 1)
       end do
    end subroutine expand
@@ -444,13 +449,27 @@ contains
       class(slider_layered_type), intent(inout) :: self
       real(wp), intent(in) :: time
 
+      call sum_series(size(self%state), self%terms, self%series, time, self%state)
+   end subroutine take_back
+
+   !> Values of many series at a time; four terms at once, to go through the values less often.
+   pure subroutine sum_series(number, terms, series, time, values)
+      !> Number of series, and of terms beyond the first
+      integer, intent(in) :: number, terms
+      real(wp), intent(in) :: series(number, 0:terms), time
+      real(wp), intent(out) :: values(number)
+
       integer :: term
 
-      self%state = self%series(:, :, self%terms)
-      do term = self%terms - 1, 0, -1
-         self%state = self%state * time + self%series(:, :, term)
+      values = series(:, terms)
+      do term = terms - 1, 3, -4
+         values = (((values * time + series(:, term)) * time + series(:, term - 1)) * time &
+            & + series(:, term - 2)) * time + series(:, term - 3)
       end do
-   end subroutine take_back
+      do term = modulo(terms, 4) - 1, 0, -1
+         values = values * time + series(:, term)
+      end do
+   end subroutine sum_series
 
    !> A step of CVODE, as a series from its start.
    subroutine step_cvode(self, end_time, step, ends)
@@ -530,7 +549,7 @@ contains
       y => FN_VGetArrayPointer(state)
       dy => FN_VGetArrayPointer(rate)
       allocate (acceleration(0:system%parameters%layers))
-      call accelerate(system, y(1::2), y(2::2), acceleration)
+      call accelerate(system, 1.0_wp, 0.0_wp, y(1::2), y(2::2), acceleration)
       call push(system, time, acceleration)
       dy(1::2) = y(2::2)
       dy(2::2) = acceleration
@@ -671,19 +690,29 @@ contains
       !> The motion, that of layer 1 relative to the base
       type(motion_type) :: motion
 
-      real(wp) :: step, drive, first, last, base
-      integer :: layers
+      real(wp) :: step, drive, first, last, base, first_velocity
+      integer :: layers, term
 
       layers = self%parameters%layers
       step = time - self%step_time
       drive = self%drive_at(time)
-      first = value_of(1, 1)
-      base = value_of(0, 1)
-      last = value_of(layers, 1)
+      ! All of them term by term: they do not wait for each other.
+      base = 0.0_wp
+      first = 0.0_wp
+      last = 0.0_wp
+      motion%base_velocity = 0.0_wp
+      first_velocity = 0.0_wp
+      motion%pulled_velocity = 0.0_wp
+      do term = self%terms, 0, -1
+         base = base * step + self%series(0, 1, term)
+         first = first * step + self%series(1, 1, term)
+         last = last * step + self%series(layers, 1, term)
+         motion%base_velocity = motion%base_velocity * step + self%series(0, 2, term)
+         first_velocity = first_velocity * step + self%series(1, 2, term)
+         motion%pulled_velocity = motion%pulled_velocity * step + self%series(layers, 2, term)
+      end do
       motion%time = time
-      motion%base_velocity = value_of(0, 2)
-      motion%pulled_velocity = value_of(layers, 2)
-      motion%velocity = value_of(1, 2) - motion%base_velocity
+      motion%velocity = first_velocity - motion%base_velocity
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + first - base
       motion%spring_force = self%system%spring * (drive - last)
@@ -691,22 +720,6 @@ contains
       motion%base_displacement = base
       motion%contact_force = self%system%law%stiffness * (first - base) - self%system%law%offset &
          & + self%system%law%drag * motion%velocity
-
-   contains
-
-      !> Displacement (1) or velocity (2) of the base (0) or of a layer.
-      pure function value_of(layer, kind) result(value)
-         integer, intent(in) :: layer, kind
-         real(wp) :: value
-
-         integer :: term
-
-         value = self%series(layer, kind, self%terms)
-         do term = self%terms - 1, 0, -1
-            value = value * step + self%series(layer, kind, term)
-         end do
-      end function value_of
-
    end function observe
 
    !> Displacements of the layers at a time of the last advance.

@@ -57,49 +57,40 @@ contains
 
       type(break_tree_type) :: tree
       type(error_type), allocatable :: error
-      real(wp) :: upper(count), lower(count), displacement
+      real(wp) :: coordinate(count), place
       integer :: step, contact, expected
       logical :: is_right
 
       call new_break_tree(tree, count, error)
-      upper = huge(1.0_wp)
-      lower = -huge(1.0_wp)
-      is_right = .not. allocated(error) .and. tree%upper() >= huge(1.0_wp)
+      coordinate = huge(1.0_wp)
+      is_right = .not. allocated(error) .and. tree%first() >= huge(1.0_wp)
       do step = 1, 4 * count + 50
          contact = 1 + int(deviate() * count)
          if (deviate() < 0.2_wp) then
-            upper(contact) = huge(1.0_wp)
-            lower(contact) = -huge(1.0_wp)
+            coordinate(contact) = huge(1.0_wp)
             call tree%remove(contact)
          else
             ! Few different values, so that some are equal.
-            upper(contact) = real(int(50.0_wp * deviate()), wp)
-            lower(contact) = upper(contact) - 30.0_wp
-            call tree%set(contact, upper(contact), lower(contact))
+            coordinate(contact) = real(int(50.0_wp * deviate()), wp)
+            call tree%set(contact, coordinate(contact))
          end if
-         is_right = is_right .and. .not. abs(tree%upper() - minval(upper)) > 0.0_wp
-         is_right = is_right .and. .not. abs(tree%lower() - maxval(lower)) > 0.0_wp
-         displacement = 60.0_wp * deviate() - 20.0_wp
+         is_right = is_right .and. .not. abs(tree%first() - minval(coordinate)) > 0.0_wp
+         place = 60.0_wp * deviate() - 20.0_wp
          expected = 0
-         if (minval(upper) <= displacement) then
-            expected = minloc(upper, dim=1)
-         else if (maxval(lower) >= displacement) then
-            expected = maxloc(lower, dim=1)
-         end if
-         is_right = is_right .and. tree%due(displacement) == expected
+         if (minval(coordinate) <= place) expected = minloc(coordinate, dim=1)
+         is_right = is_right .and. tree%due(place) == expected
       end do
       call check(is_right, "the first contact of a tree that changes")
 
       call tree%clear()
       do contact = 1, count
-         if (upper(contact) < huge(1.0_wp)) call tree%put(contact, upper(contact), lower(contact))
+         if (coordinate(contact) < huge(1.0_wp)) call tree%put(contact, coordinate(contact))
       end do
       call tree%arrange()
-      is_right = .not. (abs(tree%upper() - minval(upper)) > 0.0_wp &
-         & .or. abs(tree%lower() - maxval(lower)) > 0.0_wp)
-      displacement = minval(upper)
-      if (displacement < huge(1.0_wp)) is_right = is_right .and. &
-         & tree%due(displacement) == minloc(upper, dim=1)
+      place = minval(coordinate)
+      is_right = .not. abs(tree%first() - place) > 0.0_wp
+      if (place < huge(1.0_wp)) is_right = is_right .and. &
+         & tree%due(place) == minloc(coordinate, dim=1)
       call check(is_right, "the first contact of a tree made anew")
    end subroutine breaks_first
 

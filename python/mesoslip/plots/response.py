@@ -70,7 +70,7 @@ def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
             )
             place = min(place, experiment.time.size - 1)
             text = (
-                f"{stage.duration:.3g} s"
+                f"{stage.duration:.4g} s"
                 if stage.is_hold
                 else f"{abs(stage.velocity) * 1e6:.3g} µm/s"
             )

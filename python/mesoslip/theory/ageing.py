@@ -72,12 +72,12 @@ def mean_life(config: Config, velocity: float) -> float:
 
 
 def restart_peak(config: Config, velocity: float, hold: float) -> float:
-    """Greatest force when sliding at a velocity goes on after a hold, under a prescribed slider [N].
+    """Greatest force of a restart at the velocity before a hold, under a prescribed slider [N].
 
     Sliding at v leaves contacts whose displacements w since they attached are spread evenly up to
-    the life l of each. Held for so long, a contact would break after a life of L instead, at the age
-    of the hold and L/v; so at a displacement y from the restart those with w > L - y have broken, and
-    each has lost L of its stretch by now. In stretches x^ = f_s/k, per contact,
+    the life l of each. Held for so long, a contact would break after a life of L instead, at the
+    age of the hold and L/v; so at a displacement y from the restart those with w > L - y have
+    broken, and each has lost L of its stretch by now. In stretches x^ = f_s/k, per contact,
 
         F(y) = F(0) + y - <L max(0, y - (L - l))>/<l>,
 
@@ -110,9 +110,7 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
     # break: the greatest one is at one of them.
     order = np.argsort(held - life)
     start = (held - life)[order]
-    broken, moment = (
-        np.cumsum((weight * one)[order]) for one in (held, held * (held - life))
-    )
+    broken, moment = (np.cumsum((weight * one)[order]) for one in (held, held * (held - life)))
     force = start - (start * broken - moment) / mean
     steady = float(weight @ (back * life + life**2 / 2)) / mean
     return contacts.static_force * (steady + float(np.max(force)))

@@ -68,7 +68,7 @@ def main(sweep: Path, file: Path) -> None:
     for name, colour in zip(NAMES, COLOURS, strict=True):
         above.plot([], [], "o", color=colour, markersize=4, label=name)
     above.plot([], [], "_", color="black", label="mean force")
-    above.set(xscale="log", ylabel="peaks of the spring force / $F_s$")
+    above.set(ylabel="peaks of the spring force / $F_s$")
     above.legend()
     below.set(xlabel="velocity of the drive, µm/s", ylabel="amplitude / mean", yscale="log")
     figure.savefig(file, dpi=100)

@@ -7,12 +7,13 @@ import math
 import mesoslip
 import numpy as np
 import pytest
+from conftest import ROOT
 from kinds import KINDS, configuration
-from mesoslip import ConfigError
+from mesoslip import Config, ConfigError
 from mesoslip.output import layout
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import run_realizations
-from mesoslip.theory.ageing import mean_life, steady_force
+from mesoslip.theory.ageing import mean_life, restart_peak, steady_force
 from oracles import Contacts, aged, ageing_force, fixed_step, stationary_force
 from scipy import optimize
 from test_events import breaks
@@ -316,6 +317,60 @@ def test_restart_peak_grows_with_the_logarithm_of_the_hold(klein, engine):
     steps = np.diff(peaks)
     assert np.all(steps > 0.01)
     assert steps[-1] == pytest.approx(steps[-2], rel=0.1)
+
+
+@pytest.mark.parametrize(("growth", "width"), [(0.005, 0.1), (0.02, 0.1), (0.02, 0.2), (0.05, 0.1)])
+def test_restart_peak_is_that_of_its_formula(klein, growth, width):
+    """For N to infinity; between holds it grows by a little less than the thresholds do."""
+    holds = [1.0, 100.0]
+    stages = [{"duration": 0.2, "velocity": 1e-6}]
+    for hold in holds:
+        stages += [{"duration": hold, "velocity": 0.0}, {"duration": 0.1, "velocity": 1e-6}]
+    config = klein(
+        **PRESCRIBED,
+        run__engine="me",
+        run__resolution=0.1,
+        run__duration=None,
+        drive={"stage": stages},
+        output__interval=1e-2,
+        contacts__delay=0.0,
+        contacts__initial="steady",
+        contacts__threshold__relative_width=width,
+        contacts__ageing=LOG | {"time": 1e-3, "growth": growth},
+    )
+    stages = mesoslip.run(config)["stages"].to_dataset()
+    peaks = stages["greatest_force"].values[[2, 4]]
+    steady_sliding = steady_force(config, 1e-6)
+    expected = np.array([restart_peak(config, 1e-6, hold) for hold in holds])
+    assert restart_peak(config, 1e-6, 0.0) == pytest.approx(steady_sliding, rel=1e-9)
+    np.testing.assert_allclose(
+        peaks - steady_sliding, expected - steady_sliding, rtol=0.02, atol=2e-4 * STATIC
+    )
+    slope = np.diff(expected)[0] / STATIC / math.log(holds[1] / holds[0])
+    assert 0.93 * growth < slope < 1.05 * growth
+
+
+@pytest.mark.parametrize("name", ["velocity-step", "slide-hold-slide", "steady-force"])
+def test_ready_runs_run(name):
+    """With few contacts, up to their second change of the drive."""
+    config = Config.load(ROOT / "runs" / f"{name}.toml")
+    stages = config.drive_parts
+    short = sum(one.duration for one in stages[:2]) + 0.5 * stages[2].duration
+    # The last stage does not go on.
+    assert config.duration == pytest.approx(config.drive.length)
+    config = Config.load(
+        ROOT / "runs" / f"{name}.toml",
+        [
+            "contacts.count=200",
+            "run.realizations=1",
+            f"run.duration={short}",
+            f"output.interval={4 * config.output_interval}",
+        ],
+    )
+    tree = mesoslip.run(config)
+    assert abs(float(tree["energy_residual"][0])) < 1e-10
+    found = mesoslip.response(tree, fit=False)
+    assert found["steady"].to_dataset().sizes["velocity_stage"] >= 2
 
 
 @pytest.mark.parametrize(

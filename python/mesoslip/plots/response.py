@@ -23,6 +23,8 @@ MOST_DOTS = 20_000
 # Changes of the drive that are marked, and stages that are told above them.
 MOST_MARKS = 200
 MOST_LABELS = 12
+# Least distance of two labels, as a part of the width.
+LABEL_WIDTH = 0.03
 
 
 def _draw_record(axes: Axes, experiment: Experiment) -> None:
@@ -62,6 +64,8 @@ def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
     """The velocity of each stage, or how long the drive stands, above the record."""
     if len(experiment.stages) > MOST_LABELS:
         return
+    apart = LABEL_WIDTH * float(np.ptp(experiment.drive))
+    last = -math.inf
     for stage in experiment.stages:
         inside = experiment.samples(stage)
         if stage.is_hold or stage.is_steady:
@@ -69,8 +73,12 @@ def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
                 experiment.at_start(stage) if stage.is_hold else (inside.start + inside.stop) // 2
             )
             place = min(place, experiment.time.size - 1)
+            # Those of short stages would lie over each other.
+            if abs(experiment.drive[place] - last) < apart:
+                continue
+            last = float(experiment.drive[place])
             text = (
-                f"{stage.duration:.3g} s"
+                f"{stage.duration:.4g} s"
                 if stage.is_hold
                 else f"{abs(stage.velocity) * 1e6:.3g} µm/s"
             )

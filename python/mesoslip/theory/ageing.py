@@ -71,6 +71,51 @@ def mean_life(config: Config, velocity: float) -> float:
     return velocity * float(weight @ _lives(config, threshold, velocity / stretch))
 
 
+def restart_peak(config: Config, velocity: float, hold: float) -> float:
+    """Greatest force of a restart at the velocity before a hold, under a prescribed slider [N].
+
+    Sliding at v leaves contacts whose displacements w since they attached are spread evenly up to
+    the life l of each. Held for so long, a contact would break after a life of L instead, at the
+    age of the hold and L/v; so at a displacement y from the restart those with w > L - y have
+    broken, and each has lost L of its stretch by now. In stretches x^ = f_s/k, per contact,
+
+        F(y) = F(0) + y - <L max(0, y - (L - l))>/<l>,
+
+    whose greatest value is where <L; L - l < y> = <l>. It is exact for infinitely many contacts
+    without delay that do not weaken, as long as those that attach after the restart bear on to
+    the peak: while it comes within the shortest lives.
+
+    Parameters
+    ----------
+    config
+        A configuration with contacts that age.
+    velocity
+        Positive [m/s], before the hold and after it.
+    hold
+        Time for which the slider stands [s].
+
+    Returns
+    -------
+    float
+        The force [N].
+    """
+    contacts = config.contacts
+    weight, threshold = _thresholds(config)
+    back = contacts.back_force_ratio
+    speed = velocity / contacts.break_stretch
+    life = speed * _lives(config, threshold, speed)
+    held = speed * _lives(config, threshold, speed, hold)
+    mean = float(weight @ life)
+    # The force is concave in y, and straight between the displacements at which contacts start to
+    # break: the greatest one is at one of them.
+    order = np.argsort(held - life)
+    start = (held - life)[order]
+    broken, moment = (np.cumsum((weight * one)[order]) for one in (held, held * (held - life)))
+    force = start - (start * broken - moment) / mean
+    steady = float(weight @ (back * life + life**2 / 2)) / mean
+    return contacts.static_force * (steady + float(np.max(force)))
+
+
 def _thresholds(config: Config) -> tuple[Array, Array]:
     """Weights and points of a rule over the configured thresholds, relative to the mean."""
     contacts = config.contacts
@@ -93,13 +138,16 @@ def _threshold(config: Config, configured: Array, age: float | Array) -> Array:
     return config.contacts.ageing.threshold(configured, width, age)
 
 
-def _lives(config: Config, configured: Array, speed: float) -> Array:
-    """Times T at which contacts break whose forces grow by f_s times a speed in a second [s]."""
+def _lives(config: Config, configured: Array, speed: float, older: float = 0.0) -> Array:
+    """Times T at which contacts break whose forces grow by f_s times a speed in a second [s].
+
+    They are older than that by a time in which they were held.
+    """
     back = config.contacts.back_force_ratio
 
     # Thresholds are concave in time where they grow, and fall otherwise: there is one solution.
     def gap(time: Array, threshold: Array) -> Array:
-        return _threshold(config, threshold, time) - back - speed * time
+        return _threshold(config, threshold, older + time) - back - speed * time
 
     longest = np.ones_like(configured) / speed
     while np.any(gap(longest, configured) > 0):

@@ -42,17 +42,24 @@ class Range(Table):
     """Values from one to another."""
 
     from_: Annotated[Any, Field(alias="from")]
+    """First value."""
     to: Any
+    """Last value."""
     points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
+    """Number of values, both ends among them."""
     spacing: Literal["linear", "logarithmic"] = "linear"
+    """How values are spaced."""
 
 
 class Extent(Table):
     """Where a Latin hypercube takes the values of a key from."""
 
     from_: Annotated[Any, Field(alias="from")]
+    """Least value."""
     to: Any
+    """Greatest value."""
     spacing: Literal["linear", "logarithmic"] = "linear"
+    """How values are spread."""
 
 
 class SweepTable(Table):

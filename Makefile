@@ -36,7 +36,7 @@ export UV_COMPILE_BYTECODE := 1
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
-	@printf '\nWhat uses what, from left to right (README, "Develop", tells what to touch to add something):\n'
+	@printf '\nWhat uses what, from left to right (docs/architecture.md tells what to touch to add something):\n'
 	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
 	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign and reports, command_line\n' | expand -t 16
 

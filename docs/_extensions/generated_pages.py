@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import mesoslip
 from command_reference import command_page
 from configuration_reference import configuration_page
 from fortran_reference import fortran_page
@@ -30,10 +31,16 @@ def write_pages(folder: Path) -> None:
 
 
 def _on_start(app: Any) -> None:
-    write_pages(Path(app.srcdir) / FOLDER)
+    folder = Path(app.srcdir)
+    write_pages(folder / FOLDER)
+    # What the scripts of the gallery start from.
+    start = folder / "gallery" / "klein.toml"
+    start.unlink(missing_ok=True)
+    mesoslip.example("klein", start)
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Write the pages before any is read."""
-    app.connect("builder-inited", _on_start)
+    # The gallery runs at the same event, later.
+    app.connect("builder-inited", _on_start, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -30,4 +30,4 @@ axes.legend()
 # %%
 # A spring stiffer than this would hold the slider at any time.
 
-print(f"K* = {curve.K_star:.4g} N/m; the spring has {config.spring_stiffness:g} N/m")
+print(f"K* = {curve.K_star[0]:.4g} N/m; the spring has {config.spring_stiffness:g} N/m")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
+
+from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_extensions"))
@@ -27,9 +30,8 @@ extensions = [
     "generated_pages",
     "mathml",
 ]
-exclude_patterns = ["_build", "gallery/README*", "examples/**/*.ipynb", "examples/**/*.py"]
-# Links of pages that are also read in the repository.
-suppress_warnings = ["toc.empty_glob", "config.cache"]
+exclude_patterns = ["_extensions", "gallery"]
+suppress_warnings = ["config.cache"]
 
 # What names of other projects mean is not looked up: that takes a network.
 nitpicky = True
@@ -64,3 +66,19 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "plot_gallery": True,
 }
+
+
+def _pages_that_are_there(app: Sphinx, name: str, source: list[str]) -> None:
+    """Leave out lines such as ``fit*`` of the front page's lists where there is no such page."""
+    if name == "index":
+        folder = Path(app.srcdir)
+        source[0] = "\n".join(
+            line
+            for line in source[0].splitlines()
+            if not re.fullmatch(r"[\w/-]+\*", line) or list(folder.glob(f"{line}.md"))
+        )
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what is done while pages are read."""
+    app.connect("source-read", _pages_that_are_there)

@@ -9,7 +9,7 @@ from mesoslip.output.variables import Group
 INTRODUCTION = """\
 # Output
 
-Outputs are netCDF-4 files, with CF and ACDD attributes; [xarray](../how-to/read-an-output.md) opens them,
+Outputs are netCDF-4 files, with CF and ACDD attributes; [xarray](../../how-to/read-an-output.md) opens them,
 as does anything else that reads netCDF. Every variable has units. This page is made from the table that
 `mesoslip` writes outputs by; an output has those that its slider, contacts and keys bring about.
 

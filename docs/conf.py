@@ -64,7 +64,8 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "show_signature": False,
     "download_all_examples": False,
-    "plot_gallery": True,
+    "write_computation_times": False,
+    "ignore_repr_types": r"matplotlib",
 }
 
 

@@ -24,9 +24,9 @@ INTRODUCTION = """\
 # Configuration
 
 A run is described by a TOML file. Quantities are texts of one number and one unit (`"97 N/m"`,
-`"0.5 ms"`), or plain numbers in the unit of this page; a unit of another dimension is an error, and so
-is a key that there is not. `base = "klein.toml"` at the top of a file lays it over another one, beside
-it. On the command line `--set contacts.delay=1ms` changes one key.
+`"0.5 ms"`), or plain numbers in the unit of this page; a unit of another dimension is an error,
+and so is a key that there is not. `base = "klein.toml"` at the top of a file lays it over another
+one, beside it. On the command line `--set contacts.delay=1ms` changes one key.
 
 This page is made from the tables that check configurations.
 """
@@ -127,9 +127,7 @@ def _tables_of_config(table: type[Table]) -> set[str]:
     """The tables of a whole configuration, each of which says what it is."""
     if table is not Config:
         return set()
-    return {
-        name for name, field in table.model_fields.items() if list(tables_in(field.annotation))
-    }
+    return {name for name, field in table.model_fields.items() if list(tables_in(field.annotation))}
 
 
 def _metadata(annotation: Any) -> Iterator[Any]:
@@ -195,7 +193,9 @@ def _takes(field: FieldInfo) -> str:
 
 def _types(annotation: Any) -> set[Any]:
     parts = get_args(annotation)
-    return {annotation}.union(*(_types(one) for one in parts if isinstance(one, type) or get_args(one)))
+    return {annotation}.union(
+        *(_types(one) for one in parts if isinstance(one, type) or get_args(one))
+    )
 
 
 def _choices(field: FieldInfo, bare: Any) -> tuple[str, ...]:
@@ -232,5 +232,3 @@ def _number(value: float) -> str:
     if isinstance(value, int) and value > 1 and value & (value - 1) == 0 and value > 1024:
         return f"2^{value.bit_length() - 1}"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-

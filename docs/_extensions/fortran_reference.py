@@ -18,9 +18,9 @@ INTRODUCTION = """\
 # Fortran library
 
 The kernel is a Fortran library that Python is one user of. Modules are named after their path:
-`fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. This page has what they make public, from the comments
-of the sources. What can fail has an allocatable `type(error_type)` as its last argument; unallocated
-means success, and the library never stops the program.
+`fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. This page has what they make public, from
+the comments of the sources. What can fail has an allocatable `type(error_type)` as its last
+argument; unallocated means success, and the library never stops the program.
 """
 
 MODULE = re.compile(r"module (?!procedure)(\w+)")
@@ -124,7 +124,9 @@ def _begun(module: Module, statement: str, comment: str, is_interface: bool) -> 
         begun = Entity(*procedure, statement, comment)
     else:
         if "parameter" in statement and "::" in statement:
-            for name, value in re.findall(r"(\w+) *= *([^,\[]+|\[[^\]]*\])", statement.split("::")[1]):
+            for name, value in re.findall(
+                r"(\w+) *= *([^,\[]+|\[[^\]]*\])", statement.split("::")[1]
+            ):
                 module.constants[name] = (value.strip(), comment)
         return None
     if not is_interface or begun.name not in module.entities:

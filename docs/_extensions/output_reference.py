@@ -9,17 +9,19 @@ from mesoslip.output.variables import Group
 INTRODUCTION = """\
 # Output
 
-Outputs are netCDF-4 files, with CF and ACDD attributes; [xarray](../../how-to/read-an-output.md) opens them,
-as does anything else that reads netCDF. Every variable has units. This page is made from the table that
-`mesoslip` writes outputs by; an output has those that its slider, contacts and keys bring about.
+Outputs are netCDF-4 files, with CF and ACDD attributes; [xarray](../../how-to/read-an-output.md)
+opens them, as does anything else that reads netCDF. Every variable has units. This page is made
+from the table that `mesoslip` writes outputs by; an output has those that its slider, contacts
+and keys bring about.
 
-Catalogues (slips, stages, avalanches, snapshots, finer traces) are CF's *indexed ragged arrays*: rows of
-all realizations one after another, each with its `realization_index`. What has not been recorded, as
-after the end of a realization that was over before the others, is NaN.
+Catalogues (slips, stages, avalanches, snapshots, finer traces) are CF's *indexed ragged arrays*:
+rows of all realizations one after another, each with its `realization_index`. What has not been
+recorded, as after the end of a realization that was over before the others, is NaN.
 
-Attributes of the root tell the whole configuration (`configuration`, TOML with plain SI numbers) and
-what it was laid over (`base_configuration`), `seed`, versions of program, compiler and libraries, counts
-of events, `energy_residual`, `ending`, and the wall time. `mesoslip run OUT.nc` repeats the run of an output.
+Attributes of the root tell the whole configuration (`configuration`, TOML with plain SI numbers)
+and what it was laid over (`base_configuration`), `seed`, versions of program, compiler and
+libraries, counts of events, `energy_residual`, `ending`, and the wall time. `mesoslip run OUT.nc`
+repeats the run of an output.
 """
 
 # Groups in the order in which they are told: name, dimensions, what it is.
@@ -28,13 +30,14 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "Root: all else",
         Group({k: v for k, v in variables.ROOT.items() if k not in variables.TRACE}),
-        "Coordinates, numbers of each realization, and traces of layers (`realization`, `time`, `layer`).",
+        "Coordinates, numbers of each realization, and traces of layers (`realization`, `time`, "
+        "`layer`).",
     ),
     (
         "Group slips",
         variables.SLIPS,
-        "Dimension `slip`. A slip is a time in which contacts break and the block travels by more than "
-        "it rings.",
+        "Dimension `slip`. A slip is a time in which contacts break and the block travels by more "
+        "than it rings.",
     ),
     ("Group stages", variables.STAGES, "Dimension `stage`: what each stage of the drive came to."),
     (
@@ -52,7 +55,8 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "mesoslip curve: root",
         variables.CURVE,
-        "Dimension `displacement`. Attributes: `K_star`, `X_c`, `F_peak`, `F_steady`, `D0` to `D3`, `stable`.",
+        "Dimension `displacement`. Attributes: `K_star`, `X_c`, `F_peak`, `F_steady`, `D0` to `D3`, "
+        "`stable`.",
     ),
     (
         "mesoslip curve: group critical",
@@ -72,7 +76,14 @@ def output_page() -> str:
     """All groups with their variables."""
     parts = [INTRODUCTION]
     for title, group, what in GROUPS:
-        parts += [f"## {title}", "", what, "", "| variable | units | type | meaning |", "|---|---|---|---|"]
+        parts += [
+            f"## {title}",
+            "",
+            what,
+            "",
+            "| variable | units | type | meaning |",
+            "|---|---|---|---|",
+        ]
         for name, meaning in group.items():
             kind = str(np.dtype(meaning.dtype))
             if meaning.is_fractional:

@@ -11,7 +11,9 @@ import mesoslip
 import numpy as np
 
 config = mesoslip.Config.load("klein.toml").replace(
-    "contacts.coupling=equal", "contacts.back_force_ratio=0", "contacts.threshold.relative_width=0.2"
+    "contacts.coupling=equal",
+    "contacts.back_force_ratio=0",
+    "contacts.threshold.relative_width=0.2",
 )
 curve = mesoslip.ForceCurve(config)
 stretch = config.contacts.break_stretch

@@ -33,6 +33,6 @@ print(data["regime"].isel(realization=0).to_pandas())
 # %%
 # The dataset is xarray's, and so are its pictures.
 
-(1e6 * data["mean_force"].isel(realization=0)).plot.line(
+_ = (1e6 * data["mean_force"].isel(realization=0)).plot.line(
     x="slider.stiffness", hue="contacts.delay", marker="o", xscale="log"
 )

@@ -66,6 +66,9 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "write_computation_times": False,
     "ignore_repr_types": r"matplotlib",
+    "image_scrapers": ("matplotlib", "figure_scraper.figure_of_block"),
+    # They are drawn by the program, which may have changed.
+    "run_stale_examples": True,
 }
 
 
@@ -80,6 +83,15 @@ def _pages_that_are_there(app: Sphinx, name: str, source: list[str]) -> None:
         )
 
 
+def _property_as_text(
+    _app: Sphinx, what: str, _name: str, _object: object, _options: object, lines: list[str]
+) -> None:
+    """Keep napoleon from taking what stands before a colon for the type of a property."""
+    if what == "property":
+        lines.insert(0, "")
+
+
 def setup(app: Sphinx) -> None:
     """Connect what is done while pages are read."""
+    app.connect("autodoc-process-docstring", _property_as_text, priority=100)
     app.connect("source-read", _pages_that_are_there)

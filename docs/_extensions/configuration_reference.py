@@ -87,7 +87,7 @@ def _rows(table: type[Table], title: str) -> Iterator[str]:
             f"`{field.alias or name}`",
             _unit(field),
             _default(field),
-            "a table" if is_of_tables else _takes(field),
+            _table_or_tables(field) if is_of_tables else _takes(field),
             documented[name],
         )
         yield "| " + " | ".join(cells) + " |"
@@ -136,6 +136,10 @@ def _metadata(annotation: Any) -> Iterator[Any]:
         if part is not ... and not isinstance(part, str):
             yield from _metadata(part)
     yield from getattr(annotation, "__metadata__", ())
+
+
+def _table_or_tables(field: FieldInfo) -> str:
+    return "tables" if get_origin(_bare(field)) is tuple else "a table"
 
 
 def _all_metadata(field: FieldInfo) -> list[Any]:
@@ -188,7 +192,9 @@ def _takes(field: FieldInfo) -> str:
         return "texts" if is_list else "a text"
     if int in _types(bare):
         text = f"whole, {text}" if text else "whole"
-    return f"a list, each {text}" if is_list and text else "a list" if is_list else text
+    if is_list:
+        return f"a list, each {text}" if text else "a list"
+    return text or "any"
 
 
 def _types(annotation: Any) -> set[Any]:
@@ -223,12 +229,7 @@ def _limits(field: FieldInfo) -> str:
             (annotated_types.Lt, "lt", "<"),
             (annotated_types.Le, "le", "≤"),
         ):
-            if isinstance(one, kind):
-                shown.append(f"{sign} {_number(getattr(one, name))}")
+            # What is beyond what anybody asks for is only there to keep integers whole.
+            if isinstance(one, kind) and getattr(one, name) < 2**31:
+                shown.append(f"{sign} {getattr(one, name):g}")
     return ", ".join(shown)
-
-
-def _number(value: float) -> str:
-    if isinstance(value, int) and value > 1 and value & (value - 1) == 0 and value > 1024:
-        return f"2^{value.bit_length() - 1}"
-    return f"{value:g}" if isinstance(value, float) else str(value)

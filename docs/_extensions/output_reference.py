@@ -55,8 +55,8 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "mesoslip curve: root",
         variables.CURVE,
-        "Dimension `displacement`. Attributes: `K_star`, `X_c`, `F_peak`, `F_steady`, `D0` to `D3`, "
-        "`stable`.",
+        "Dimension `displacement`. Attributes: `K_star`, `X_c`, `F_peak`, `F_steady`, `D0` to "
+        "`D3`, `stable`.",
     ),
     (
         "mesoslip curve: group critical",

@@ -2,8 +2,8 @@
 A map of regimes
 ================
 
-A sweep over two keys, and what each run shows. More realizations and finer axes are a matter of
-two numbers; see the page on campaigns.
+A sweep over two keys, and what each run shows: 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
+More realizations and finer axes are a matter of two numbers; see the page on campaigns.
 """
 
 import mesoslip
@@ -33,6 +33,8 @@ print(data["regime"].isel(realization=0).to_pandas())
 # %%
 # The dataset is xarray's, and so are its pictures.
 
-_ = (1e6 * data["mean_force"].isel(realization=0)).plot.line(
-    x="slider.stiffness", hue="contacts.delay", marker="o", xscale="log"
+_ = (
+    data["mean_force"]
+    .isel(realization=0)
+    .plot.line(x="slider.stiffness", hue="contacts.delay", marker="o", xscale="log")
 )

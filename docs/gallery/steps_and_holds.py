@@ -35,4 +35,6 @@ mesoslip.plot(tree, view="response")
 # %%
 # What each stage came to.
 
-mesoslip.response(tree, fit=False)["steady"].to_dataset()
+steady = mesoslip.response(tree, fit=False)["steady"].to_dataset()
+columns = ["stage_number", "velocity", "steady_force", "steady_force_error", "is_steady"]
+steady[columns].to_dataframe()

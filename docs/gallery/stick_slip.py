@@ -16,7 +16,8 @@ mesoslip.plot(tree)
 # is in the catalogue.
 
 slips = mesoslip.slips(tree)
-slips[["start_time", "force_before", "force_drop", "contacts_broken"]].to_dataframe().head()
+columns = ["start_time", "force_before", "force_drop", "contacts_broken"]
+slips[columns].to_dataframe().head()
 
 # %%
 # One slip in close-up.

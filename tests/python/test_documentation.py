@@ -1,7 +1,7 @@
 """What README and documentation tell to type is typed: Python, TOML, and commands, page by page.
 
-Blocks are gone through as a reader does, in a folder of their own. A TOML block whose first line is
-a comment with a file's name is that file. A block after the comment ``not run: reason`` is left out.
+Blocks are gone through as a reader does, in a folder of their own. A TOML block whose first line
+is a comment with a file's name is that file. A block after ``not run: reason`` is left out.
 """
 
 from __future__ import annotations

@@ -336,7 +336,7 @@ class Drive(Table):
     velocity: Velocity | None = None
     """One velocity for the whole run."""
     stage: tuple[Stage, ...] | None = None
-    """Stages one after another, as [[drive.stage]] tables."""
+    """Stages one after another, as `[[drive.stage]]` tables."""
     repeat: Annotated[Whole, Field(ge=1, le=MOST_PARTS)] | None = None
     """How often the list of stages is gone through."""
     cycle: Cycle | None = None

@@ -2,14 +2,16 @@
 What the delay does
 ===================
 
-Without a delay before a broken contact attaches again, sliding becomes smooth; with a long one it
-sticks and slips. Stiffness and thresholds are the same.
+Without a delay before a broken contact attaches again, slips die away and sliding becomes smooth;
+with a long one it sticks and slips. Stiffness and thresholds are the same.
 """
 
 import matplotlib.pyplot as plt
 import mesoslip
 
-klein = mesoslip.Config.load("klein.toml").replace("run.duration=6 s", "contacts.count=1000")
+klein = mesoslip.Config.load("klein.toml").replace(
+    "run.duration=20 s", "contacts.count=1000", "contacts.threshold.relative_width=0.05"
+)
 figure, panels = plt.subplots(3, 1, sharex=True, figsize=(6.4, 6.4), layout="constrained")
 for panel, delay in zip(panels, ["0 s", "0.5 ms", "5 ms"], strict=True):
     tree = mesoslip.run(klein.replace({"contacts.delay": delay}))

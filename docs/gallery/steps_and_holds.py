@@ -2,8 +2,8 @@
 Velocity steps and holds
 ========================
 
-The tests of rate-and-state friction on a smooth slider: what the force does after a step of the
-velocity, and after a hold.
+Contacts that grow stronger with the logarithm of their age behave as rate-and-state friction says:
+less force at a higher velocity, and a peak after a hold. The red line is the law that fits.
 """
 
 import mesoslip
@@ -11,20 +11,21 @@ import mesoslip
 config = mesoslip.Config.load("klein.toml").replace(
     {
         "slider.kind": "prescribed",
-        "contacts.count": 2000,
-        "contacts.delay": "50 ms",
-        "contacts.threshold.relative_width": 0.3,
+        "contacts.coupling": "equal",
+        "contacts.back_force_ratio": 0.0,
         "contacts.initial": "steady",
+        "contacts.threshold": {"law": "weibull", "relative_width": 0.7},
+        "contacts.ageing": {"law": "log", "time": "1 ms", "growth": 0.1},
         "run.engine": "me",
         "run.duration": None,
         "output.interval": "5 ms",
         "drive": {
             "stage": [
-                {"velocity": "0.1 um/s", "duration": "1 s"},
-                {"velocity": "1 um/s", "duration": "0.5 s"},
-                {"velocity": "0.1 um/s", "duration": "1 s"},
-                {"hold": True, "duration": "1 s"},
-                {"velocity": "0.1 um/s", "duration": "1 s"},
+                {"velocity": "0.1 um/s", "duration": "2 s"},
+                {"velocity": "1 um/s", "duration": "0.2 s"},
+                {"velocity": "0.1 um/s", "duration": "2 s"},
+                {"hold": True, "duration": "2 s"},
+                {"velocity": "0.1 um/s", "duration": "2 s"},
             ]
         },
     }
@@ -33,7 +34,7 @@ tree = mesoslip.run(config)
 mesoslip.plot(tree, view="response")
 
 # %%
-# What each stage came to.
+# What the steady stages came to.
 
 steady = mesoslip.response(tree, fit=False)["steady"].to_dataset()
 columns = ["stage_number", "velocity", "steady_force", "steady_force_error", "is_steady"]

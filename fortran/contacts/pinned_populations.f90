@@ -353,8 +353,9 @@ contains
       real(wp), intent(out) :: late, onset
 
       real(wp) :: moments(moments_length), loss(moments_length), distance, force, broken, next
-      real(wp) :: most, edge, start
-      integer :: place, row
+      real(wp) :: most, edge, start, gap
+      integer :: place, row, trial, listed
+      logical :: breaks
 
       start = before%displacement
       row = merge(row_ahead, row_behind, sense > 0.0_wp)
@@ -363,7 +364,6 @@ contains
       most = 0.0_wp
       onset = displacement
       edge = sense * start + tiny_gap * self%step
-      self%trial%count = 0
       if (allocated(self%trial%population)) then
          if (size(self%trial%population) < self%count) then
             deallocate (self%trial%population, self%trial%broken, self%trial%moments, &
@@ -382,12 +382,18 @@ contains
       self%trial%breaks = 0.0_wp
       self%trial%mass = 0.0_wp
       self%trial%work = 0.0_wp
+      ! Which ones break is as good as random: they are listed without a branch. Contacts whose
+      ! thresholds fall may break while the slider rests.
+      listed = 0
       do place = 1, self%count
-         if (sense * (self%population(place, row) - displacement) >= 0.0_wp &
-            & .and. .not. falls_at_rest(place)) then
-            next = min(next, sense * self%population(place, row))
-            cycle
-         end if
+         gap = sense * (self%population(place, row) - displacement)
+         breaks = gap < 0.0_wp .or. (self%some_fall .and. .not. gap > 0.0_wp)
+         self%trial%population(listed + 1) = place
+         listed = listed + merge(1, 0, breaks)
+         next = min(next, merge(huge(1.0_wp), sense * self%population(place, row), breaks))
+      end do
+      do trial = 1, listed
+         place = self%trial%population(trial)
          force = sense * self%population(place, row_force)
          distance = sense * (displacement - self%population(place, row_origin)) / self%stretch
          if (self%ages) then
@@ -397,22 +403,21 @@ contains
             broken = max(self%population(place, row_broken), &
                & broken_threshold(self%parameters%coupling, force, distance))
          end if
-         call self%moments(nint(self%population(place, row_law)))%interpolate(broken, moments)
+         call self%moments(int(self%population(place, row_law)))%interpolate(broken, moments)
          moments = min(self%population(place, row_weight) * moments, &
             & self%population(place, row_moments + 1:))
          loss = self%population(place, row_moments + 1:) - moments
-         self%trial%count = self%trial%count + 1
-         self%trial%population(self%trial%count) = place
-         self%trial%broken(self%trial%count) = broken
-         self%trial%moments(:, self%trial%count) = moments
-         self%trial%lost(self%trial%count) = loss(lost)
-         if (self%ages) self%trial%lost(self%trial%count) = loss(lost) + loss(number) &
+         self%trial%population(trial) = place
+         self%trial%broken(trial) = broken
+         self%trial%moments(:, trial) = moments
+         self%trial%lost(trial) = loss(lost)
+         if (self%ages) self%trial%lost(trial) = loss(lost) + loss(number) &
             & * more_lost(place, broken, distance + force)
          self%trial%breaks = self%trial%breaks + loss(number)
          self%trial%mass = self%trial%mass + loss(massive)
          self%trial%work = self%trial%work + 0.5_wp * (loss(stiff) * distance**2 &
             & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 &
-            & - self%trial%lost(self%trial%count))
+            & - self%trial%lost(trial))
          if (sense * self%population(place, row) > edge) then
             late = late + loss(number)
             if (loss(number) > most) then
@@ -421,6 +426,7 @@ contains
             end if
          end if
       end do
+      self%trial%count = listed
       self%trial%work = self%trial%work * self%parameters%static_force * self%stretch
       self%trial%next = sense * next
       if (self%trial%count == 0) then
@@ -429,17 +435,6 @@ contains
       end if
 
    contains
-
-      !> Whether contacts of a population may break while the slider rests.
-      pure function falls_at_rest(population)
-         integer, intent(in) :: population
-         logical :: falls_at_rest
-
-         falls_at_rest = .false.
-         if (self%some_fall) then
-            falls_at_rest = .not. sense * (self%population(population, row) - displacement) > 0.0_wp
-         end if
-      end function falls_at_rest
 
       !> Energy of the contacts of a population that break on the way, beyond that of their
       !> configured thresholds: twice that of each of them in the mean, if on the way the force at

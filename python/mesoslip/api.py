@@ -557,10 +557,15 @@ def report(
     from mesoslip.reports.page import write
 
     with ExitStack() as stack:
-        trees, names = _opened(_several(output), stack)
-        paths = [Path(name) for name in names]
-        stems = [path.stem for path in paths]
-        short = stems if len(set(stems)) == len(stems) else names
+        outputs = _several(output)
+        trees, names = _opened(outputs, stack)
+        stems = [
+            Path(name).stem if isinstance(one, str | os.PathLike) else name
+            for name, one in zip(names, outputs, strict=True)
+        ]
+        numbered = [f"{name} ({number})" for number, name in enumerate(names, 1)]
+        # The shortest by which they can be told apart.
+        short = next(one for one in (stems, names, numbered) if len(set(one)) == len(one))
         write([Subject(*one) for one in zip(short, trees, strict=True)], Path(file))
 
 

@@ -13,6 +13,9 @@ program test_slider_rigid
    call climbs(1.0e-6_wp)
    call climbs(2.0e-4_wp)
    call climbs(8.0e-3_wp)
+   call damps(2.0e-4_wp)
+   call damps(8.0e-3_wp)
+   call damps(1.0_wp)
    call turns_short_of_crossing()
    call stays_at_rest()
    call finish()
@@ -99,6 +102,34 @@ contains
       call check_close(slider%drive_work(), slider%energy(), 1.0e-13_wp, &
          & "energy over all crossings")
    end subroutine climbs
+
+   !> The damper leaves the momentum to block and damper alike: M (V + W) is the impulse of the
+   !> drive, its work over its velocity. What the damper takes of the energy is its loss.
+   subroutine damps(rung)
+      !> Way from one crossing to the next; it settles whether steps are short or long
+      real(wp), intent(in) :: rung
+
+      real(wp), parameter :: mass = 2.0_wp, damping = 1.3_wp
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      integer :: crossing
+
+      slider = slider_rigid_type(mass=mass, stiffness=mass * frequency**2, damping=damping)
+      call slider%start(law)
+      call slider%drive(drive_velocity, 0.0_wp)
+      window%end_time = 10.0_wp
+      do crossing = 1, int(1.5_wp / rung)
+         window%upper = crossing * rung
+         do while (slider%displacement < window%upper)
+            call slider%advance(law, window)
+         end do
+      end do
+      call check_close(mass * (2.0_wp * slider%velocity - slider%damper / damping), &
+         & slider%drive_work() / drive_velocity, 1.0e-12_wp, "momentum of block and damper")
+      call check_close(slider%energy() + slider%damping_loss%total(), slider%drive_work(), &
+         & 1.0e-12_wp, "energy with a damper")
+   end subroutine damps
 
    !> An oscillation of amplitude 1 about 0 stays inside a window slightly wider, and meets one
    !> slightly narrower, on either side.

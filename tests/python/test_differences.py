@@ -73,10 +73,19 @@ def test_a_base_that_cannot_be_run_by_itself_is_none(tmp_path):
     assert mesoslip.Config.load(tmp_path / "whole.toml").base is None
 
 
-def test_an_output_tells_what_its_run_changes():
-    config = mesoslip.Config.load(KLEIN, ["run.duration=1 ms", "contacts.count=10"])
+def test_an_output_tells_what_its_run_changes(tmp_path, command):
+    config = mesoslip.Config.load(KLEIN, ["run.duration=1 ms", "output.interval=1 ms"])
     tree = mesoslip.run(config)
     assert mesoslip.Config.from_toml(tree.attrs["base_configuration"]) == config.base
+    # Also when it is run again, unless something is changed then.
+    first, again, other = (tmp_path / f"{name}.nc" for name in ("first", "again", "other"))
+    changes = ("--set", "run.duration=1 ms", "--set", "output.interval=1 ms")
+    assert command("run", KLEIN, "-o", first, "--quiet", *changes)[0] == 0
+    assert command("run", first, "-o", again, "--quiet")[0] == 0
+    assert command("run", first, "-o", other, "--quiet", "--set", "run.seed=2")[0] == 0
+    bases = [mesoslip.read(path).attrs["base_configuration"] for path in (first, again, other)]
+    assert bases[0] == bases[1] == tree.attrs["base_configuration"]
+    assert bases[2] == tree.attrs["configuration"]
 
 
 def test_labels_name_what_differs(klein):

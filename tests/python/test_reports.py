@@ -60,6 +60,10 @@ def written(outputs, path):
     assert all(one.startswith(("#", "data:")) for one in page.asked)
     assert not re.search(r"url\((?!#)", text)
     assert "@import" not in text
+    # Pictures do not share the names of their parts.
+    parts = re.findall(r'<clipPath id="([^"]+)"', text)
+    assert len(parts) == len(set(parts))
+    assert set(re.findall(r'clip-path="url\(#([^)]+)\)"', text)) <= set(parts)
     return text, page
 
 

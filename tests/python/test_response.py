@@ -106,11 +106,12 @@ HOLDS = (
 
 
 @pytest.mark.parametrize(
-    ("realizations", "count", "repeat"), [(1, 1000, 0.9), (4, 250, 0.5), (1, 2000, 0.0)]
+    ("realizations", "count", "repeat", "transient"),
+    [(1, 1000, 0.9, 0.0), (4, 250, 0.5, 0.0), (1, 2000, 0.0, 0.0), (1, 10_000, 0.0, 5.0)],
 )
-def test_errors_of_means_cover(realizations, count, repeat):
+def test_errors_of_means_cover(realizations, count, repeat, transient):
     """Of 120 means, 95 % within four standard errors of that part; more in docs/response.md."""
-    covers, ratio, _, among = steady_coverage(realizations, count, repeat, samples=120)
+    covers, ratio, _, among = steady_coverage(realizations, count, repeat, transient, samples=120)
     assert covers > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 120)
     assert among >= covers - 0.02
     assert 0.75 < ratio < 1.3
@@ -233,6 +234,20 @@ def test_the_law_of_a_record_is_found_and_judged():
     assert slip["is_described"] == 0
     assert "times the noise" in slip["note"]
     assert ageing["information_criterion"] < slip["information_criterion"]
+
+
+def test_the_law_starts_where_sliding_has_become_steady():
+    """A first stage that is all transient is left out."""
+    law = RateAndState(**{**LAW.__dict__, "law": "ageing"})
+    tree = record(law, STEP[:2] + HOLDS[:3], 4000.0, noise=1e-3 * FORCE)
+    inside = tree["time"].values <= 1.0
+    early = np.where(inside, 1 - tree["time"].values, 0.0)
+    tree["spring_force"] = tree["spring_force"] - 0.3 * FORCE * early
+    found = mesoslip.response(tree)
+    assert not rows_of(found, "steady")[0]["is_steady"]
+    ageing = rows_of(found, "rate_and_state")[0]
+    assert ageing["reference_velocity"] == pytest.approx(1e-6)
+    assert abs(ageing["b"] - law.b) < 4 * ageing["b_error"]
 
 
 def test_lines_have_errors():

@@ -216,5 +216,9 @@ def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
     quantities = mesoslip.info(klein())
     assert quantities["steady_growth_rate"].value == SteadySliding(klein()).growth_rate
     assert quantities["steady_frequency"].unit == "1/s"
+    neighbours = {"strength": 0.1, "columns": 60, "rows": 68}
+    assert "steady_growth_rate" not in mesoslip.info(klein(interaction=neighbours))
+    # What takes long is left out.
+    assert "steady_growth_rate" not in mesoslip.info(klein(contacts__delay=1e4))
     for slider in ({"kind": "prescribed"}, {"kind": "quasistatic", "stiffness": 97.0}):
         assert "steady_growth_rate" not in mesoslip.info(klein(slider=slider))

@@ -13,7 +13,7 @@ from conftest import ROOT
 from mesoslip import FileError
 from mesoslip.output import files
 
-OLD = ROOT / "tests" / "reference" / "klein.nc"
+OLD = ROOT / "tests" / "reference" / "eq-rigid-scaled.nc"
 
 
 @pytest.fixture

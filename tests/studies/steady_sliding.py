@@ -109,7 +109,7 @@ def measured_growth(config: Config, start: float) -> tuple[float, float]:
     """Growth rate and frequency of the oscillation after a time [1/s], while it is small."""
     tree = mesoslip.run(config)
     time, velocity = tree["time"].values, tree["velocity"].values[0]
-    steady = config.drive_stages[-1].velocity
+    steady = config.drive_parts[-1].end_velocity
     inside = time > start
     time, shaken = time[inside], velocity[inside] / steady - 1
     turns = np.flatnonzero((shaken[1:-1] - shaken[:-2]) * (shaken[2:] - shaken[1:-1]) < 0) + 1

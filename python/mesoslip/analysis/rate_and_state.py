@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -112,6 +112,8 @@ class Record:
         Displacement in the order of which D_c is looked for [m].
     has_noise
         Whether the record has noise that residuals can be compared with.
+    start
+        Time of the output at which the first stage starts [s].
     """
 
     stages: tuple[Loading, ...]
@@ -122,6 +124,7 @@ class Record:
     stiffness: float
     length_scale: float
     has_noise: bool
+    start: float = 0.0
 
     @property
     def reference_velocity(self) -> float:
@@ -516,34 +519,33 @@ def _verdict(record: Record, found: Fit, relative: float, described: bool) -> st
 def record_of(experiment: Experiment) -> Record | str:
     """The record of an output from its first steady sliding on, or why a law cannot be fitted."""
     stages = experiment.stages
-    first = next((place for place, one in enumerate(stages) if one.is_steady), None)
-    if first is None or first == len(stages) - 1:
+    sliding = [place for place, one in enumerate(stages[:-1]) if one.is_steady]
+    if not sliding:
         return "no step and no hold after sliding at one velocity: nothing tells a, b and D_c"
-    reference = stages[first]
-    used = stages[first:]
-    if not all(one.is_uniform for one in used):
-        return "the velocity of the drive has no simple course"
-    if len(used) > MOST_STAGES:
-        return f"more than {MOST_STAGES} stages of the drive"
-    if any(sign != reference.direction for one in used for sign in _signs(one)):
-        return (
-            "the drive turns round, which a law with the logarithm of the velocity has no word for"
-        )
-    if math.isinf(experiment.stiffness) and not any(
-        one.is_steady and one.velocity != reference.velocity for one in used
-    ):
-        return "a prescribed slider without a step from one velocity to another tells no a"
-    for one in used:
+    # Where a law without inertia has a meaning is asked of all that slides.
+    for one in stages[sliding[0] :]:
         if experiment.sticks_and_slips(one):
             return (
                 f"sticks and slips at {abs(one.velocity):.3g} m/s: the law without inertia "
                 "describes no slips"
             )
-    mean = experiment.mean_of(reference)
-    if mean is None:
-        return "too few samples before the first change of the drive"
-    if not mean.is_steady:
-        return "not steady before the first change of the drive, from which the law must start"
+    means = {place: experiment.mean_of(stages[place]) for place in sliding}
+    steady = [place for place, one in means.items() if one is not None and one.is_steady]
+    if not steady:
+        return "not steady, or too few samples, before any change of the drive: a law starts there"
+    reference, mean = stages[steady[0]], means[steady[0]]
+    assert mean is not None
+    used = stages[steady[0] :]
+    if not all(one.is_uniform for one in used):
+        return "the velocity of the drive has no simple course"
+    if len(used) > MOST_STAGES:
+        return f"more than {MOST_STAGES} stages of the drive"
+    if any(sign != reference.direction for one in used for sign in _signs(one)):
+        return "the drive turns round, which a law with the logarithm of velocity has no word for"
+    if math.isinf(experiment.stiffness) and not any(
+        one.is_steady and one.velocity != reference.velocity for one in used
+    ):
+        return "a prescribed slider without a step from one velocity to another tells no a"
     begin = experiment.samples(reference).start + mean.start
     end = experiment.samples(used[-1]).stop
     start = float(experiment.time[begin])
@@ -552,7 +554,7 @@ def record_of(experiment: Experiment) -> Record | str:
     loadings += [
         Loading(one.duration, abs(one.start_velocity), abs(one.end_velocity)) for one in used[1:]
     ]
-    return make_record(
+    record = make_record(
         loadings,
         experiment.time[begin:end] - start,
         sign * experiment.force[:, begin:end].mean(axis=0),
@@ -561,6 +563,7 @@ def record_of(experiment: Experiment) -> Record | str:
         experiment.stiffness,
         experiment.config.contacts.break_stretch,
     )
+    return replace(record, start=start)
 
 
 def _signs(stage: Stage) -> Iterator[float]:

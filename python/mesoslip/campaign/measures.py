@@ -244,6 +244,12 @@ MEASURES: dict[str, Measure] = {
             "growth rate of small perturbations of steady sliding with delay, by linear theory",
         ),
         Measure(
+            "stable_out_of_step",
+            _predicted(predictions.stable_out_of_step),
+            "1",
+            "whether steady sliding is stable, also for contacts that do not break in step",
+        ),
+        Measure(
             "critical_stiffness_ratio",
             _predicted(predictions.critical_stiffness_ratio),
             "1",

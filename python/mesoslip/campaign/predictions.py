@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Length of the force curve in mean breaking stretches: its steepest fall is the first one.
 CURVE_LENGTH = 3.0
+# Work that the stability of steady sliding may take, some tenths of a second.
+MOST_WORK = 10**6
 
 
 def _configuration(tree: xr.DataTree) -> Config:
@@ -27,6 +29,11 @@ def _configuration(tree: xr.DataTree) -> Config:
 def growth_rate(tree: xr.DataTree) -> float:
     """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
     return _growth_rate(_configuration(tree))
+
+
+def stable_out_of_step(tree: xr.DataTree) -> float:
+    """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
+    return _stable_out_of_step(_configuration(tree))
 
 
 def critical_stiffness_ratio(tree: xr.DataTree) -> float:
@@ -49,8 +56,14 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 # Realizations of a configuration come one after another.
 @lru_cache(maxsize=16)
 def _growth_rate(config: Config) -> float:
-    sliding = steady_sliding(config)
+    sliding = steady_sliding(config, MOST_WORK)
     return math.nan if sliding is None else sliding.growth_rate
+
+
+@lru_cache(maxsize=16)
+def _stable_out_of_step(config: Config) -> float:
+    sliding = steady_sliding(config, MOST_WORK)
+    return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
 
 
 @lru_cache(maxsize=16)

@@ -62,9 +62,9 @@ class Place:
 
 
 def places(plan: Plan) -> Iterator[Place]:
-    """All points of a sweep: the first realizations of all combinations, then the second, ..."""
-    for realization in range(plan.realizations):
-        for one in plan.combinations:
+    """All points of a sweep: the realizations of the first combination, of the second, ..."""
+    for one in plan.combinations:
+        for realization in range(plan.realizations):
             name = point_name(one.config, realization, plan.measures, plan.sweep.discard)
             yield Place(one, realization, name)
 

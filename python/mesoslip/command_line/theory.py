@@ -18,6 +18,9 @@ from mesoslip.command_line.options import (
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
+# Work that the stability of steady sliding may take after a force curve, some seconds.
+MOST_WORK = 400_000
+
 
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
     """Show derived quantities."""
@@ -70,7 +73,7 @@ def curve(
         for name, value in summary.items():
             show(name, value, *SUMMARY[name])
         typer.echo(force_curve.verdict)
-        sliding = steady_sliding(checked)
+        sliding = steady_sliding(checked, MOST_WORK)
         if sliding is not None and sliding.told is not None:
             typer.echo(sliding.told)
     if force_curve.error > checked.curve.tolerance:

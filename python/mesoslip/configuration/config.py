@@ -220,11 +220,19 @@ class Config(Table):
 
     @classmethod
     def from_toml(
-        cls, text: str, source: str = "configuration", overrides: Iterable[Change] = ()
+        cls,
+        text: str,
+        source: str = "configuration",
+        overrides: Iterable[Change] = (),
+        base: str | None = None,
     ) -> Config:
-        """Check a configuration given as the text of a TOML file, with changes laid over it."""
+        """Check a configuration given as the text of a TOML file, with changes laid over it.
+
+        Without changes, it is taken to have been laid over ``base``, if that is given.
+        """
         tables, overrides = parse_toml(text, source), tuple(overrides)
-        return cls._checked(override(tables, overrides), source, tables if overrides else None)
+        below = None if base is None else parse_toml(base, source)
+        return cls._checked(override(tables, overrides), source, tables if overrides else below)
 
     @classmethod
     def _checked(

@@ -480,5 +480,5 @@ def _check_run(tree: xr.DataTree, path: str | Path) -> None:
 def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:
     """The configuration of an output, to run it again, with changes laid over it."""
     with opened(path) as tree:
-        text = tree.attrs["configuration"]
-    return Config.from_toml(text, str(path), overrides)
+        text, base = (tree.attrs.get(name) for name in ("configuration", "base_configuration"))
+    return Config.from_toml(str(text), str(path), overrides, base)

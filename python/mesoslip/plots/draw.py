@@ -160,7 +160,8 @@ def comparison(
 def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
     """A label for each output that says how it differs from the others."""
     configs = [Config.from_toml(tree.attrs["configuration"]) for tree in trees]
-    return differences.labels(configs, [Path(name).stem for name in names])
+    short = [Path(name).stem if name.endswith(".nc") else name for name in names]
+    return differences.labels(configs, short)
 
 
 def _with_legend(panel: Callable[[Axes], None]) -> Callable[[Axes], None]:

@@ -88,14 +88,13 @@ def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
 
 def _draw_law(axes: Axes, experiment: Experiment, record: Record, found: Fit) -> None:
     """What a law makes of the record, on the same axes."""
-    used = next(one for one in experiment.stages if one.is_steady)
-    start = used.end - record.stages[0].duration
-    drive = np.interp(record.time + start, experiment.time, experiment.drive)
+    sign = next(one.direction for one in experiment.stages if one.direction)
+    drive = sign * np.interp(record.time + record.start, experiment.time, experiment.drive)
     force = (record.force - found.residual) / experiment.static_force
     label = f"{found.law.law} law, $a$ = {found.law.a / experiment.static_force:.2g} $F_s$, "
     label += f"$b$ = {found.law.b / experiment.static_force:.2g} $F_s$, "
     label += f"$D_c$ = {found.law.slip_distance * 1e9:.3g} nm"
-    axes.plot(used.direction * drive * 1e6, force, color="tab:red", label=label)
+    axes.plot(drive * 1e6, force, color="tab:red", label=label)
     axes.legend(loc="lower right")
 
 

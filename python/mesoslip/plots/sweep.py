@@ -30,8 +30,9 @@ MOST_LABELS = 8
 CHOICES = ("#a6cee3", "#ee8877", "#e6d488", "#d9d9d9", "#7fbf7b", "#c2a5cf")
 # What theory says, as lines of a map of the regime: the measure, the value at the line, its style,
 # and what it is.
-BOUNDARIES: tuple[tuple[str, float, Literal["-", "--", ":"], str], ...] = (
-    ("growth_rate", 0.0, "-", "steady sliding with delay: stable | unstable"),
+BOUNDARIES: tuple[tuple[str, float, Literal["-", "--", "-.", ":"], str], ...] = (
+    ("growth_rate", 0.0, "-.", "steady sliding with delay turns unstable"),
+    ("stable_out_of_step", 0.5, "-", "the same, contacts out of step"),
     ("critical_stiffness_ratio", 1.0, "--", "$K = K^*$"),
     ("waiting_over_damping", 1.0, ":", r"$\tau_{ss} \eta_S = 1$"),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 from collections.abc import Callable, Sequence
@@ -107,6 +108,10 @@ def drawn(caption: str, draw: Callable[[], Canvas]) -> Picture:
             one.set_rasterized(True)
         whole.savefig(stream, format="svg", dpi=DOTS_PER_INCH, metadata=NO_METADATA)
     text = stream.getvalue()
+    # Named after their places, which the layout tells to rounding, and not always to the bit.
+    own = hashlib.sha256(caption.encode("utf-8", "backslashreplace")).hexdigest()[:8]
+    for number, name in enumerate(re.findall(r'<clipPath id="(p[0-9a-f]+)"', text)):
+        text = text.replace(name, f"clip-{own}-{number}")
     # As wide as the page where that is not much more than the picture.
     width = MAGNIFIED * whole.get_figwidth()
     size = re.compile(r"<svg [^>]*?(?= xmlns| viewBox)", re.DOTALL)

@@ -50,6 +50,8 @@ NO_GROWTH = 1e-7
 FASTEST = 1e6
 # Steps of Newton's method, and relative change at which a root is found.
 STEPS, ROOT_TOLERANCE = 25, 1e-10
+# Imaginary part over the absolute value below which a root is real.
+REAL = 1e-9
 # Candidates for roots that are followed.
 MOST_CANDIDATES = 40
 
@@ -57,8 +59,6 @@ MOST_CANDIDATES = 40
 OUT_OF_STEP = 0.5
 # Layers whose frequencies the points of the path still tell apart.
 MOST_LAYERS = 16
-# Points of the path times the slider's degree that take no longer than a tenth of a second.
-QUICK_WORK = 10_000
 
 WITHOUT_AGEING = (
     "has no linear stability here: contacts that age break at times that depend on how the slider "
@@ -453,6 +453,7 @@ class SteadySliding:
                 if not np.any(change > ROOT_TOLERANCE):
                     break
         root = root[change < 1e-6]
+        root = np.where(np.abs(root.imag) < REAL * np.abs(root), root.real + 0j, root)
         return np.where(root.imag < 0, root.conj(), root)
 
     @property
@@ -474,13 +475,16 @@ class SteadySliding:
         return math.nan if self.leading_root is None else self.leading_root.imag
 
     @property
-    def is_quick(self) -> bool:
-        """Whether the roots are found in about a tenth of a second."""
+    def work(self) -> int:
+        """Work of finding the roots, points of the path times the degree of the slider.
+
+        Ten thousand take about a tenth of a second.
+        """
         if not self._has_motion or self.delay == 0:
-            return True
+            return 0
         slider = self.config.slider.dynamic_stiffness(np.array([1j * self._scale]))
         assert slider is not None
-        return len(self._path) * slider.degree <= QUICK_WORK
+        return len(self._path) * slider.degree
 
     @property
     def told(self) -> str | None:
@@ -500,7 +504,7 @@ class SteadySliding:
                 "first slip, may go on all the same"
             )
         grows = (
-            f"{where} is unstable, with delay: an oscillation of {self._hertz} grows at "
+            f"{where} is unstable, with delay: {self._perturbation} grows at "
             f"{self.growth_rate:.2g} 1/s"
         )
         if self.is_stable_out_of_step:
@@ -512,16 +516,21 @@ class SteadySliding:
         return f"{grows}, also of contacts that break out of step: it comes to slips as a rule"
 
     @property
-    def _hertz(self) -> str:
-        return f"{self.frequency / (2 * math.pi):.3g} Hz"
+    def _perturbation(self) -> str:
+        if not self.frequency > 0:
+            return "a perturbation"
+        return f"an oscillation of {self.frequency / (2 * math.pi):.3g} Hz"
 
 
-def steady_sliding(config: Config) -> SteadySliding | None:
-    """Steady sliding of a configuration; None if there is none that this theory can tell of."""
+def steady_sliding(config: Config, most_work: int) -> SteadySliding | None:
+    """Steady sliding of a configuration, if there is a theory of it that takes no more work."""
+    if config.interaction is not None and config.interaction.strength > 0:
+        return None
     try:
-        return SteadySliding(config)
+        sliding = SteadySliding(config)
     except ConfigError:
         return None
+    return sliding if sliding.work <= most_work else None
 
 
 class _Parts(NamedTuple):

@@ -1,8 +1,8 @@
 """What README and documentation tell to type is typed: Python, TOML, and commands, page by page.
 
 Blocks are gone through as a reader does, in a folder of their own. A TOML block whose first line
-is a comment with a file's name is that file. A block after ``not run: reason`` is left out, but that
-its commands are parsed.
+is a comment with a file's name is that file. Of a block after ``not run: reason`` commands are
+parsed, and no more is done.
 """
 
 from __future__ import annotations

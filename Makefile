@@ -10,6 +10,8 @@ UV := $(VENV)/bin/uv
 # Stamps: the locked Python packages are there, and mesoslip itself, built from these sources.
 ENVIRONMENT := $(VENV)/.environment
 INSTALLED := $(VENV)/.installed
+# What builds the documentation, which nothing else needs.
+DOCUMENTATION := $(VENV)/.documentation
 
 # .git/logs/HEAD, as outputs tell the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
@@ -29,12 +31,12 @@ export UV_COMPILE_BYTECODE := 1
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures claims \
-  campaign bench fuzz reference lint clean
+  campaign docs bench fuzz reference lint clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
-	@printf '\nWhat uses what, from left to right (README, "Develop", tells what to touch to add something):\n'
+	@printf '\nWhat uses what, from left to right (docs/architecture.md tells what to touch to add something):\n'
 	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
 	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign and reports, command_line\n' | expand -t 16
 
@@ -79,8 +81,13 @@ lint: $(INSTALLED) ## Check the style of all sources
 	$(VENV)/bin/fortitude check fortran tests/fortran
 	$(VENV)/bin/codespell
 
+# Every warning is an error, and what browsers would load from elsewhere is one.
+docs: $(INSTALLED) $(DOCUMENTATION) ## Build the documentation into out/docs
+	$(VENV)/bin/python -m sphinx -b html -W --keep-going -q -d build/docs docs out/docs
+	$(VENV)/bin/python tools/self-contained out/docs
+
 clean: ## Remove the environment, what was built, and outputs
-	rm -rf build out $(VENV)
+	rm -rf build out $(VENV) docs/examples docs/reference/generated
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)
@@ -96,6 +103,11 @@ $(INSTALLED): $(ENVIRONMENT) $(SOURCES)
 	@$(UV) pip install --quiet --python $(VENV)/bin/python --no-deps --no-build-isolation \
 	  --reinstall-package mesoslip -Cbuild-dir=build/package \
 	  $(addprefix -Csetup-args=,$(MESON_ARGS)) .
+	@touch $@
+
+$(DOCUMENTATION): $(ENVIRONMENT)
+	@echo "Installing what builds the documentation"
+	@$(UV) sync --quiet --locked --inexact --no-install-project --group docs
 	@touch $@
 
 # The Fortran tests, without Python, in three profiles.

@@ -42,43 +42,43 @@ class Range(Table):
     """Values from one to another."""
 
     from_: Annotated[Any, Field(alias="from")]
+    """First value."""
     to: Any
+    """Last value."""
     points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
+    """Number of values, both ends among them."""
     spacing: Literal["linear", "logarithmic"] = "linear"
+    """How values are spaced."""
 
 
 class Extent(Table):
     """Where a Latin hypercube takes the values of a key from."""
 
     from_: Annotated[Any, Field(alias="from")]
+    """Least value."""
     to: Any
+    """Greatest value."""
     spacing: Literal["linear", "logarithmic"] = "linear"
+    """How values are spread."""
 
 
 class SweepTable(Table):
-    """The table ``[sweep]``.
-
-    Attributes
-    ----------
-    realizations
-        Of each combination; those of the run by default.
-    measures
-        Names, and functions of one's own as "file.py:function".
-    discard
-        Part of each run, from its start, that measures leave out.
-    traces
-        Whether the output of each point is kept.
-    grid, together, latin_hypercube
-        What is varied, see the module.
-    """
+    """What a sweep varies, and what is measured of each run."""
 
     realizations: Annotated[Whole, Field(ge=1, lt=2**31)] | None = None
+    """Runs of each combination; those of the run by default."""
     measures: tuple[StrictStr, ...]
+    """Names of measures, and functions of one's own as "file.py:function"."""
     discard: Annotated[Number, Field(ge=0, lt=1)] = 0.5
+    """Part of each run, from its start, that measures leave out."""
     traces: StrictBool = False
+    """Whether the output of each point is kept."""
     grid: dict[str, Any] = Field(default_factory=dict)
+    """Lists or ranges of values of keys, each an axis; axes multiply."""
     together: tuple[dict[str, Any], ...] = ()
+    """Tables of keys that go together as one axis."""
     latin_hypercube: dict[str, Any] | None = None
+    """Ranges of keys from which `points` combinations are taken, spread evenly."""
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:

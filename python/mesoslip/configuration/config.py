@@ -40,6 +40,7 @@ class Config(Table):
     """A whole configuration."""
 
     title: Text | None = None
+    """What the run is, for pictures and reports."""
     run: Run
     drive: Drive
     slider: Slider

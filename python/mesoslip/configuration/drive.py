@@ -110,11 +110,17 @@ class Stage(Table):
     either sign or zero; a ramp from one velocity to another; or a hold."""
 
     duration: Annotated[Time, Field(gt=0)] | None = None
+    """How long the stage is."""
     displacement: Annotated[Length, Field(gt=0)] | None = None
+    """Way of the drive after which the stage is over, instead of a duration."""
     velocity: Velocity | None = None
+    """Velocity of the drive, of either sign."""
     start_velocity: Velocity | None = None
+    """Velocity at the start of a ramp."""
     end_velocity: Velocity | None = None
+    """Velocity at the end of a ramp."""
     hold: StrictBool | None = None
+    """Whether the drive stands."""
 
     @model_validator(mode="after")
     def _is_one_motion(self) -> Self:
@@ -166,10 +172,15 @@ class Cycle(Table):
     back, so many times. Each stroke is a stage."""
 
     shape: Literal["triangle"] = "triangle"
+    """Straight strokes."""
     amplitude: Annotated[Length, Field(gt=0)]
+    """Greatest displacement of the drive to either side."""
     velocity: Annotated[Velocity, Field(gt=0)] | None = None
+    """Speed of the drive."""
     frequency: Annotated[Rate, Field(gt=0)] | None = None
+    """Cycles in a second, instead of a velocity."""
     cycles: Annotated[Whole, Field(ge=1, lt=MOST_PARTS // 2)]
+    """Number of cycles, after which the run ends."""
 
     @model_validator(mode="after")
     def _has_a_speed(self) -> Self:
@@ -199,8 +210,11 @@ class History(Table):
     lines between them. A file is read once; what is kept are its points."""
 
     file: Text | None = None
+    """A CSV file with the columns time and displacement, beside the configuration."""
     time: tuple[MeasuredTime, ...] | None = None
+    """Times of the points, instead of a file."""
     displacement: tuple[MeasuredLength, ...] | None = None
+    """Displacements of the drive at these times."""
 
     @model_validator(mode="before")
     @classmethod
@@ -320,11 +334,17 @@ class Drive(Table):
     a measured history; or as a force that grows."""
 
     velocity: Velocity | None = None
+    """One velocity for the whole run."""
     stage: tuple[Stage, ...] | None = None
+    """Stages one after another, as `[[drive.stage]]` tables."""
     repeat: Annotated[Whole, Field(ge=1, le=MOST_PARTS)] | None = None
+    """How often the list of stages is gone through."""
     cycle: Cycle | None = None
+    """A drive that goes forth and back."""
     history: History | None = None
+    """A measured motion of the drive."""
     force_rate: ForceRate | None = None
+    """Rate of a force that pulls a quasi-static slider instead of a spring."""
 
     @model_validator(mode="after")
     def _one_of_them(self) -> Self:

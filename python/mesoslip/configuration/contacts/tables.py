@@ -55,7 +55,9 @@ class Threshold(Table):
     """Law of the relative thresholds: mean 1, and a standard deviation."""
 
     law: Annotated[str, choice(LAWS)] = "gaussian"
+    """Law of the relative thresholds, whose mean is 1."""
     relative_width: Annotated[Number, Field(gt=0)]
+    """Their standard deviation, Δf_s/f_s."""
 
     @model_validator(mode="after")
     def _width_that_is_possible(self) -> Self:
@@ -91,11 +93,17 @@ class Ageing(Table):
     """
 
     law: Annotated[str, choice(AGEING_LAWS)] = "relax"
+    """`relax`: from young to old exponentially; `log`: growth with the logarithm of the age."""
     time: Annotated[Time, Field(gt=0)]
+    """Time scale of ageing, τ_a."""
     young_force_ratio: Annotated[Number, Field(gt=0)] | None = None
+    """With `relax`: mean threshold of the young over that of the old."""
     young_relative_width: Annotated[Number, Field(gt=0)] | None = None
+    """With `relax`: standard deviation of the thresholds of the young over their mean."""
     growth: Annotated[Number, Field(ge=0)] | None = None
+    """With `log`: β of the mean threshold f_s [1 + β ln(1 + age/time)]."""
     initial_age: Annotated[Time, Field(ge=0)] | None = None
+    """Age of the contacts at the start; by default old with `relax`, just born with `log`."""
 
     @model_validator(mode="after")
     def _keys_of_the_law(self) -> Self:
@@ -144,19 +152,37 @@ class Contacts(Table):
     """The contacts of the interface; forces, stiffness and area are those of all together."""
 
     count: Annotated[Whole, Field(ge=1, lt=2**31)]
+    """Number of contacts, N."""
     static_force: Annotated[Force, Field(gt=0)]
+    """Static friction force of all contacts together, F_s = N f_s."""
     stiffness: Annotated[Stiffness, Field(gt=0)]
+    """Stiffness of all contacts together, Nk."""
     area: Annotated[Area, Field(gt=0)] | None = None
+    """Area of the interface, A; its N-th part is a contact's."""
     film_thickness: Annotated[Length, Field(gt=0)] | None = None
+    """Thickness of the film between the surfaces, h; with area and density the mass of the
+    contacts."""
     film_density: Annotated[Density, Field(gt=0)] | None = None
+    """Density of the film, ρ."""
     drag_rate: Annotated[Rate, Field(ge=0)] = 0.0
+    """Rate η of the drag m η V of a detached contact; needs area, thickness and density of the
+    film."""
     delay: Annotated[Time, Field(ge=0)] = 0.0
+    """Time between letting go and attaching again, τ_d."""
     back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
+    """Force at which a contact attaches over the mean threshold, f_b/f_s."""
     coupling: Annotated[str, choice(COUPLINGS)] = "scaled"
+    """`scaled`: stiffness goes with the root of the threshold, mass with the threshold; `equal`:
+    all contacts have the same."""
     initial: Annotated[str, choice(INITIAL_STATES)] = "relaxed"
+    """`relaxed`: no contact bears force; `steady`: as in slow sliding; `uniform`: stretches uniform
+    up to breaking."""
     reattach: StrictBool = True
+    """Whether a broken contact attaches again; false makes a bundle of fibres."""
     threshold: Threshold
+    """Law of the thresholds."""
     ageing: Ageing | None = None
+    """How thresholds change with age; by default they do not."""
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:
@@ -224,9 +250,14 @@ class Interaction(Table):
     """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
 
     strength: Number
+    """Dimensionless strength ξ = g/(f_s a⁴) of the repulsion g/r³ between neighbours at the
+    distance a."""
     lattice: Annotated[str, choice(LATTICES)] = "triangular"
+    """Lattice of the contacts, without edges."""
     columns: Annotated[Whole, Field(ge=2)]
+    """Contacts in a row."""
     rows: Annotated[Whole, Field(ge=2)]
+    """Rows; columns times rows is the number of contacts. Even on a triangular lattice."""
 
     @model_validator(mode="after")
     def _contacts_attach(self) -> Self:

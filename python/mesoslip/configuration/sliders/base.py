@@ -91,6 +91,7 @@ class SliderTable(Table):
     driven_by_force: ClassVar[bool] = False
 
     kind: str
+    """Kind of the slider."""
 
     @property
     def kernel_kind(self) -> str:

@@ -19,7 +19,9 @@ class InertialSlider(SliderTable):
     """A slider with a mass on a spring: it has slips, and a frequency of its own."""
 
     mass: Annotated[Mass, Field(gt=0)]
+    """Mass of the slider, M."""
     stiffness: Annotated[Stiffness, Field(gt=0)]
+    """Stiffness of the drive's spring, K; of layers, the static stiffness of all springs."""
 
     @property
     def spring_stiffness(self) -> float:

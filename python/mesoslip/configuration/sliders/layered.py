@@ -49,24 +49,34 @@ class Base(Table):
     """The lower body: a mass on a spring to the ground, which damping holds back."""
 
     mass: Annotated[Mass, Field(gt=0)]
+    """Mass of the lower body, M_B."""
     stiffness: Annotated[Stiffness, Field(gt=0)]
+    """Stiffness of its spring to the ground, K_B."""
     damping: Annotated[Rate, Field(ge=0)] = 0.0
+    """Damping of its motion."""
 
 
 class Solver(Table):
     """How layers are integrated: by series, exact to rounding, or by CVODE's formulas."""
 
     method: Annotated[str, choice({AUTOMATIC: None, **SOLVERS})] = AUTOMATIC
+    """`series` is exact to rounding; `adams` and `bdf` are formulas of CVODE; `auto` takes the
+    series unless that would take hours."""
     relative_tolerance: Annotated[Number, Field(ge=1e-13, le=1e-2)] = 1e-8
+    """Tolerance of CVODE's formulas."""
 
 
 class Cantilever(Table):
     """A round rod that is held at one end, pulled at the other."""
 
     length: Annotated[Length, Field(gt=0)]
+    """Length, L."""
     radius: Annotated[Length, Field(gt=0)]
+    """Radius, r."""
     density: Annotated[Density, Field(gt=0)]
+    """Density, ρ."""
     young_modulus: Annotated[Pressure, Field(gt=0)]
+    """Young's modulus, E."""
 
     @property
     def mass(self) -> float:
@@ -100,11 +110,17 @@ class LayeredSlider(InertialSlider):
     """
 
     kind: Literal["layered"] = "layered"
+    """An elastic block of layers joined by springs."""
     layers: Annotated[Whole, Field(ge=1, le=100_000)]
+    """Number of layers, N_l."""
     layer_damping: Annotated[Rate, Field(ge=0)] = 0.0
+    """Rate γ of the damping γ M/N_l between neighbouring layers."""
     base: Base | None = None
+    """The lower body, if it moves."""
     solver: Solver = Solver()
+    """How the layers are integrated."""
     cantilever: Cantilever | None = None
+    """A rod whose mass and stiffness are those of the slider."""
 
     @model_validator(mode="before")
     @classmethod

@@ -12,6 +12,7 @@ class PrescribedSlider(SliderTable):
     """A block that goes where the drive goes, K = ∞."""
 
     kind: Literal["prescribed"] = "prescribed"
+    """A block that goes where the drive goes."""
 
     @property
     def spring_stiffness(self) -> float:

@@ -23,7 +23,9 @@ class QuasistaticSlider(SliderTable):
     driven_by_force: ClassVar[bool] = True
 
     kind: Literal["quasistatic"] = "quasistatic"
+    """A block without inertia."""
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
+    """Stiffness of the drive's spring, K; none if a force drives."""
 
     @property
     def spring_stiffness(self) -> float:

@@ -19,8 +19,11 @@ class RigidSlider(InertialSlider):
     """A rigid block on a spring; damping acts on its velocity relative to the running mean."""
 
     kind: Literal["rigid"] = "rigid"
+    """A rigid block on a spring."""
     damping_ratio: Annotated[Number, Field(ge=0)] | None = None
+    """Damping of the setup over its frequency, η_S/Ω_S."""
     damping: Annotated[Rate, Field(ge=0)] | None = None
+    """Damping of the setup, η_S, instead of its ratio."""
 
     @model_validator(mode="after")
     def _one_damping(self) -> Self:

@@ -1,0 +1,28 @@
+"""
+An avalanche on the lattice
+===========================
+
+Contacts that push each other over: strong interaction makes the first avalanche take nearly all of
+them at one instant. Colours tell in which generation each has let go.
+"""
+
+import mesoslip
+
+config = mesoslip.Config.load("klein.toml").replace(
+    {
+        "run.duration": "1.6 s",
+        "contacts.stiffness": "200 N/m",
+        "contacts.threshold.relative_width": 0.3,
+        "interaction": {"strength": 0.3, "columns": 60, "rows": 68},
+        "output.snapshot_size": 3000,
+    }
+)
+tree = mesoslip.run(config)
+mesoslip.plot(tree, view="lattice")
+
+# %%
+# The largest of them.
+
+avalanches = mesoslip.avalanches(tree)
+largest = avalanches.isel(avalanche=int(avalanches["size"].argmax("avalanche")))
+print(f"{int(largest['size'])} breaks, {int(largest['generations'])} generations")

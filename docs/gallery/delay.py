@@ -1,0 +1,23 @@
+"""
+What the delay does
+===================
+
+Without a delay before a broken contact attaches again, slips die away and sliding becomes smooth;
+with a long one it sticks and slips. Stiffness and thresholds are the same.
+"""
+
+import matplotlib.pyplot as plt
+import mesoslip
+
+klein = mesoslip.Config.load("klein.toml").replace(
+    "run.duration=20 s", "contacts.count=1000", "contacts.threshold.relative_width=0.05"
+)
+figure, panels = plt.subplots(3, 1, sharex=True, figsize=(6.4, 6.4), layout="constrained")
+for panel, delay in zip(panels, ["0 s", "0.5 ms", "5 ms"], strict=True):
+    tree = mesoslip.run(klein.replace({"contacts.delay": delay}))
+    verdict = mesoslip.regime(tree)["regime"]
+    names = dict(zip(verdict.flag_values, verdict.flag_meanings.split(), strict=True))
+    force = tree["spring_force"].isel(realization=0)
+    panel.plot(force["time"], 1e6 * force)
+    panel.set(ylabel="spring force (µN)", title=f"delay {delay}: {names[int(verdict[0])]}")
+panels[-1].set_xlabel("time (s)")

@@ -1,0 +1,26 @@
+"""
+Stick-slip
+==========
+
+Klein's surface force balance: the spring is loaded until all contacts let go, and the slider slips.
+"""
+
+import mesoslip
+
+config = mesoslip.Config.load("klein.toml").replace("run.duration=6 s")
+tree = mesoslip.run(config)
+mesoslip.plot(tree)
+
+# %%
+# The first spike is the largest: all contacts are as old as each other then. What each slip came to
+# is in the catalogue.
+
+slips = mesoslip.slips(tree)
+columns = ["start_time", "force_before", "force_drop", "contacts_broken"]
+slips[columns].to_dataframe().head()
+
+# %%
+# One slip in close-up.
+
+start = float(slips["start_time"][-1])
+mesoslip.plot(tree, start=start - 0.02, end=start + 0.1)

@@ -1,0 +1,280 @@
+"""What README and documentation tell to type is typed: Python, TOML, and commands, page by page.
+
+Blocks are gone through as a reader does, in a folder of their own. A TOML block whose first line
+is a comment with a file's name is that file. Of a block after ``not run: reason`` commands are
+parsed, and no more is done.
+"""
+
+from __future__ import annotations
+
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pytest
+import typer
+from conftest import ROOT
+from mesoslip import Config
+from mesoslip.campaign.plan import Plan
+from mesoslip.command_line.main import app
+
+DOCS = ROOT / "docs"
+PAGES = [
+    ROOT / "README.md",
+    *sorted(path for path in DOCS.rglob("*.md") if not {"generated", "examples"} & {*path.parts}),
+]
+GALLERY = sorted((DOCS / "gallery").glob("*.py"))
+
+FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<language>\S*).*$")
+LEFT_OUT = re.compile(r"^(?:<!--|%)\s*not run: \S.*$")
+FILE = re.compile(r"# (?P<path>[\w/.-]+\.toml)")
+# Commands whose arguments are parsed and no more: they take long, or what no other has made.
+PARSED_ONLY = {"figures", "claims", "explore", "trace", "fit"}
+# Names that stand for those of a reader's own.
+PLACEHOLDER = re.compile(r"[A-Z]{3,}\b|…|\.\.\.")
+# What makes files of the documentation short enough for a test.
+SHORTER = {
+    'duration = "20 s"': 'duration = "0.3 s"',
+    "count = 1_000_000": "count = 20_000",
+}
+HISTORY = "time [s],displacement [um]\n0,0\n1,0.1\n2,0.3\n"
+STATUS = re.compile(r"exit status (\d+)")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: where it starts, in which language, and whether it is left out."""
+
+    line: int
+    language: str
+    text: str
+    is_left_out: bool
+
+
+def blocks_of(page):
+    """The fenced blocks of a page."""
+    found, fence, language, start = [], "", "", 0
+    inside, before, left_out = [], "", False
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+        match = FENCE.match(line)
+        if not fence and match:
+            fence, language, start = match["fence"], match["language"], number
+            inside, left_out = [], bool(LEFT_OUT.match(before))
+        elif fence and line.strip() == fence:
+            found.append(Block(start, language, "\n".join(inside), left_out))
+            fence = ""
+        elif fence:
+            inside.append(line)
+        if line.strip():
+            before = line
+    assert not fence, f"{page}, line {start}: is not closed"
+    return found
+
+
+def commands_of(text):
+    """Commands of a block of a shell, and whether each is mesoslip's: words and comment."""
+    for line in text.replace("\\\n", " ").splitlines():
+        typed, _, comment = line.partition(" #")
+        words = shlex.split(typed, comments=True)
+        if words:
+            yield words, comment
+
+
+def make_shorter(path):
+    """Make what a file asks for short."""
+    text = path.read_text()
+    for old, new in SHORTER.items():
+        text = text.replace(old, new)
+    path.write_text(text)
+
+
+@pytest.fixture
+def workshop(tmp_path, monkeypatch):
+    """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
+    shutil.copytree(ROOT / "runs", tmp_path / "runs")
+    for path in tmp_path.rglob("*.toml"):
+        make_shorter(path)
+    shutil.copy(ROOT / "runs" / "klein.toml", tmp_path)
+    (tmp_path / "stage.csv").write_text(HISTORY)
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    return tmp_path
+
+
+def check_toml(block, workshop):
+    """Check a file, or a part of one laid over Klein's case."""
+    tables = tomllib.loads(block.text)
+    named = FILE.match(block.text)
+    path = workshop / (named["path"] if named else "part.toml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if "base" not in tables:
+        path.write_text('base = "klein.toml"\n' + block.text)
+    else:
+        path.write_text(block.text)
+        if not (path.parent / tables["base"]).exists():
+            # Told of another folder than that of the block.
+            path = workshop / "runs" / "sweeps" / "part.toml"
+            path.write_text(block.text)
+    make_shorter(path)
+    if "sweep" in tables:
+        assert Plan.load(path).combinations
+    else:
+        Config.load(path)
+
+
+def parse_command(words):
+    """Let the command's parser read its arguments, which raises for those that there are not."""
+    _, name, *arguments = words
+    if not name.startswith("-"):
+        parser = typer.main.get_command(app).commands[name]
+        parser.make_context(name, list(arguments))
+
+
+def run_command(words, comment, command):
+    """Run a command, unless it takes long or names what a reader has to give."""
+    _, name, *arguments = words
+    is_placeholder = any(PLACEHOLDER.search(one) for one in arguments)
+    if name in PARSED_ONLY or is_placeholder or any(one.endswith(".gif") for one in arguments):
+        return
+    if name == "example":
+        Path(f"{arguments[-1]}.toml").unlink(missing_ok=True)
+    expected = STATUS.search(comment)
+    status, out, err = command(name, *arguments)
+    assert status == (int(expected[1]) if expected else 0), f"{shlex.join(words)}\n{out}{err}"
+
+
+def needs_output(page):
+    """Whether a page speaks of the output of the first example without making it."""
+    text = page.read_text(encoding="utf-8")
+    return "out/klein.nc" in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_what_a_page_tells_to_type(page, workshop, command):
+    blocks = blocks_of(page)
+    if needs_output(page):
+        assert command("run", "klein.toml", "--quiet")[0] == 0
+    names = {"__name__": "page"}
+    for block in blocks:
+        place = f"{page.relative_to(ROOT)}, line {block.line}"
+        is_shell = block.language in {"", "sh", "bash", "console"}
+        if block.is_left_out and not is_shell:
+            continue
+        try:
+            if block.language == "toml":
+                check_toml(block, workshop)
+            elif block.language == "python":
+                exec(compile(block.text, place, "exec"), names)
+                plt.close("all")
+            elif is_shell:
+                for words, comment in commands_of(block.text):
+                    if words[0] == "mesoslip":
+                        parse_command(words)
+                        if not block.is_left_out:
+                            run_command(words, comment, command)
+                    elif words[0] == "make":
+                        check_targets(words[1:])
+        except Exception as error:
+            error.add_note(f"in {place}")
+            raise
+
+
+def check_targets(targets):
+    """Whether make knows what a page tells it to make."""
+    known = (ROOT / "Makefile").read_text() + (ROOT / "runs" / "campaign.mk").read_text()
+    for target in targets:
+        if not target.startswith(("-", "out/")) and "=" not in target:
+            assert re.search(rf"^{re.escape(target)}:", known, re.MULTILINE), target
+
+
+@pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.stem)
+@pytest.mark.usefixtures("workshop")
+def test_scripts_of_the_gallery(script):
+    """Each runs; what its pictures show is looked at by people."""
+    runpy.run_path(str(script))
+    plt.close("all")
+
+
+@pytest.fixture
+def references(monkeypatch):
+    """The makers of the references, which need no Sphinx."""
+    monkeypatch.syspath_prepend(DOCS / "_extensions")
+
+
+@pytest.mark.usefixtures("references")
+def test_every_key_is_in_the_reference_with_its_meaning():
+    from configuration_reference import configuration_page
+    from mesoslip.configuration.messages import all_keys
+
+    page = configuration_page()
+    rows = set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
+    names = {key.rpartition(".")[2] for key in all_keys(Config)}
+    tables = {"run", "drive", "slider", "contacts", "interaction", "output", "curve"}
+    assert names - tables <= rows
+    assert re.search(r"`delay` \| s \| `0` \| ≥ 0 \| \S", page)
+    assert '`"scaled"`, `"equal"`' in page
+    assert not re.search(r"\| *\|$", page, re.MULTILINE)
+
+
+@pytest.mark.usefixtures("references")
+def test_every_command_and_variable_is_in_the_reference():
+    from command_reference import command_page
+    from mesoslip.output import variables
+    from output_reference import output_page
+
+    commands = command_page()
+    for name, parser in typer.main.get_command(app).commands.items():
+        assert f"\n## {name}\n" in commands
+        for one in parser.params:
+            label = one.opts[-1] if one.param_type_name == "option" else ""
+            assert label in commands
+    outputs = output_page()
+    groups = [one for one in vars(variables).values() if isinstance(one, variables.Group)]
+    for name in {name for group in groups for name in group}:
+        assert f"| `{name}` |" in outputs, name
+
+
+@pytest.mark.usefixtures("references")
+def test_the_fortran_reference_has_what_modules_make_public():
+    from fortran_reference import SOURCES, fortran_page, read_module
+
+    page = fortran_page()
+    for path in SOURCES.rglob("*.f90"):
+        module = read_module(path)
+        if module is None:
+            continue
+        for name in module.public:
+            entity = module.entities.get(name)
+            # What other modules define is told there.
+            if entity is not None:
+                assert f"**{name}**" in page
+                assert entity.comment, f"{module.file}: {name}"
+    assert "**slider_type**" in page
+    assert (
+        "- `error : type(error_type), allocatable, intent(out)`<br>Set if there is no such" in page
+    )
+
+
+def test_what_pages_load_from_elsewhere_is_found(tmp_path):
+    check = [sys.executable, ROOT / "tools" / "self-contained", tmp_path]
+    page = tmp_path / "page.html"
+    page.write_text('<a href="https://example.org">a link</a><img src="own.png">')
+    assert subprocess.run(check, check=False).returncode == 0
+    for text in (
+        '<script src="https://example.org/a.js"></script>',
+        '<link rel="stylesheet" href="//example.org/a.css">',
+        "<style>@import 'https://example.org/a.css';</style>",
+        '<p style="background: url(https://example.org/a.png)">',
+    ):
+        page.write_text(text)
+        done = subprocess.run(check, check=False, capture_output=True, text=True)
+        assert done.returncode == 1
+        assert "example.org" in done.stderr

@@ -26,8 +26,8 @@ class Session:
         The latest configuration that can be run; all changes are in it unless there are problems.
     problems
         What is wrong, by the key of the control that it is shown at.
-    generation
-        How often something was changed.
+    values
+        Values of the controls that have a meaning in ``config``, in SI, by key.
     """
 
     def __init__(self, start: Config, source: str) -> None:
@@ -35,8 +35,7 @@ class Session:
         self.source = source
         self.changes: dict[str, str] = {}
         self.problems: dict[str, str] = {}
-        self.generation = 0
-        self._at_start = values(start)
+        self.values = self._at_start = values(start)
 
     def change(self, key: str, text: str) -> bool:
         """Change a key; returns whether the configuration can be run with all changes.
@@ -54,7 +53,6 @@ class Session:
             If there is no such control.
         """
         control = BY_KEY[key]
-        self.generation += 1
         text = " ".join(text.split())
         if text in {self.start_text(key), NONE}:
             self.changes.pop(key, None)
@@ -68,7 +66,6 @@ class Session:
 
     def reset(self) -> bool:
         """Take back all changes."""
-        self.generation += 1
         self.changes.clear()
         return self._check("")
 
@@ -80,7 +77,7 @@ class Session:
         """Value of a key as it is now, right or wrong."""
         if key in self.changes:
             return self.changes[key]
-        value = values(self.config).get(key)
+        value = self.values.get(key)
         return "" if value is None else text_of(key, value)
 
     def is_changed(self, key: str) -> bool:
@@ -90,8 +87,7 @@ class Session:
     @property
     def shown(self) -> list[str]:
         """Keys of the controls that have a meaning now, and of those that are wrong."""
-        there = values(self.config)
-        return [key for key in BY_KEY if key in there or key in self.problems]
+        return [key for key in BY_KEY if key in self.values or key in self.problems]
 
     @property
     def command(self) -> str:
@@ -147,14 +143,14 @@ class Session:
                     part for part in (self.problems.get(key), told) if part
                 )
         else:
+            self.values = values(self.config)
             # What is written otherwise, as 500 us for 0.5 ms, is not changed.
-            there = values(self.config)
             for key in list(self.changes):
-                if key in there and there[key] == self._at_start.get(key):
+                if key in self.values and self.values[key] == self._at_start.get(key):
                     del self.changes[key]
         return not self.problems
 
     def _place(self, problem: Problem, last: str) -> str:
         """The control that a problem is shown at: its own, or else the one that was changed."""
-        is_there = problem.key in values(self.config) or problem.key in self.changes
+        is_there = problem.key in self.values or problem.key in self.changes
         return problem.key if problem.key in BY_KEY and is_there else last

@@ -33,7 +33,7 @@ from bokeh.plotting import figure
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, MesoslipError
-from mesoslip.explorer.controls import BY_KEY, NONE, STEPS, Control, values
+from mesoslip.explorer.controls import BY_KEY, NONE, STEPS, Control
 from mesoslip.explorer.following import Worker, explored, follow
 from mesoslip.explorer.pictures import Lattice, Line, Motion, Theory, motion, theory
 from mesoslip.explorer.session import Session
@@ -46,7 +46,9 @@ FRAME_MILLISECONDS = 120
 CHANGED = {"background-color": "#fff3cd", "border-radius": "4px"}
 UNCHANGED: dict[str, str] = {}
 RED = {"color": "#b00020"}
-# What the engines are called in pictures.
+# Tag of the status of what cannot be run; otherwise the part of the run that is drawn.
+REFUSED = -1
+# Colors of N contacts, and of infinitely many.
 FIRST, SECOND = "#1f3b6f", "#c2571a"
 
 # The browser saves what the server has put into a source, under the name that it has been given.
@@ -69,7 +71,8 @@ class ControlView:
 
     def __init__(self, control: Control, session: Session, change: Callable[[str, str], None]):
         self.control, self._session, self._change = control, session, change
-        self._is_set = False
+        # What the page shows: a change to that is no wish of a person.
+        self._text, self._position = "", 0
         self._scale = None if control.choices else control.scale(_number(session, control.key))
         self.message = Div(visible=False, styles=RED, name=f"{control.key}:message", width=250)
         self._field: Select | TextInput
@@ -101,36 +104,33 @@ class ControlView:
         return self._session.start_text(self.control.key) == NONE
 
     def _moved(self, _attribute: str, _old: Any, position: float) -> None:
-        if not self._is_set and self._scale is not None:
+        if position != self._position and self._scale is not None:
             self._change(self.control.key, self.control.text(self._scale.value(position)))
 
     def _typed(self, _attribute: str, _old: Any, text: str) -> None:
-        if not self._is_set:
+        if text != self._text:
             self._change(self.control.key, text)
 
     def show(self) -> None:
         """Show the value, whether it is changed, and what is wrong with it."""
         session, key = self._session, self.control.key
-        text = session.text(key)
         is_changed = session.is_changed(key)
         before = session.start_text(key) or "not given"
-        self._is_set = True
-        try:
-            _set(self._field, title=self.control.label + (f" ● was {before}" * is_changed))
-            _set(self._field, value=text, styles=CHANGED if is_changed else UNCHANGED)
-            if self._slider is not None and self._scale is not None:
-                value = _number(session, key)
-                if key not in session.problems and isinstance(value, int | float):
-                    _set(self._slider, value=self._scale.position(float(value)))
-            told = session.problems.get(key, "")
-            _set(self.message, text=html.escape(told), visible=bool(told))
-            _set(self.layout, visible=key in session.shown)
-        finally:
-            self._is_set = False
+        self._text = session.text(key)
+        _set(self._field, title=self.control.label + (f" ● was {before}" * is_changed))
+        _set(self._field, value=self._text, styles=CHANGED if is_changed else UNCHANGED)
+        value = _number(session, key)
+        if self._slider is not None and self._scale is not None and key not in session.problems:
+            if isinstance(value, int | float):
+                self._position = self._scale.position(float(value))
+            _set(self._slider, value=self._position)
+        told = session.problems.get(key, "")
+        _set(self.message, text=html.escape(told), visible=bool(told))
+        _set(self.layout, visible=key in session.shown)
 
 
 def _number(session: Session, key: str) -> object:
-    return values(session.config).get(key)
+    return session.values.get(key)
 
 
 def _set(model: Any, **properties: Any) -> None:
@@ -228,6 +228,8 @@ class TheoryView:
             "curve",
             "F(X) of slow sliding, and the spring",
             {"force": FIRST, "slope -K": SECOND},
+            x_range=Range1d(0, 1),
+            y_range=Range1d(0, 1),
         )
         self._critical = ColumnDataSource({"x": [], "y": []}, name="curve:X_c")
         self.plot.figure.scatter("x", "y", source=self._critical, size=9, color=SECOND)
@@ -245,8 +247,9 @@ class TheoryView:
             span = float(np.nanmax(force) - min(0.0, np.nanmin(force))) or 1.0
             # The line of a stiff spring leaves the picture.
             low, high = min(0.0, float(np.nanmin(force))) - 0.05 * span, float(np.nanmax(force))
-            self.plot.figure.y_range.update(start=low, end=high + 0.1 * span)
-            self.plot.figure.x_range.update(start=0.0, end=float(shown.curve.x[-1]))
+            high, end = high + 0.1 * span, float(shown.curve.x[-1])
+            _set(self.plot.figure.y_range, start=low, end=high, reset_start=low, reset_end=high)
+            _set(self.plot.figure.x_range, start=0.0, end=end, reset_start=0.0, reset_end=end)
             _set(self.plot.figure.xaxis[0], axis_label=shown.curve.x_label)
             _set(self.plot.figure.yaxis[0], axis_label=shown.curve.y_label)
         numbers = ", ".join(f"{name} = {value}" for name, value in shown.numbers)
@@ -333,6 +336,8 @@ class Page:
         self._stem = Path(source).stem or "run"
         self.session = Session(start, source)
         self._results: Results | None = None
+        # Number of what is shown, or to be shown, so that nothing outdated is.
+        self._turn = 0
         self._is_closed = False
         self._workers = {name: Worker(f"explore {name}") for name in ("run", "limit", "theory")}
         self._controls = {
@@ -443,6 +448,7 @@ class Page:
     def _update(self) -> None:
         """Show the controls as they are, and run what they say if it can be run."""
         self._results = None
+        self._turn += 1
         session = self.session
         with self._together():
             self._show_controls()
@@ -450,16 +456,14 @@ class Page:
                 for worker in self._workers.values():
                     worker.cancel()
                 self._tell("what is marked in red cannot be run")
+                self._status.tags = [self._turn, REFUSED]
                 return
-            generation, config = session.generation, session.config
             self._tell("running …")
-            self._start("run", config, generation)
-            self._workers["theory"].submit(
-                lambda stop: self._publish(stop, generation, self._show_theory, theory(config))
-            )
-            self._start_limit(config, generation)
+            self._workers["theory"].cancel()
+            self._start("run", session.config)
+            self._start_limit(session.config)
 
-    def _start_limit(self, config: Config, generation: int) -> None:
+    def _start_limit(self, config: Config) -> None:
         """Run the same with infinitely many contacts beside it, if that is wanted and possible."""
         told = ""
         is_wanted = bool(self._limit.active)
@@ -467,41 +471,49 @@ class Page:
         if is_wanted:
             try:
                 limit = config.replace({"run.engine": "me"})
-                self._start("limit", limit, generation)
+                self._start("limit", limit)
             except ConfigError as error:
                 told = "; ".join(one.message for one in error.problems)
         _set(self._limit_message, text=html.escape(told), visible=bool(told))
         _set(self._beside.layout, visible=is_wanted and not told)
 
-    def _start(self, name: str, config: Config, generation: int) -> None:
-        wanted = explored(config)
+    def _start(self, name: str, config: Config) -> None:
+        turn, wanted = self._turn, explored(config)
         show = self._show_motion if name == "run" else self._show_limit
+        # Theory waits until there is a first picture, as that is what a person waits for.
+        waiting = [config] if name == "run" else []
 
         def job(stop: StopFlag) -> None:
             def look(results: Results) -> None:
                 kept = results if results.complete else None
-                self._publish(stop, generation, show, (motion(results), kept))
+                self._publish(stop, turn, show, (motion(results), kept))
+                if waiting:
+                    self._start_theory(stop, turn, waiting.pop())
 
             try:
                 follow(wanted, stop, look)
             except MesoslipError as error:
-                self._publish(stop, generation, self._tell, str(error))
+                self._publish(stop, turn, self._tell, str(error))
 
         self._workers[name].submit(job)
 
+    def _start_theory(self, run: StopFlag, turn: int, config: Config) -> None:
+        if not run.is_set():
+            self._workers["theory"].submit(
+                lambda stop: self._publish(stop, turn, self._show_theory, theory(config))
+            )
+
     def _publish(
-        self, stop: StopFlag, generation: int, show: Callable[[Any], None], shown: object
+        self, stop: StopFlag, turn: int, show: Callable[[Any], None], shown: object
     ) -> None:
         """Have the page show something, unless it is outdated then."""
         if not stop.is_set():
-            self._document.add_next_tick_callback(
-                partial(self._show, stop, generation, show, shown)
-            )
+            self._document.add_next_tick_callback(partial(self._show, stop, turn, show, shown))
 
     def _show(
-        self, stop: StopFlag, generation: int, show: Callable[[Any], None], shown: object
+        self, stop: StopFlag, turn: int, show: Callable[[Any], None], shown: object
     ) -> None:
-        if self._is_closed or stop.is_set() or generation != self.session.generation:
+        if self._is_closed or stop.is_set() or turn != self._turn:
             return
         with self._together():
             show(shown)
@@ -516,7 +528,7 @@ class Page:
         done = "" if drawn.part_done >= 1 else f"{100 * drawn.part_done:.0f} % of the run"
         self._tell(done or "done")
         # What a test, or who measures, waits for.
-        self._status.tags = [self.session.generation, drawn.part_done]
+        self._status.tags = [self._turn, drawn.part_done]
 
     def _show_limit(self, shown: tuple[Motion, Results | None]) -> None:
         self._beside.show(shown[0])

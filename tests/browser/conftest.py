@@ -143,7 +143,9 @@ class Browser:
     def errors(self) -> list[str]:
         """What the browser complained of."""
         return [
-            entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"
+            entry["message"]
+            for entry in self.driver.get_log("browser")
+            if entry["level"] == "SEVERE"
         ]
 
 

@@ -7,6 +7,7 @@ import json
 import random
 import statistics
 import time
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -28,7 +29,9 @@ def ask(address: str, path: str = "/", **headers: str) -> int:
     """Status of a request with headers of one's own."""
     connection = http.client.HTTPConnection(urlsplit(address).netloc, timeout=PATIENCE)
     try:
-        connection.request("GET", path, headers={k.replace("_", "-"): v for k, v in headers.items()})
+        connection.request(
+            "GET", path, headers={k.replace("_", "-"): v for k, v in headers.items()}
+        )
         return connection.getresponse().status
     finally:
         connection.close()
@@ -121,9 +124,7 @@ def test_infinitely_many_contacts_beside(server, browser):
     browser.wait("return Bokeh.documents[0].get_model_by_name('limit:regime').text.length > 0")
     browser.wait_until_done()
     assert eventually(
-        lambda: (
-            abs(max(browser.data("limit:force:force")) - max(browser.data("force:force"))) < 0.5
-        )
+        lambda: abs(max(browser.data("limit:force:force")) - max(browser.data("force:force"))) < 0.5
     )
     assert browser.change("interaction.lattice", "square")[1] == "drawn"
     assert "no neighbours" in browser.value("limit:message", "text")
@@ -143,16 +144,10 @@ def test_a_lattice_moves(server, browser):
     image = "return Bokeh.documents[0].get_model_by_name('lattice:image').data.image[0]"
     browser.wait(f"{image} != null")
     assert browser.value("lattice:image", "data.dw[0]") == 60
-    browser.driver.execute_script(
-        "Bokeh.documents[0].get_model_by_name('moving').active = true"
-    )
+    browser.driver.execute_script("Bokeh.documents[0].get_model_by_name('moving').active = true")
     seen = set()
-    assert eventually(
-        lambda: seen.add(browser.value("snapshot", "value")) or len(seen) > 3
-    )
-    browser.driver.execute_script(
-        "Bokeh.documents[0].get_model_by_name('moving').active = false"
-    )
+    assert eventually(lambda: seen.add(browser.value("snapshot", "value")) or len(seen) > 3)
+    browser.driver.execute_script("Bokeh.documents[0].get_model_by_name('moving').active = false")
     assert browser.errors() == []
 
 
@@ -258,8 +253,9 @@ def test_another_page_cannot_reach_it(server, browser):
 
 def test_only_this_machine_is_listened_to(server):
     port = urlsplit(server.address).port
-    with open(f"/proc/{server.process.pid}/net/tcp") as table:
-        bound = [line.split()[1] for line in table if line.split()[1].endswith(f":{port:04X}")]
+    table = Path(f"/proc/{server.process.pid}/net/tcp").read_text().splitlines()
+    # Its sockets: those that other pages of a test are connected to have the same address.
+    bound = [line.split()[1] for line in table if line.split()[1].endswith(f":{port:04X}")]
     assert bound
     assert {one.split(":")[0] for one in bound} == {"0100007F"}
 
@@ -269,7 +265,9 @@ def test_files_cannot_be_asked_for(server):
         assert ask(server.address, path) in {403, 404}
 
 
-def test_many_changes_at_random(tmp_path):
+# As long as a machine with other work on it may take.
+@pytest.mark.timeout(1800)
+def test_many_changes_at_random():
     """No error, new pictures soon, memory that does not grow."""
     chance = random.Random(1)
     server, browser = Server("runs/klein.toml"), Browser()
@@ -277,9 +275,14 @@ def test_many_changes_at_random(tmp_path):
         browser.open(server.address)
         drawn, refused, memory = [], 0, []
         for number in range(CHANGES):
-            shown = [
-                one for one in CONTROLS if browser.value(f"{one.key}:control", "visible")
-            ]
+            keys = browser.driver.execute_script(
+                """
+                const find = (name) => Bokeh.documents[0].get_model_by_name(name)
+                return arguments[0].filter((key) => find(`${key}:control`).visible)
+                """,
+                [one.key for one in CONTROLS],
+            )
+            shown = [one for one in CONTROLS if one.key in keys]
             control = chance.choice(shown)
             if control.choices:
                 options = browser.value(control.key, "options")
@@ -296,11 +299,8 @@ def test_many_changes_at_random(tmp_path):
                 drawn.append(seconds)
             else:
                 refused += 1
-                browser.driver.execute_script("return 0")
                 browser.element("reset", "button").click()
-                browser.wait(
-                    "return Bokeh.documents[0].get_model_by_name('status').tags[1] >= 0"
-                )
+                browser.wait("return Bokeh.documents[0].get_model_by_name('status').tags[1] >= 0")
             assert browser.errors() == []
             if number % 10 == 9:
                 memory.append(server.memory())

@@ -231,8 +231,12 @@ def test_a_lattice_is_shown_in_motion():
 
 
 def test_a_run_is_cut_off_by_the_next_one():
-    """A run of an hour ends within a segment, and of those that waited only the last one is done."""
-    long = explored(Config.load(KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=10 ms"]))
+    """A long run ends within a segment; of those that waited only the last one is done."""
+    long = explored(
+        Config.load(
+            KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=10 ms"]
+        )
+    )
     worker, begun, done = Worker("test"), threading.Event(), []
 
     def hour(stop):

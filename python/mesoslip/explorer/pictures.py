@@ -35,8 +35,8 @@ Array = NDArray[np.float64]
 
 # Parts of a line of each of which the extremes are drawn.
 PARTS = 500
-# Points of the force curve that are drawn, its length in mean breaking stretches, and its precision:
-# a picture needs no more, and a person does not wait for it.
+# Points of the force curve that are drawn, its length in mean breaking stretches, its precision: a
+# picture needs no more, and a person does not wait for it.
 CURVE_POINTS = 800
 CURVE_LENGTH = 6.0
 CURVE_TOLERANCE = 1e-6

@@ -11,9 +11,9 @@ from urllib.parse import urlsplit
 from bokeh.application import Application
 from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
-from bokeh.resources import Resources
 from bokeh.server.auth_provider import AuthProvider
 from bokeh.server.server import Server
+from bokeh.settings import settings
 from jinja2 import Environment
 from tornado.ioloop import IOLoop
 from tornado.web import HTTPError, RequestHandler
@@ -50,7 +50,7 @@ class OnlyHere(AuthProvider):
         super().__init__()
 
     @property
-    def get_user_async(self) -> Callable[[RequestHandler], Awaitable[str]]:
+    def get_user_async(self) -> Callable[[Any], Awaitable[Any]]:
         return self._user
 
     @property
@@ -120,6 +120,9 @@ def make_server(config: Config, source: str, port: int) -> Server:
     logging.getLogger("bokeh").setLevel(logging.CRITICAL)
     logging.getLogger("tornado").setLevel(logging.CRITICAL)
 
+    # Scripts and styles come from this server, whatever its environment says.
+    settings.resources = "server"
+
     def make(document: Document) -> None:
         document.template = TEMPLATE
         Page(document, config, source)
@@ -140,7 +143,5 @@ def make_server(config: Config, source: str, port: int) -> Server:
             continue
         gate.hosts = {f"{name}:{server.port}" for name in (ADDRESS, "localhost")}
         server._tornado.websocket_origins.update(gate.hosts)
-        # Scripts and styles come from this server, whatever its environment says.
-        server._tornado._resources = Resources(mode="server")
         return server
     raise RunError(f"no port from {port} to {port + MORE_PORTS - 1} is free: choose one by --port")

@@ -13,22 +13,10 @@ from typing import Any
 import numpy as np
 from bokeh.document import Document
 from bokeh.layouts import column, row
-from bokeh.models import (
-    BoxAnnotation,
-    Button,
-    ColorBar,
-    ColumnDataSource,
-    CustomJS,
-    Div,
-    LinearColorMapper,
-    Range1d,
-    Select,
-    Slider,
-    Span,
-    TextInput,
-    Toggle,
-    UIElement,
-)
+from bokeh.models import ColumnDataSource, CustomJS, LinearColorMapper, Range1d
+from bokeh.models.annotations import BoxAnnotation, ColorBar, Span
+from bokeh.models.ui import UIElement
+from bokeh.models.widgets import Button, Div, Select, Slider, TextInput, Toggle
 from bokeh.plotting import figure
 
 from mesoslip.configuration.config import Config
@@ -43,9 +31,9 @@ from mesoslip.simulation.stop import StopFlag
 
 # Time between two snapshots of a moving lattice [ms].
 FRAME_MILLISECONDS = 120
-CHANGED = {"background-color": "#fff3cd", "border-radius": "4px"}
-UNCHANGED: dict[str, str] = {}
-RED = {"color": "#b00020"}
+CHANGED: dict[str, str | None] = {"background-color": "#fff3cd", "border-radius": "4px"}
+UNCHANGED: dict[str, str | None] = {}
+RED: dict[str, str | None] = {"color": "#b00020"}
 # Tag of the status of what cannot be run; otherwise the part of the run that is drawn.
 REFUSED = -1
 # Colors of N contacts, and of infinitely many.
@@ -78,7 +66,7 @@ class ControlView:
         self._field: Select | TextInput
         self._slider: Slider | None = None
         if self._scale is None:
-            options = [one for one in control.choices if one != NONE or self._may_lack]
+            options: list[Any] = [one for one in control.choices if one != NONE or self._may_lack]
             self._field = Select(options=options, name=control.key, width=250)
             parts: list[UIElement] = [self._field]
         else:
@@ -157,7 +145,7 @@ class Plot:
         self.sources = {}
         for label, color in colors.items():
             source = ColumnDataSource({"x": [], "y": []}, name=f"{name}:{label}")
-            legend = {"legend_label": label} if len(colors) > 1 else {}
+            legend: dict[str, Any] = {"legend_label": label} if len(colors) > 1 else {}
             self.figure.line("x", "y", source=source, color=color, line_width=1.3, **legend)
             self.sources[label] = source
         if len(colors) > 1:
@@ -179,7 +167,7 @@ class MotionView:
     """Pictures of a run: force, velocity and detached contacts, and a slip in close-up."""
 
     def __init__(self, prefix: str, title: str, color: str) -> None:
-        self._range = Range1d(0, 1)
+        self._range = Range1d(start=0, end=1)
         self.title = Div(text=f"<b>{html.escape(title)}</b>", name=f"{prefix}title")
         self.told = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
         self.now = Span(location=0, dimension="height", line_color="gray", visible=False)
@@ -228,8 +216,8 @@ class TheoryView:
             "curve",
             "F(X) of slow sliding, and the spring",
             {"force": FIRST, "slope -K": SECOND},
-            x_range=Range1d(0, 1),
-            y_range=Range1d(0, 1),
+            x_range=Range1d(start=0, end=1),
+            y_range=Range1d(start=0, end=1),
         )
         self._critical = ColumnDataSource({"x": [], "y": []}, name="curve:X_c")
         self.plot.figure.scatter("x", "y", source=self._critical, size=9, color=SECOND)
@@ -276,7 +264,8 @@ class LatticeView:
             tools="pan,wheel_zoom,reset,save",
         )
         self._figure.toolbar.logo = None
-        self._figure.image(source=self._source, color_mapper=mapper)
+        look: dict[str, Any] = {"color_mapper": mapper}
+        self._figure.image(source=self._source, **look)
         self._figure.add_layout(ColorBar(color_mapper=mapper, width=8), "right")
         self._place = Slider(
             start=0, end=1, step=1, value=0, title="snapshot", name="snapshot", width=300
@@ -510,9 +499,7 @@ class Page:
         if not stop.is_set():
             self._document.add_next_tick_callback(partial(self._show, stop, turn, show, shown))
 
-    def _show(
-        self, stop: StopFlag, turn: int, show: Callable[[Any], None], shown: object
-    ) -> None:
+    def _show(self, stop: StopFlag, turn: int, show: Callable[[Any], None], shown: object) -> None:
         if self._is_closed or stop.is_set() or turn != self._turn:
             return
         with self._together():

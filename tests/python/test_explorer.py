@@ -263,3 +263,42 @@ def test_values_are_those_that_have_a_meaning(klein):
     assert "slider.mass" not in there
     assert "contacts.count" in there
     assert there["interaction.lattice"] == "none"
+
+
+def test_a_missing_library_is_named(command, monkeypatch):
+    monkeypatch.setattr("mesoslip.command_line.explore.find_spec", lambda _: None)
+    status, out, told = command("explore", KLEIN, "--no-browser")
+    assert (status, out) == (2, "")
+    assert "mesoslip[explore]" in told
+    assert len(told.splitlines()) == 1
+
+
+def test_what_cannot_be_explored_is_told(command):
+    status, _, told = command("explore", KLEIN, "--no-browser", "--set", "contacts.delay=1kg")
+    assert status == 2
+    assert "contacts.delay" in told
+
+
+def test_the_page_is_of_every_control():
+    """It is made without a browser, and takes changes as its widgets give them."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer.view import Page
+
+    page = Page(document, Config.load(KLEIN), KLEIN)
+    try:
+        for control in CONTROLS:
+            assert document.get_model_by_name(control.key) is not None
+        field = document.get_model_by_name("contacts.delay")
+        slider = document.get_model_by_name("contacts.delay:slider")
+        field.value = "1 ms"
+        # The slider follows without a change of its own.
+        assert page.session.changes == {"contacts.delay": "1 ms"}
+        assert slider.value > STEPS / 2
+        slider.value = STEPS
+        assert page.session.config.contacts.delay == pytest.approx(0.05)
+        field.value = "what?"
+        assert document.get_model_by_name("contacts.delay:message").visible
+        slider.value = STEPS - 1
+        assert not document.get_model_by_name("contacts.delay:message").visible
+    finally:
+        page.close()

@@ -30,15 +30,15 @@ export UV_COMPILE_BYTECODE := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
-.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures claims \
-  campaign docs bench fuzz reference lint clean
+.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser figures \
+  claims campaign docs bench fuzz reference lint clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
 	@printf '\nWhat uses what, from left to right (docs/architecture.md tells what to touch to add something):\n'
 	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
-	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign and reports, command_line\n' | expand -t 16
+	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign, reports and explorer, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build
 	@:
@@ -62,6 +62,10 @@ test-debug: build/debug/build.ninja ## Fortran unit tests with all run-time chec
 test-sanitize: build/sanitize/build.ninja ## Fortran unit tests with the sanitizers
 	@ninja --quiet -C build/sanitize
 	$(VENV)/bin/meson test -C build/sanitize --no-rebuild --print-errorlogs
+
+test-browser: $(INSTALLED) ## The explorer's page in a real Chromium, which is installed if it may be
+	@PYTHON=$(PYTHON) tools/system-packages chromium chromium-driver
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -q -s tests/browser
 
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py

@@ -15,6 +15,7 @@ from mesoslip.command_line import (
     catalogues,
     claims,
     example,
+    explore,
     pictures,
     report,
     response,
@@ -39,6 +40,7 @@ COMMANDS = (
     pictures.figures,
     claims.claims,
     report.report,
+    explore.explore,
     example.example,
 )
 

@@ -1,0 +1,68 @@
+"""``mesoslip explore``."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mesoslip.command_line.options import SetOption
+from mesoslip.errors import FileError
+
+EXAMPLE = "klein"
+MISSING = (
+    "the page needs Bokeh, which is not there: install it with python -m pip install "
+    "'mesoslip[explore]', or python -m pip install bokeh"
+)
+
+
+def explore(
+    config: Annotated[
+        str | None,
+        typer.Argument(
+            help="TOML file, or an output, to start from; Klein's case by default",
+            metavar="CONFIG",
+        ),
+    ] = None,
+    changes: SetOption = None,
+    port: Annotated[
+        int,
+        typer.Option(
+            min=0, max=65535, help="Port, or the next one that is free; 0 for any", metavar="PORT"
+        ),
+    ] = 5006,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser")
+    ] = True,
+) -> None:
+    """Open a page on which to turn knobs and see the motion change; Ctrl-C ends it.
+
+    The page is on the loopback address of this machine, loads nothing from elsewhere, and is
+    refused to other pages.
+    """
+    from mesoslip import api
+    from mesoslip.examples import example
+
+    if find_spec("bokeh") is None:
+        raise FileError(MISSING)
+    if config is None:
+        from tempfile import TemporaryDirectory
+
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / f"{EXAMPLE}.toml"
+            example(EXAMPLE, path)
+            start = api.as_config(str(path), changes or ())
+        source = f"{EXAMPLE}.toml"
+    else:
+        start = api.as_config(config, changes or ())
+        source = config
+    from mesoslip.explorer.server import serve
+
+    def tell(address: str) -> None:
+        typer.echo(f"mesoslip explore: {address} (Ctrl-C ends it)")
+
+    with suppress(KeyboardInterrupt):
+        serve(start, source, port=port, opens=browser, tell=tell)

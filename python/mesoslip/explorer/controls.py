@@ -1,0 +1,187 @@
+"""What can be changed on the page: keys of the configuration, with ranges and choices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES, LATTICES
+from mesoslip.configuration.differences import flat
+from mesoslip.configuration.keys import key_kind
+from mesoslip.configuration.sliders import SLIDERS
+from mesoslip.configuration.threshold_law import LAWS
+from mesoslip.configuration.units import with_unit
+
+# Positions of a slider on the page.
+STEPS = 200
+# What a choice is called that leaves out a table.
+NONE = "none"
+
+
+@dataclass(frozen=True)
+class Control:
+    """A key that can be changed.
+
+    Attributes
+    ----------
+    key
+        Its dotted name.
+    label
+        What it is called on the page.
+    group
+        Heading under which it stands.
+    decades
+        How far the range goes to both sides of the value at the start, in powers of ten; 0 if the
+        range is linear.
+    range
+        Of a linear range the ends, of another one those it must not pass, in SI.
+    usual
+        Where a range of decades is about if the value at the start is zero, in SI.
+    choices
+        What it may be, if it is no number.
+    beside
+        Keys that a choice needs, and what they are if they are not given.
+    """
+
+    key: str
+    label: str
+    group: str
+    decades: float = 0.0
+    range: tuple[float, float] = (0.0, math.inf)
+    usual: float = 1.0
+    choices: tuple[str, ...] = ()
+    beside: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    @property
+    def unit(self) -> str:
+        """The SI unit; "1" for plain numbers."""
+        kind = key_kind(self.key)
+        return kind.unit if kind is not None and kind.unit else "1"
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it takes whole numbers."""
+        kind = key_kind(self.key)
+        return kind is not None and kind.is_whole
+
+    def scale(self, start: object) -> Scale:
+        """The positions of a slider for it, given the value at the start.
+
+        Raises
+        ------
+        TypeError
+            If it takes no numbers.
+        """
+        if self.choices:
+            raise TypeError(f"{self.key} has choices, not a range")
+        given = float(start) if isinstance(start, int | float) and start else self.usual
+        low, high = self.range
+        if self.decades:
+            factor = 10**self.decades
+            low, high = max(low, given / factor), min(high, given * factor)
+        # What the file says is always in the range.
+        return Scale(min(low, given), max(high, given), bool(self.decades), self.is_whole)
+
+    def text(self, value: float) -> str:
+        """A value in SI as it is written, such as "0.5 ms"."""
+        if self.is_whole:
+            return str(round(value))
+        return with_unit(value, self.unit, 3)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Values at the positions 0 to `STEPS` of a slider on the page."""
+
+    low: float
+    high: float
+    is_logarithmic: bool
+    is_whole: bool
+
+    def value(self, position: float) -> float:
+        """The value at a position."""
+        part = min(max(position / STEPS, 0.0), 1.0)
+        if self.is_logarithmic:
+            value = self.low * (self.high / self.low) ** part
+        else:
+            value = self.low + part * (self.high - self.low)
+        return float(round(value)) if self.is_whole else value
+
+    def position(self, value: float) -> int:
+        """The position nearest to a value; an end for what is beyond it."""
+        if self.high <= self.low:
+            return 0
+        value = min(max(value, self.low), self.high)
+        if self.is_logarithmic:
+            part = math.log(value / self.low) / math.log(self.high / self.low)
+        else:
+            part = (value - self.low) / (self.high - self.low)
+        return round(STEPS * part)
+
+
+def _lattice(columns: int, rows: int) -> dict[str, str]:
+    return {
+        "interaction.columns": str(columns),
+        "interaction.rows": str(rows),
+        "interaction.strength": "0.1",
+        "contacts.count": str(columns * rows),
+    }
+
+
+CONTROLS = (
+    Control("drive.velocity", "drive velocity", "Drive and run", 3),
+    Control("run.duration", "duration", "Drive and run", 1),
+    Control("run.seed", "seed", "Drive and run", range=(1, 100)),
+    Control("run.engine", "contacts are", "Drive and run", choices=("eq", "me")),
+    Control(
+        "slider.kind",
+        "kind",
+        "Slider",
+        choices=tuple(SLIDERS),
+        beside={"layered": {"slider.layers": "8"}},
+    ),
+    Control("slider.stiffness", "spring K", "Slider", 2),
+    Control("slider.mass", "mass M", "Slider", 2),
+    Control("slider.damping_ratio", "damping η_S/Ω_S", "Slider", range=(0, 2)),
+    Control("slider.layers", "layers", "Slider", range=(1, 64)),
+    Control("contacts.count", "number N", "Contacts", 2, (10, 1e6)),
+    Control("contacts.static_force", "static force F_s", "Contacts", 1),
+    Control("contacts.stiffness", "stiffness Nk", "Contacts", 1.5),
+    Control("contacts.delay", "delay τ_d", "Contacts", 2, usual=1e-3),
+    Control("contacts.back_force_ratio", "back force f_b/f_s", "Contacts", range=(0, 0.9)),
+    Control("contacts.drag_rate", "drag rate η", "Contacts", 5, usual=1e11),
+    Control("contacts.coupling", "coupling", "Contacts", choices=tuple(COUPLINGS)),
+    Control("contacts.initial", "at the start", "Contacts", choices=tuple(INITIAL_STATES)),
+    Control("contacts.threshold.law", "law", "Thresholds", choices=tuple(LAWS)),
+    Control(
+        "contacts.threshold.relative_width", "width Δf_s/f_s", "Thresholds", 2, (1e-3, 1), 0.01
+    ),
+    Control(
+        "interaction.lattice",
+        "lattice",
+        "Interaction",
+        choices=(NONE, *LATTICES),
+        beside={name: _lattice(60, 68) for name in LATTICES},
+    ),
+    Control("interaction.strength", "strength ξ", "Interaction", range=(0, 1)),
+    Control("interaction.columns", "columns", "Interaction", range=(4, 200)),
+    Control("interaction.rows", "rows", "Interaction", range=(4, 200)),
+)
+BY_KEY = {control.key: control for control in CONTROLS}
+
+# Controls that stand for a table as a whole: they are there without it.
+FOR_TABLES = ("interaction.lattice",)
+# What a lattice counts is not changed beside it.
+COUNTED = ("interaction.columns", "interaction.rows", "contacts.count")
+
+
+def values(config: Config) -> dict[str, object]:
+    """Values of the controls that have a meaning for a configuration, in SI, by key."""
+    given = flat(config)
+    for key in FOR_TABLES:
+        given.setdefault(key, NONE)
+    if config.interaction is not None:
+        given.pop("contacts.count")
+    return {control.key: given[control.key] for control in CONTROLS if control.key in given}

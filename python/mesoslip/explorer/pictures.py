@@ -1,0 +1,291 @@
+"""Numbers to draw of a run, and of what theory says of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.regime import judgements, regimes
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.units import Scale, scale_for, with_unit
+from mesoslip.errors import MesoslipError
+from mesoslip.output.layout import build_tree, group_of
+from mesoslip.plots.run import (
+    NAMES,
+    UNITS,
+    Extent,
+    force_of,
+    largest_slip,
+    line,
+    slip_window,
+    times_of,
+)
+from mesoslip.simulation.runner import Results
+from mesoslip.theory.force_curve import ForceCurve
+from mesoslip.theory.steady_sliding import steady_sliding
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+# Parts of a line of each of which the extremes are drawn.
+PARTS = 500
+# Points of the force curve that are drawn, its length in mean breaking stretches, its precision: a
+# picture needs no more, and a person does not wait for it.
+CURVE_POINTS = 800
+CURVE_LENGTH = 6.0
+CURVE_TOLERANCE = 1e-6
+# Work that the stability of steady sliding may take.
+MOST_WORK = 10_000
+# Largest picture of the lattice, in contacts along a side.
+MOST_PLACES = 300
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line in a picture: what is along its axes, and in which units."""
+
+    x: Array
+    y: Array
+    x_label: str
+    y_label: str
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to draw."""
+        return len(self.x) == 0
+
+
+NOTHING = Line(np.empty(0), np.empty(0), "", "")
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Snapshots of a lattice.
+
+    Attributes
+    ----------
+    times
+        When they were taken [s].
+    places
+        The same in the unit of the pictures of the motion.
+    loads
+        Force over threshold of each contact, NaN if it is detached, shape (snapshots, rows,
+        columns).
+    avalanches
+        Breaks in avalanches since the snapshot before.
+    """
+
+    times: Array
+    places: Array
+    loads: NDArray[np.float32]
+    avalanches: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a run has come to.
+
+    Attributes
+    ----------
+    force, velocity, detached
+        Against time.
+    slip_force, slip_contact_force
+        The largest slip in close-up: spring force and contact force.
+    end
+        End of the run in the unit of the time axis.
+    regime
+        Which motion it is, in words.
+    numbers
+        Names and values of what else is told.
+    lattice
+        Snapshots, if contacts are on a lattice.
+    part_done
+        Part of the run that is done.
+    """
+
+    force: Line
+    velocity: Line
+    detached: Line
+    slip_force: Line
+    slip_contact_force: Line
+    end: float
+    regime: str
+    numbers: tuple[tuple[str, str], ...]
+    lattice: Lattice | None
+    part_done: float
+
+
+@dataclass(frozen=True)
+class Theory:
+    """What theory says before anything is run.
+
+    Attributes
+    ----------
+    curve
+        F(X) of the master equation.
+    spring
+        The line of slope -K through the point where the slider becomes unstable.
+    critical
+        That point, X_c and its force, in the units of the curve; None if there is none.
+    told
+        In words: the verdict, or why there is no curve.
+    numbers
+        Names and values of what else is told.
+    """
+
+    curve: Line
+    spring: Line
+    critical: tuple[float, float] | None
+    told: str
+    numbers: tuple[tuple[str, str], ...]
+
+
+def motion(results: Results) -> Motion:
+    """What a run has come to, though it may not be over."""
+    config, (realization,) = results.config, results.realizations
+    tree = build_tree(results)
+    extent = Extent(0, parts=PARTS)
+    times = times_of(tree)
+    end = max(config.expected_duration, float(times[-1]) if len(times) else 0.0)
+    along = scale_for(end, "s")
+    force, velocity, detached = (
+        _line(tree, name, extent, extent.window(tree) if len(times) else (0.0, 0.0), along)
+        for name in (force_of(tree), "velocity", "detached_contacts")
+    )
+    close, close_contact = _close_up(tree)
+    numbers = [
+        ("breaks", f"{realization.breaks:.6g}"),
+        ("slips", str(tree["slips"].sizes["slip"])),
+        ("computing time", with_unit(realization.kernel_seconds, "s", 3)),
+    ]
+    if results.complete:
+        numbers.append(("energy balance", f"to {abs(realization.energy_residual):.0e}"))
+    if config.has_avalanches:
+        numbers.insert(1, ("avalanches", str(realization.avalanche_count)))
+    told = judgements(regimes(tree))[0].told
+    return Motion(
+        force,
+        velocity,
+        detached,
+        close,
+        close_contact,
+        end / along.size,
+        told if results.complete else f"{told} (so far)",
+        tuple(numbers),
+        _lattice(tree, along),
+        1.0 if results.complete else realization.part_done,
+    )
+
+
+def _line(
+    tree: xr.DataTree,
+    name: str,
+    extent: Extent,
+    window: tuple[float, float],
+    along: Scale,
+    origin: float = 0.0,
+) -> Line:
+    """A variable against the time since an origin."""
+    if "time" not in tree.coords or tree.sizes["time"] == 0:
+        return NOTHING
+    times, values = line(tree, ("time", name), extent, window)
+    finite = values[np.isfinite(values)]
+    scale = scale_for(float(np.max(np.abs(finite), initial=0.0)), UNITS[name])
+    label = "time" if origin == 0 else f"time after {with_unit(origin, 's', 5)}"
+    return Line(
+        (times - origin) / along.size,
+        values / scale.size,
+        along.label(label),
+        scale.label(NAMES[name]),
+    )
+
+
+def _close_up(tree: xr.DataTree) -> tuple[Line, Line]:
+    """Both forces of the largest slip; nothing if there is none."""
+    slip = largest_slip(tree)
+    if slip is None:
+        return NOTHING, NOTHING
+    low, high = slip_window(slip)
+    times = times_of(tree)
+    window = max(low, float(times[0])), min(high, float(times[-1]))
+    if not window[0] < window[1]:
+        return NOTHING, NOTHING
+    along = scale_for(window[1] - window[0], "s")
+    extent = Extent(0, *window, parts=PARTS)
+    spring, contact = (
+        _line(tree, name, extent, window, along, window[0])
+        for name in (force_of(tree), "contact_force")
+    )
+    return spring, contact
+
+
+def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
+    if "snapshots" not in tree.children:
+        return None
+    data = group_of(tree, "snapshots")
+    if data.sizes["snapshot"] == 0:
+        return None
+    times = data["snapshot_time"].values
+    step = max(1, math.ceil(max(data.sizes["row"], data.sizes["column"]) / MOST_PLACES))
+    loads = data["load"].values[:, ::step, ::step].astype(np.float32)
+    catalogue = group_of(tree, "avalanches")
+    place = np.searchsorted(times, catalogue["start_time"].values)
+    largest = np.zeros(len(times) + 1, dtype=np.int64)
+    np.maximum.at(largest, place, catalogue["size"].values.astype(np.int64))
+    return Lattice(times, times / along.size, loads, largest[:-1])
+
+
+def theory(config: Config) -> Theory:
+    """What theory says of a configuration."""
+    sliding = steady_sliding(config, MOST_WORK)
+    told = [] if sliding is None or sliding.told is None else [sliding.told]
+    numbers = []
+    if sliding is not None:
+        numbers.append(("steady force", with_unit(sliding.force, "N", 4)))
+    try:
+        curve = ForceCurve(_quick(config))
+        drawn, spring, critical, more, verdict = _curve(config, curve)
+    except MesoslipError as error:
+        return Theory(NOTHING, NOTHING, None, "; ".join([str(error), *told]), tuple(numbers))
+    if config.interaction is not None and config.interaction.strength > 0:
+        verdict = f"without interaction, which the curve cannot have: {verdict}"
+    return Theory(drawn, spring, critical, "; ".join([verdict, *told]), (*more, *numbers))
+
+
+def _quick(config: Config) -> Config:
+    length = config.curve.length or CURVE_LENGTH * config.contacts.break_stretch
+    tolerance = max(config.curve.tolerance, CURVE_TOLERANCE)
+    return config.replace({"curve.length": length, "curve.tolerance": tolerance})
+
+
+def _curve(
+    config: Config, curve: ForceCurve
+) -> tuple[Line, Line, tuple[float, float] | None, tuple[tuple[str, str], ...], str]:
+    samples = curve.samples
+    end = float(samples[-1])
+    critical = curve.critical_points[:1]
+    marked = [curve.peak[0], *(one.displacement for one in critical)]
+    x = np.unique(np.clip([*np.linspace(0, end, CURVE_POINTS), *marked], samples[0], end))
+    force = curve.force(x)
+    across, along = scale_for(end, "m"), scale_for(float(np.nanmax(np.abs(force))), "N")
+    labels = across.label("displacement"), along.label("force of the contacts")
+    drawn = Line(x / across.size, force / along.size, *labels)
+    numbers = [("K*", with_unit(curve.K_star[0], "N/m", 4))]
+    stiffness = config.spring_stiffness
+    spring, point = NOTHING, None
+    if math.isfinite(stiffness) and stiffness > 0:
+        numbers.append(("K", with_unit(stiffness, "N/m", 4)))
+    if critical:
+        (first,) = critical
+        numbers.append(("X_c", with_unit(first.displacement, "m", 4)))
+        point = first.displacement / across.size, first.force / along.size
+        ends = np.array([0.0, end])
+        height = first.force - stiffness * (ends - first.displacement)
+        spring = Line(ends / across.size, height / along.size, *labels)
+    return drawn, spring, point, tuple(numbers), curve.verdict

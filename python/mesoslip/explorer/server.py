@@ -1,0 +1,147 @@
+"""The server of the page: for this machine alone, and for no other page in its browser."""
+
+from __future__ import annotations
+
+import logging
+import webbrowser
+from collections.abc import Awaitable, Callable
+from typing import Any
+from urllib.parse import urlsplit
+
+from bokeh.application import Application
+from bokeh.application.handlers import FunctionHandler
+from bokeh.document import Document
+from bokeh.server.auth_provider import AuthProvider
+from bokeh.server.server import Server
+from bokeh.settings import settings
+from jinja2 import Environment
+from tornado.ioloop import IOLoop
+from tornado.web import HTTPError, RequestHandler
+
+from mesoslip.configuration.config import Config
+from mesoslip.errors import RunError
+from mesoslip.explorer.view import Page
+
+ADDRESS = "127.0.0.1"
+# Ports that are tried after the one that is wanted.
+MORE_PORTS = 20
+# How soon the runs of a closed tab are ended [ms].
+UNUSED_MILLISECONDS = 3_000
+
+# Bokeh compiles what it is told to do at a click, and styles what it draws; nothing else is let in,
+# and nothing at all from elsewhere.
+POLICY = (
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-ancestors 'none'; form-action 'none'; base-uri 'none'"
+)
+TEMPLATE = Environment(autoescape=False).from_string(
+    """{% extends base %}
+{% block preamble %}<style>body { font-family: sans-serif; margin: 8px }</style>{% endblock %}
+"""
+)
+
+
+class OnlyHere(AuthProvider):
+    """Who may ask: the page itself, under the address of this machine."""
+
+    def __init__(self) -> None:
+        self.hosts: set[str] = set()
+        super().__init__()
+
+    @property
+    def get_user_async(self) -> Callable[[Any], Awaitable[Any]]:
+        return self._user
+
+    @property
+    def login_url(self) -> str:
+        """Nobody can log in: who is refused stays so."""
+        return "/"
+
+    async def _user(self, handler: RequestHandler) -> str:
+        headers = handler.request.headers
+        origin, site = headers.get("Origin"), headers.get("Sec-Fetch-Site", "none")
+        # A foreign name that leads here has its own name in Host.
+        is_allowed = (
+            handler.request.host.lower() in self.hosts
+            and (origin is None or urlsplit(origin).netloc.lower() in self.hosts)
+            and site in {"none", "same-origin"}
+        )
+        if not is_allowed:
+            raise HTTPError(403)
+        handler.set_header("Content-Security-Policy", POLICY)
+        handler.set_header("X-Content-Type-Options", "nosniff")
+        return "here"
+
+
+def serve(
+    config: Config,
+    source: str,
+    *,
+    port: int,
+    opens: bool,
+    tell: Callable[[str], None],
+) -> None:
+    """Serve the page until the program is interrupted.
+
+    Parameters
+    ----------
+    config
+        What the page starts from.
+    source
+        What the command line calls it.
+    port
+        Port of the loopback address; the first free one from there on.
+    opens
+        Whether a browser is opened.
+    tell
+        Called with the address of the page.
+
+    Raises
+    ------
+    RunError
+        If no port is free.
+    """
+    server = make_server(config, source, port)
+    address = f"http://{ADDRESS}:{server.port}/"
+    tell(address)
+    if opens:
+        IOLoop.current().call_later(0, webbrowser.open, address)
+    server.start()
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()
+
+
+def make_server(config: Config, source: str, port: int) -> Server:
+    """A server of the page that is not started; see `serve`."""
+    # What the library has to say is for its own developers.
+    logging.getLogger("bokeh").setLevel(logging.CRITICAL)
+    logging.getLogger("tornado").setLevel(logging.CRITICAL)
+
+    # Scripts and styles come from this server, whatever its environment says.
+    settings.resources = "server"
+
+    def make(document: Document) -> None:
+        document.template = TEMPLATE
+        Page(document, config, source)
+
+    for one in [0] if port == 0 else range(port, port + MORE_PORTS):
+        gate = OnlyHere()
+        options: dict[str, Any] = {
+            "address": ADDRESS,
+            "port": one,
+            "auth_provider": gate,
+            "allow_websocket_origin": [f"{ADDRESS}:{one}", f"localhost:{one}"],
+            "unused_session_lifetime_milliseconds": UNUSED_MILLISECONDS,
+            "check_unused_sessions_milliseconds": UNUSED_MILLISECONDS // 3,
+        }
+        try:
+            server = Server({"/": Application(FunctionHandler(make))}, **options)
+        except OSError:
+            continue
+        gate.hosts = {f"{name}:{server.port}" for name in (ADDRESS, "localhost")}
+        server._tornado.websocket_origins.update(gate.hosts)
+        return server
+    raise RunError(f"no port from {port} to {port + MORE_PORTS - 1} is free: choose one by --port")

@@ -1,0 +1,330 @@
+"""The page of the explorer in a real browser: as it is loaded, used, and closed."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import random
+import statistics
+import time
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from conftest import PATIENCE, ROOT, Browser, Server, eventually, is_here
+from mesoslip import Config
+from mesoslip.explorer.controls import CONTROLS, STEPS
+from selenium.webdriver.common.keys import Keys
+
+REFUSED = 403
+# Random changes, and the median time in which they are to be drawn [s].
+CHANGES = 200
+MEDIAN = 0.5
+# What the memory of the program may grow by while it is used.
+GROWTH = 1.25
+
+
+def ask(address: str, path: str = "/", **headers: str) -> int:
+    """Status of a request with headers of one's own."""
+    connection = http.client.HTTPConnection(urlsplit(address).netloc, timeout=PATIENCE)
+    try:
+        connection.request(
+            "GET", path, headers={k.replace("_", "-"): v for k, v in headers.items()}
+        )
+        return connection.getresponse().status
+    finally:
+        connection.close()
+
+
+def test_loads_and_draws_without_asking_anyone(server, browser):
+    browser.open(server.address)
+    browser.wait_until_done()
+    asked = browser.requests()
+    assert len(asked) > 3
+    assert [url for url in asked if not is_here(url)] == []
+    assert browser.errors() == []
+    force = browser.data("force:force")
+    assert 17.0 < max(force) < 18.0
+    assert browser.value("force", "below[0].axis_label") == "time (s)"
+    assert len(browser.data("curve:force")) > 100
+    assert "stick-slip" in browser.value("regime", "text")
+
+
+def test_a_value_is_typed(server, browser):
+    browser.open(server.address)
+    browser.wait_until_done()
+    before = browser.data("force:force")
+    field = browser.element("contacts.static_force", "input")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("9 uN", Keys.ENTER)
+    browser.wait("return Bokeh.documents[0].get_model_by_name('command').value.includes('9 uN')")
+    browser.wait_until_done()
+    assert max(browser.data("force:force")) == pytest.approx(max(before) / 2, rel=0.02)
+    assert "was 18 µN" in browser.value("contacts.static_force", "title")
+
+
+def test_a_slider_is_moved_by_keys(server, browser):
+    browser.open(server.address)
+    browser.wait_until_done()
+    handle = browser.element("contacts.delay:slider", ".noUi-handle")
+    handle.send_keys(Keys.ARROW_RIGHT)
+    browser.wait("return Bokeh.documents[0].get_model_by_name('command').value.includes('delay')")
+    assert browser.value("contacts.delay:slider", "value") == STEPS / 2 + 1
+    browser.wait_until_done()
+    assert "● was 500 µs" in browser.value("contacts.delay", "title")
+    assert browser.errors() == []
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
+def test_each_control_draws_a_new_picture(server, browser, control):
+    """Each by itself on a page of its own; what it changes to can be run."""
+    browser.open(server.address)
+    before = browser.value("command", "value")
+    if control.key.startswith("interaction.") and control.key != "interaction.lattice":
+        assert browser.change("interaction.lattice", "square")[1] == "drawn"
+    if control.key == "slider.layers":
+        assert browser.change("slider.kind", "layered")[1] == "drawn"
+    if control.choices:
+        now = browser.value(control.key, "value")
+        other = next(one for one in control.choices if one != now)
+        assert browser.change(control.key, other)[1] == "drawn"
+    else:
+        place = browser.value(f"{control.key}:slider", "value")
+        place = place - 8 if place > STEPS / 2 else place + 8
+        assert browser.change(f"{control.key}:slider", place)[1] == "drawn"
+        # The page leaves the slider where it was put, to the rounding of the text.
+        assert abs(browser.value(f"{control.key}:slider", "value") - place) <= 2
+    assert browser.value("command", "value") != before
+    assert "●" in browser.value(control.key, "title")
+    assert len(browser.data("force:force")) > 1
+    assert browser.errors() == []
+
+
+def test_a_wrong_value_is_told_at_its_control(server, browser):
+    browser.open(server.address)
+    browser.wait_until_done()
+    before = browser.data("force:force")
+    assert browser.change("contacts.delay", "<b>1 kg</b>")[1] == "refused"
+    assert browser.value("contacts.delay:message", "visible")
+    assert "<b>" not in browser.value("contacts.delay:message", "text")
+    assert browser.data("force:force") == before
+    assert browser.change("contacts.delay", "1 ms")[1] == "drawn"
+    assert not browser.value("contacts.delay:message", "visible")
+
+
+def test_infinitely_many_contacts_beside(server, browser):
+    browser.open(server.address)
+    browser.change("run.duration", "3 s")
+    assert browser.change("limit", True, "active")[1] == "drawn"
+    browser.wait("return Bokeh.documents[0].get_model_by_name('limit:motion').visible")
+    browser.wait(
+        "return Bokeh.documents[0].get_model_by_name('limit:force:force').data.y.length > 100"
+    )
+    browser.wait("return Bokeh.documents[0].get_model_by_name('limit:regime').text.length > 0")
+    browser.wait_until_done()
+    assert eventually(
+        lambda: abs(max(browser.data("limit:force:force")) - max(browser.data("force:force"))) < 0.5
+    )
+    assert browser.change("interaction.lattice", "square")[1] == "drawn"
+    assert "no neighbours" in browser.value("limit:message", "text")
+    assert not browser.value("limit:motion", "visible")
+
+
+def test_a_lattice_moves(server, browser):
+    browser.open(server.address)
+    for key, value in (
+        ("interaction.lattice", "triangular"),
+        ("contacts.stiffness", "200 N/m"),
+        ("contacts.threshold.relative_width", "0.3"),
+        ("interaction.strength", "0.3"),
+    ):
+        assert browser.change(key, value)[1] == "drawn"
+    browser.wait_until_done()
+    image = "return Bokeh.documents[0].get_model_by_name('lattice:image').data.image[0]"
+    browser.wait(f"{image} != null")
+    assert browser.value("lattice:image", "data.dw[0]") == 60
+    browser.driver.execute_script("Bokeh.documents[0].get_model_by_name('moving').active = true")
+    seen = set()
+    assert eventually(lambda: seen.add(browser.value("snapshot", "value")) or len(seen) > 3)
+    browser.driver.execute_script("Bokeh.documents[0].get_model_by_name('moving').active = false")
+    assert browser.errors() == []
+
+
+def test_two_tabs_have_changes_of_their_own(server, browser):
+    browser.open(server.address)
+    first = browser.driver.current_window_handle
+    assert browser.change("contacts.delay", "1 ms")[1] == "drawn"
+    threads = server.threads()
+    browser.driver.switch_to.new_window("tab")
+    browser.open(server.address)
+    assert browser.value("contacts.delay", "value") == "500 µs"
+    assert browser.change("slider.stiffness", "200 N/m")[1] == "drawn"
+    assert server.threads() > threads
+    browser.driver.close()
+    browser.driver.switch_to.window(first)
+    assert browser.value("contacts.delay", "value") == "1 ms"
+    assert "stiffness" not in browser.value("command", "value")
+    assert browser.change("slider.mass", "1 g")[1] == "drawn"
+    # A closed tab leaves no thread behind.
+    assert eventually(lambda: server.threads() <= threads, 60)
+
+
+def test_a_tab_that_is_closed_ends_its_run(browser, tmp_path):
+    """Though that would go on for hours."""
+    path = tmp_path / "long.toml"
+    path.write_text(
+        f'base = "{ROOT}/runs/klein.toml"\n[run]\nduration = "1e5 s"\n'
+        '[contacts]\ncount = 1000000\n[output]\ninterval = "1 s"\nslip_interval = "10 ms"\n'
+    )
+    server = Server(str(path))
+    try:
+        first = browser.driver.current_window_handle
+        browser.driver.switch_to.new_window("tab")
+        browser.open(server.address)
+        busy = server.threads()
+        browser.driver.close()
+        browser.driver.switch_to.window(first)
+        assert eventually(lambda: server.threads() <= busy - 3, 60)
+    finally:
+        server.stop()
+
+
+def test_files_are_saved(server, browser, tmp_path):
+    import mesoslip
+
+    browser.driver.execute_cdp_cmd(
+        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)}
+    )
+    browser.open(server.address)
+    assert browser.change("contacts.delay", "0.4 ms")[1] == "drawn"
+    browser.wait_until_done()
+    browser.element("save", "button").click()
+    assert eventually((tmp_path / "klein.toml").exists)
+    saved = Config.load(tmp_path / "klein.toml")
+    assert saved == Config.load(ROOT / "runs" / "klein.toml", ["contacts.delay=0.4 ms"])
+    browser.element("download", "button").click()
+    assert eventually((tmp_path / "klein.nc").exists)
+    tree = mesoslip.read(tmp_path / "klein.nc")
+    assert float(tree["spring_force"].max()) == pytest.approx(
+        1e-6 * max(browser.data("force:force")), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example"},
+        {"Host": "evil.example:5006"},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Sec_Fetch_Site": "cross-site"},
+        {"Sec_Fetch_Site": "same-site"},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("path", ["/", "/ws", "/autoload.js?bokeh-autoload-element=x"])
+def test_other_origins_are_refused(server, headers, path):
+    upgrade = {
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec_WebSocket_Version": "13",
+        "Sec_WebSocket_Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+    }
+    assert ask(server.address) == 200
+    assert ask(server.address, path, **headers, **(upgrade if path == "/ws" else {})) == REFUSED
+
+
+def test_another_page_cannot_reach_it(server, browser):
+    """A page of another origin, in the same browser, gets no connection."""
+    browser.driver.get("data:text/html,<title>another page</title>")
+    outcome = browser.driver.execute_async_script(
+        """
+        const done = arguments[arguments.length - 1]
+        const socket = new WebSocket(arguments[0].replace("http", "ws") + "ws", ["bokeh", "x"])
+        socket.onopen = () => done("open")
+        socket.onerror = () => done("refused")
+        """,
+        server.address,
+    )
+    assert outcome == "refused"
+    browser.driver.get_log("browser")
+
+
+def test_only_this_machine_is_listened_to(server):
+    port = urlsplit(server.address).port
+    table = Path(f"/proc/{server.process.pid}/net/tcp").read_text().splitlines()
+    # Its sockets: those that other pages of a test are connected to have the same address.
+    bound = [line.split()[1] for line in table if line.split()[1].endswith(f":{port:04X}")]
+    assert bound
+    assert {one.split(":")[0] for one in bound} == {"0100007F"}
+
+
+def test_files_cannot_be_asked_for(server):
+    for path in ("/static/../../../etc/passwd", "/runs/klein.toml", "/static/%2e%2e/%2e%2e/x"):
+        assert ask(server.address, path) in {403, 404}
+
+
+# As long as a machine with other work on it may take.
+@pytest.mark.timeout(1800)
+def test_many_changes_at_random():
+    """No error, new pictures soon, memory that does not grow."""
+    chance = random.Random(1)
+    server, browser = Server("runs/klein.toml"), Browser()
+    try:
+        browser.open(server.address)
+        drawn, refused, memory = [], 0, []
+        for number in range(CHANGES):
+            keys = browser.driver.execute_script(
+                """
+                const find = (name) => Bokeh.documents[0].get_model_by_name(name)
+                return arguments[0].filter((key) => find(`${key}:control`).visible)
+                """,
+                [one.key for one in CONTROLS],
+            )
+            shown = [one for one in CONTROLS if one.key in keys]
+            control = chance.choice(shown)
+            if control.choices:
+                options = browser.value(control.key, "options")
+                now = browser.value(control.key, "value")
+                value = chance.choice([one for one in options if one != now])
+                seconds, became = browser.change(control.key, value)
+            else:
+                name = f"{control.key}:slider"
+                now = browser.value(name, "value")
+                value = chance.choice([one for one in range(STEPS + 1) if abs(one - now) > 5])
+                seconds, became = browser.change(name, value)
+            assert became in {"drawn", "refused"}, control.key
+            if became == "drawn":
+                drawn.append(seconds)
+            else:
+                refused += 1
+                browser.element("reset", "button").click()
+                browser.wait("return Bokeh.documents[0].get_model_by_name('status').tags[1] >= 0")
+            assert browser.errors() == []
+            if number % 10 == 9:
+                memory.append(server.memory())
+        told = {
+            "drawn": len(drawn),
+            "refused": refused,
+            "median": statistics.median(drawn),
+            "90 %": float(np.percentile(drawn, 90)),
+            "longest": max(drawn),
+            "memory": [round(one / 1e6) for one in memory],
+        }
+        print(json.dumps(told))
+        half = len(memory) // 2
+        assert statistics.median(memory[half:]) < GROWTH * statistics.median(memory[2:half])
+        assert told["median"] < MEDIAN, told
+    finally:
+        browser.driver.quit()
+        server.stop()
+
+
+def test_ctrl_c_ends_it():
+    server = Server("runs/klein.toml")
+    server.process.send_signal(2)
+    started = time.monotonic()
+    server.process.communicate(timeout=PATIENCE)
+    assert server.process.returncode == 0
+    assert time.monotonic() - started < 30

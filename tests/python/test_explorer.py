@@ -1,0 +1,304 @@
+"""The explorer without a page: what was changed, runs that are shown, numbers to draw."""
+
+from __future__ import annotations
+
+import shlex
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import ROOT, klein_tables
+from kinds import KINDS, configuration
+from mesoslip import Config
+from mesoslip.configuration.keys import key_kind
+from mesoslip.explorer.controls import CONTROLS, STEPS, values
+from mesoslip.explorer.following import Worker, explored, follow
+from mesoslip.explorer.pictures import motion, theory
+from mesoslip.explorer.session import Session
+from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.stop import StopFlag
+
+KLEIN = str(ROOT / "runs" / "klein.toml")
+
+
+@pytest.fixture
+def session():
+    return Session(Config.load(KLEIN), KLEIN)
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
+def test_controls_are_keys_of_the_configuration(control):
+    kind = key_kind(control.key)
+    assert kind is not None
+    assert bool(control.choices) == (kind.unit is None and not kind.is_whole)
+
+
+@pytest.mark.parametrize("control", [one for one in CONTROLS if not one.choices], ids=str)
+@pytest.mark.parametrize("start", [None, 0.0, 3.0])
+def test_each_position_of_a_slider_has_a_value(control, start):
+    """From end to end values grow, and lie at the positions that they are shown at."""
+    scale = control.scale(start)
+    found = [scale.value(position) for position in range(STEPS + 1)]
+    assert np.all(np.diff(found) >= 0)
+    assert scale.low == pytest.approx(found[0], abs=0.5 * control.is_whole)
+    assert scale.high == pytest.approx(found[-1], abs=0.5 * control.is_whole)
+    for position in (0, 17, STEPS):
+        again = scale.value(scale.position(scale.value(position)))
+        assert again == pytest.approx(scale.value(position), rel=1e-9)
+    if start:
+        assert scale.low <= start <= scale.high
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
+def test_each_control_changes_the_configuration_as_the_command_line_does(session, control):
+    before = session.text(control.key)
+    if control.choices:
+        text = next(one for one in control.choices[::-1] if one != before)
+    else:
+        text = control.text(control.scale(session.values.get(control.key)).value(0.7 * STEPS))
+    if control.key.startswith("interaction.") and control.key != "interaction.lattice":
+        assert session.change("interaction.lattice", "square")
+    if control.key == "slider.layers":
+        assert session.change("slider.kind", "layered")
+    assert session.change(control.key, text), session.problems
+    assert session.is_changed(control.key)
+    words = shlex.split(session.command)
+    assert words[:3] == ["mesoslip", "run", KLEIN]
+    assert words[3::2] == ["--set"] * len(words[4::2])
+    assert Config.load(KLEIN, words[4::2]) == session.config
+    assert Config.from_toml(session.config.to_toml()) == session.config
+
+
+def test_a_value_as_at_the_start_is_no_change(session):
+    assert session.change("contacts.delay", "1 ms")
+    assert session.is_changed("contacts.delay")
+    assert session.change("contacts.delay", "500us")
+    assert session.changes == {}
+    assert session.config == session.start
+
+
+def test_what_is_wrong_is_told_at_its_control_until_it_is_right(session):
+    good = session.config
+    assert not session.change("contacts.delay", "1 kg")
+    assert "expected a quantity" in session.problems["contacts.delay"]
+    assert session.text("contacts.delay") == "1 kg"
+    # What is right by itself waits for it.
+    assert not session.change("slider.stiffness", "100 N/m")
+    assert list(session.problems) == ["contacts.delay"]
+    assert session.config is good
+    assert session.change("contacts.delay", "1 ms")
+    assert session.problems == {}
+    assert session.config.slider.spring_stiffness == 100.0
+
+
+def test_a_combination_is_told_at_the_control_that_brought_it_about(session):
+    assert session.change("interaction.lattice", "triangular")
+    assert not session.change("run.engine", "me")
+    assert "no neighbours" in session.problems["run.engine"]
+    assert session.change("run.engine", "eq")
+    assert not session.change("interaction.rows", "7")
+    assert "even" in session.problems["interaction.rows"]
+
+
+def test_a_problem_of_a_key_without_a_control_is_told_at_the_one_that_was_changed(session):
+    """A duration below the interval of the trace, which has no control."""
+    assert not session.change("run.duration", "0.1 ms")
+    assert session.problems["run.duration"].startswith("output.interval")
+
+
+@pytest.mark.parametrize("text", ["", "'", "1\nx = 2", "[1]", "{}", "nan", "1e999", "\x00", "∞"])
+@pytest.mark.parametrize("key", ["contacts.delay", "contacts.count", "slider.kind"])
+def test_nonsense_is_told(session, key, text):
+    assert not session.change(key, text)
+    assert session.problems[key]
+
+
+def test_a_lattice_counts_its_contacts_and_goes_again(session):
+    assert session.change("interaction.lattice", "square")
+    assert "contacts.count" not in session.shown
+    assert session.change("interaction.columns", "10")
+    assert session.change("interaction.rows", "7")
+    assert session.config.contacts.count == 70
+    assert session.change("interaction.lattice", "none")
+    assert session.changes == {}
+    assert session.config == session.start
+
+
+def test_a_kind_takes_the_keys_with_it_that_only_it_has(session):
+    assert session.change("slider.damping_ratio", "0.5")
+    assert session.change("slider.kind", "layered")
+    assert "slider.damping_ratio" not in session.shown
+    assert session.config.slider.layer_count == 8
+    assert session.change("slider.layers", "3")
+    assert session.change("slider.kind", "rigid")
+    assert "slider.layers" not in session.shown
+    assert session.config == session.start
+
+
+def test_a_page_of_many_changes_can_be_taken_back(session):
+    session.change("slider.kind", "quasistatic")
+    session.change("contacts.delay", "what?")
+    assert session.reset()
+    assert session.config == session.start
+    assert session.problems == {}
+
+
+def test_a_run_is_shown_soon_and_at_its_end():
+    config = explored(Config.load(KLEIN))
+    parts, times, start = [], [], time.thread_time()
+
+    def show(results):
+        times.append(time.thread_time() - start)
+        parts.append(motion(results).part_done)
+
+    follow(config, StopFlag(), show)
+    assert parts[-1] == 1.0
+    assert parts == sorted(parts)
+    # Of computing time, as others may use the machine as well.
+    assert times[0] < 0.5
+
+
+def test_what_is_explored_moves_as_what_is_run():
+    """Samples and snapshots do not change the motion."""
+    config = Config.load(KLEIN, ["run.duration=3 s"])
+    seen = []
+    follow(explored(config), StopFlag(), seen.append)
+    (mine,), (theirs,) = seen[-1].realizations, run_realizations(config).realizations
+    assert mine.breaks == theirs.breaks
+    assert mine.slips == pytest.approx(theirs.slips)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_run_is_drawn(kind):
+    config = configuration(kind)
+    seen = []
+    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    drawn = seen[-1]
+    for line in (drawn.force, drawn.velocity, drawn.detached):
+        assert len(line.x) == len(line.y) > 1
+        assert np.all(np.isfinite(line.y))
+        assert line.x_label.startswith("time")
+    assert (drawn.lattice is not None) == (config.interaction is not None)
+    assert drawn.regime
+
+
+def test_pictures_are_as_long_as_a_picture_is_wide():
+    config = explored(Config.load(KLEIN))
+    seen = []
+    follow(config, StopFlag(), lambda results: seen.append(motion(results)))
+    drawn = seen[-1]
+    assert len(drawn.force.x) < 4000
+    # The first spike of Klein's case: 18 uN less the spread of the thresholds.
+    assert 17.0 < np.max(drawn.force.y) < 18.0
+    assert drawn.force.y_label == "spring force (µN)"
+    assert "ms" in drawn.slip_force.x_label
+    # In the slip all contacts let go, and the force falls to zero.
+    assert np.min(np.abs(drawn.slip_contact_force.y)) < 0.1
+
+
+def test_the_line_of_the_spring_touches_the_curve():
+    shown = theory(Config.load(KLEIN))
+    x, y = shown.critical
+    assert np.interp(x, shown.curve.x, shown.curve.y) == pytest.approx(y, rel=1e-6)
+    assert np.interp(x, shown.spring.x, shown.spring.y) == pytest.approx(y, rel=1e-6)
+    # In µN and nm, so that the slope is in 1000 N/m.
+    slope = np.diff(shown.spring.y) / np.diff(shown.spring.x)
+    assert slope == pytest.approx(-0.097)
+    assert "K < K*" in shown.told
+
+
+def test_what_has_no_curve_says_so():
+    ageing = {"law": "log", "time": "1 ms", "growth": 0.02}
+    tables = klein_tables(contacts__coupling="equal", contacts__ageing=ageing)
+    shown = theory(Config.from_dict(tables))
+    assert shown.curve.is_empty
+    assert "age" in shown.told
+
+
+def test_a_lattice_is_shown_in_motion():
+    config = Config.load(ROOT / "runs" / "S25d.toml", ["run.duration=2 s"])
+    seen = []
+    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    lattice = seen[-1].lattice
+    assert lattice.loads.shape[1:] == (68, 60)
+    assert len(lattice.times) == len(lattice.loads) > 50
+    # Loads grow until the avalanche through the whole system, and are small after it.
+    largest = int(np.argmax(lattice.avalanches))
+    assert lattice.avalanches[largest] > 3000
+    before, after = (np.nanmean(lattice.loads[place]) for place in (largest - 1, largest + 1))
+    assert after < 0.5 * before
+
+
+def test_a_run_is_cut_off_by_the_next_one():
+    """A long run ends within a segment; of those that waited only the last one is done."""
+    long = explored(
+        Config.load(
+            KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=10 ms"]
+        )
+    )
+    worker, begun, done = Worker("test"), threading.Event(), []
+
+    def hour(stop):
+        begun.set()
+        follow(long, stop, lambda _: None)
+        done.append("hour")
+
+    worker.submit(hour)
+    assert begun.wait(30)
+    worker.submit(lambda _: done.append("skipped") or time.sleep(0))
+    worker.submit(lambda _: done.append("last"))
+    end = time.monotonic() + 30
+    while "last" not in done and time.monotonic() < end:
+        time.sleep(0.01)
+    assert done[0] == "hour"
+    assert done[-1] == "last"
+    worker.close()
+    worker._thread.join(30)
+    assert not worker.is_alive
+
+
+def test_values_are_those_that_have_a_meaning(klein):
+    there = values(klein(slider={"kind": "prescribed"}))
+    assert "slider.mass" not in there
+    assert "contacts.count" in there
+    assert there["interaction.lattice"] == "none"
+
+
+def test_a_missing_library_is_named(command, monkeypatch):
+    monkeypatch.setattr("mesoslip.command_line.explore.find_spec", lambda _: None)
+    status, out, told = command("explore", KLEIN, "--no-browser")
+    assert (status, out) == (2, "")
+    assert "mesoslip[explore]" in told
+    assert len(told.splitlines()) == 1
+
+
+def test_what_cannot_be_explored_is_told(command):
+    status, _, told = command("explore", KLEIN, "--no-browser", "--set", "contacts.delay=1kg")
+    assert status == 2
+    assert "contacts.delay" in told
+
+
+def test_the_page_is_of_every_control():
+    """It is made without a browser, and takes changes as its widgets give them."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer.view import Page
+
+    page = Page(document, Config.load(KLEIN), KLEIN)
+    try:
+        for control in CONTROLS:
+            assert document.get_model_by_name(control.key) is not None
+        field = document.get_model_by_name("contacts.delay")
+        slider = document.get_model_by_name("contacts.delay:slider")
+        field.value = "1 ms"
+        # The slider follows without a change of its own.
+        assert page.session.changes == {"contacts.delay": "1 ms"}
+        assert slider.value > STEPS / 2
+        slider.value = STEPS
+        assert page.session.config.contacts.delay == pytest.approx(0.05)
+        field.value = "what?"
+        assert document.get_model_by_name("contacts.delay:message").visible
+        slider.value = STEPS - 1
+        assert not document.get_model_by_name("contacts.delay:message").visible
+    finally:
+        page.close()

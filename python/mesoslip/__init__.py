@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         onset,
         plot,
         read,
+        read_trace,
         run,
         slips,
     )
@@ -47,6 +48,7 @@ __all__ = [
     "onset",
     "plot",
     "read",
+    "read_trace",
     "run",
     "slips",
 ]
@@ -65,6 +67,7 @@ _LAZY = {
     "onset": "api",
     "plot": "api",
     "read": "api",
+    "read_trace": "api",
     "run": "api",
     "slips": "api",
 }

@@ -135,6 +135,63 @@ def onset(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
     return onset_of_slip(as_config(config))
 
 
+def read_trace(
+    file: PathLike,
+    *,
+    columns: str | None = None,
+    rate: float | None = None,
+    largest_gap: float | None = None,
+    drive_velocity: float | None = None,
+    stiffness: float | None = None,
+    config: PathLike | Mapping[str, Any] | Config | None = None,
+    noise: float | None = None,
+    period: float | None = None,
+) -> xr.DataTree:
+    """Read a measured trace from a table: an output like that of a run, with the slips found in it.
+
+    Parameters
+    ----------
+    file
+        Columns with units in their headers, such as ``time [s]``, ``force [uN]``,
+        ``displacement [nm]``.
+    columns
+        Headers in the place of those of the file, such as "time [s], force [uN], -".
+    rate
+        Samples in a second [1/s], if there are no times.
+    largest_gap
+        Longest time without values [s] that is filled by straight lines; none by default.
+    drive_velocity, stiffness
+        Velocity of the drive [m/s] and spring constant [N/m], if they are known.
+    config
+        Configuration of the experiment, which tells drive and spring, and lets every command work
+        on the output.
+    noise
+        Standard deviation of the noise of the force [N]; estimated by default.
+    period
+        Period of the setup [s]; by default that of the configuration, or estimated.
+
+    Raises
+    ------
+    FileError
+        If the table cannot be read or is wrong; the message tells the line.
+    ConfigError
+        If the configuration is wrong.
+    """
+    from mesoslip.measured import trace
+
+    return trace.read_trace(
+        Path(file),
+        columns=columns,
+        rate=rate,
+        largest_gap=largest_gap,
+        drive_velocity=drive_velocity,
+        stiffness=stiffness,
+        config=None if config is None else as_config(config),
+        noise=noise,
+        period=period,
+    )
+
+
 def read(path: PathLike) -> xr.DataTree:
     """Read an output into memory.
 

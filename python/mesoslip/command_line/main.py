@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, pictures, run, theory
+from mesoslip.command_line import catalogues, pictures, run, theory, trace
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
@@ -20,6 +20,7 @@ COMMANDS = (
     theory.info,
     theory.curve,
     theory.onset,
+    trace.trace,
     catalogues.slips,
     catalogues.avalanches,
     pictures.plot,

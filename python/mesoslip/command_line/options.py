@@ -46,3 +46,27 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(one) for one in value]
     return value
+
+
+def quantity(
+    text: str | None, option: str, unit: str, example: str, *, positive: bool = False
+) -> float | None:
+    """A quantity given to an option, in SI; None if it is not given.
+
+    Raises
+    ------
+    ConfigError
+        If it is no quantity of the unit's dimension, or not greater than 0 where it must be.
+    """
+    from mesoslip.configuration.units import to_si
+    from mesoslip.errors import ConfigError, Problem
+
+    if text is None:
+        return None
+    try:
+        value = to_si(text, unit, example)
+    except ValueError as error:
+        raise ConfigError([Problem("", option, str(error), text)]) from None
+    if positive and value <= 0:
+        raise ConfigError([Problem("", option, "must be greater than 0", text)])
+    return value

@@ -6,12 +6,9 @@ import platform
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from mesoslip import _build
-
-if TYPE_CHECKING:
-    from mesoslip.configuration.config import Config
 
 # The line that was typed, if the command line is what asks for an output.
 COMMAND_LINE: ContextVar[str | None] = ContextVar("COMMAND_LINE", default=None)
@@ -24,10 +21,24 @@ SUMMARIES = {
     "that moves forward slowly, from the master equation of multicontact friction",
     "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
     "contacts that break one after another and for a film that melts at once",
+    "trace": "A measured trace of the spring force of a slider, with the slips found in it",
+    "fit": "Parameters of the earthquake-like model of multicontact friction with their "
+    "uncertainty, from a trace of the spring force",
 }
 
 
-def program_attributes(config: Config, command: str) -> dict[str, Any]:
+class Described(Protocol):
+    """What an output is of: a configuration, or as much of one as is known."""
+
+    @property
+    def title(self) -> str | None: ...
+
+    def to_toml(self) -> str:
+        """The text of a TOML file."""
+        ...
+
+
+def program_attributes(config: Described, command: str) -> dict[str, Any]:
     """Attributes of every output: what was computed, by what."""
     # Here, as the command line imports this module, which is to start at once.
     from mesoslip import _core

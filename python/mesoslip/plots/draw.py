@@ -45,6 +45,8 @@ def picture(tree: xr.DataTree, view: str | None = None, snapshot: int | None = N
         if "avalanches" not in tree.children:
             raise FileError(NO_AVALANCHES)
         return Picture(avalanches.distribution, avalanches.draw_density)
+    if tree.attrs.get("origin") == "measured":
+        return Picture(run.overview, run.draw_force)
     if Config.from_toml(tree.attrs["configuration"]).slider.jumps:
         return Picture(avalanches.overview, avalanches.draw_force)
     return Picture(run.overview, run.draw_force)

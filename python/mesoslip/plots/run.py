@@ -157,6 +157,11 @@ def draw_series(
     axes.plot((times - start) / time_unit, values * SCALES[name][0], **style)
 
 
+def is_known(tree: xr.DataTree, name: str) -> bool:
+    """Whether a trace has a variable: a measured one may not."""
+    return bool(np.isfinite(tree[name].isel(realization=0, time=0).item()))
+
+
 def largest_slip(tree: xr.DataTree) -> xr.Dataset | None:
     """The slip with the greatest drop of the spring force; None if there is no slip."""
     all_slips = slips(tree)
@@ -178,7 +183,7 @@ def draw_force(axes: Axes, tree: xr.DataTree) -> None:
     draw_series(axes, tree, "spring_force", color="black")
     axes.set_ylabel("spring force (µN)")
     axes.set_xlabel("time (s)")
-    axes.set_xlim(0, tree["time"].max().item())
+    axes.set_xlim(min(0, tree["time"].min().item()), tree["time"].max().item())
     title = tree.attrs.get("title", "")
     if tree.attrs.get("complete") == "false":
         title = f"{title} ({tree.attrs['comment']})"
@@ -188,24 +193,31 @@ def draw_force(axes: Axes, tree: xr.DataTree) -> None:
 def overview(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
     """Spring force with a slip in an inset, velocity, and detached contacts against time."""
     with styled():
-        figure = canvas(figure, (6.5, 5.2))
-        force, velocity, detached = figure.subplots(
-            3, 1, sharex=True, gridspec_kw={"height_ratios": [2.4, 1, 1]}
+        below = {"velocity": "velocity (µm/s)", "detached_contacts": "detached contacts"}
+        below = {name: label for name, label in below.items() if is_known(tree, name)}
+        figure = canvas(figure, (6.5, 2.8 + 1.2 * len(below)))
+        panels = figure.subplots(
+            1 + len(below),
+            1,
+            sharex=True,
+            gridspec_kw={"height_ratios": [2.4, *([1] * len(below))]},
         )
+        force, *others = np.atleast_1d(panels)
         draw_force(force, tree)
-        force.set_xlabel("")
-        draw_series(velocity, tree, "velocity", color="black")
-        velocity.set_ylabel("velocity (µm/s)")
-        draw_series(detached, tree, "detached_contacts", color="black")
-        detached.set_ylabel("detached contacts")
-        detached.set_xlabel("time (s)")
+        for axes, (name, label) in zip(others, below.items(), strict=True):
+            draw_series(axes, tree, name, color="black")
+            axes.set_ylabel(label)
+            axes.set_xlabel("time (s)")
+        for axes in (force, *others)[:-1]:
+            axes.set_xlabel("")
         slip = largest_slip(tree)
         if slip is not None:
             low, high = force.get_ylim()
             force.set_ylim(low, high + 0.75 * (high - low))
             inset = force.inset_axes((0.3, 0.60, 0.45, 0.38))
             window = slip_window(slip)
-            draw_series(inset, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+            if is_known(tree, "contact_force"):
+                draw_series(inset, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
             draw_series(inset, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
             inset.set_xlabel(f"time after {window[0]:.3f} s (ms)", fontsize=7)
             inset.set_ylabel("force (µN)", fontsize=7)

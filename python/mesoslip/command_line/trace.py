@@ -83,7 +83,7 @@ def trace(
         period=quantity(period, "--period", "s", "25 ms", positive=True),
     )
     files.write(tree, path)
-    time, known = tree["time"].values, tree.attrs
+    time, known = tree.to_dataset()["time"].values, tree.attrs
     typer.echo(
         f"{path}: {time.size} samples, {time[-1] - time[0]:.6g} s, noise "
         f"{1e6 * known['noise']:.3g} uN, period of the setup {1e3 * known['setup_period']:.3g} ms "

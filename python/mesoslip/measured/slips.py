@@ -114,7 +114,8 @@ def estimated_period(time: Array, force: Array, noise: float) -> float:
     depth = force[tops] - force[bottoms]
     interval = float(np.median(np.diff(time)))
     durations = []
-    for top, bottom in zip(tops[depth >= depth.max() / 2], bottoms[depth >= depth.max() / 2]):
+    deep = depth >= depth.max() / 2
+    for top, bottom in zip(tops[deep], bottoms[deep], strict=True):
         part = (force[top : bottom + 1] - force[bottom]) / (force[top] - force[bottom])
         high = int(np.flatnonzero(part >= 1 - MARGIN)[-1])
         low = high + int(np.flatnonzero(part[high:] <= MARGIN)[0])

@@ -191,8 +191,8 @@ def _places(path: Path, headers: Sequence[str], *, has_rate: bool) -> dict[str, 
         )
     if "time" not in place and not has_rate:
         raise FileError(
-            f"{path}: has no column of the time, such as 'time [s]'; it has {there}; give --columns "
-            "with other headers, or --rate with samples in a second"
+            f"{path}: has no column of the time, such as 'time [s]'; it has {there}; give "
+            "--columns with other headers, or --rate with samples in a second"
         )
     return place
 
@@ -259,10 +259,10 @@ def _checked(
                 "--largest-gap"
             )
     if gaps.size:
+        counts = [round(steps[at] / usual) for at in gaps]
         filled = [
-            time[at]
-            + np.arange(1, round(steps[at] / usual)) * (steps[at] / round(steps[at] / usual))
-            for at in gaps
+            time[at] + np.arange(1, count) * steps[at] / count
+            for at, count in zip(gaps, counts, strict=True)
         ]
         whole_time = np.sort(np.concatenate([time, *filled]))
         values = {

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
+    from mesoslip.inference.plan import Plan
+
 PathLike = str | os.PathLike[str]
 
 
@@ -190,6 +192,70 @@ def read_trace(
         noise=noise,
         period=period,
     )
+
+
+def fit(
+    output: PathLike | xr.DataTree,
+    config: PathLike | Mapping[str, Any] | Plan,
+    *,
+    store: PathLike | None = None,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    stop: StopFlag | None = None,
+) -> xr.DataTree:
+    """Fit parameters of the model to a trace, with their uncertainty.
+
+    Parameters
+    ----------
+    output
+        Output with the trace, measured (see `read_trace`) or simulated; its first realization.
+    config
+        What is known, and in a table ``[fit.free]`` what is not: a TOML file, nested tables, or a
+        `mesoslip.inference.plan.Plan`.
+    store
+        File in which simulations are kept until the fit is done, and from which it goes on when it
+        is called again; nowhere by default.
+    workers
+        Simulations at the same time; as many as there are processors by default. The result does
+        not depend on it.
+    progress
+        Called now and then with the part of the simulations that is done.
+    stop
+        Set by who wants the fit to stop, which raises
+        `mesoslip.inference.simulations.StoppedError`.
+
+    Returns
+    -------
+    xarray.DataTree
+        The posterior, see `mesoslip.inference.posterior.build_tree`: groups ``posterior``,
+        ``prior``, ``observed_data``, ``posterior_predictive`` as ArviZ has them, and more.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the trace cannot be fitted, or the configuration is wrong or contradicts it.
+    RunError
+        If no simulation is like the trace.
+    """
+    from mesoslip.inference import fit as fits
+    from mesoslip.inference.plan import Plan
+    from mesoslip.inference.posterior import build_tree
+
+    if isinstance(config, Plan):
+        plan = config
+    elif isinstance(config, Mapping):
+        plan = Plan.from_dict(config)
+    else:
+        plan = Plan.load(config)
+    fitted = fits.fit(
+        _as_tree(output),
+        plan,
+        store=None if store is None else Path(store),
+        workers=workers,
+        progress=progress,
+        stop=stop,
+    )
+    return build_tree(fitted)
 
 
 def read(path: PathLike) -> xr.DataTree:

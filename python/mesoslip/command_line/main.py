@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, pictures, run, theory, trace
+from mesoslip.command_line import catalogues, fit, pictures, run, theory, trace
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
@@ -21,6 +21,7 @@ COMMANDS = (
     theory.curve,
     theory.onset,
     trace.trace,
+    fit.fit,
     catalogues.slips,
     catalogues.avalanches,
     pictures.plot,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, run, theory
+from mesoslip.plots import avalanches, posterior, run, theory
 from mesoslip.plots.style import Canvas, styled
 
 VIEWS = ("run", "avalanches", "lattice")
@@ -32,6 +32,8 @@ def picture(tree: xr.DataTree, view: str | None = None, snapshot: int | None = N
     if "spring_force" not in tree.data_vars:
         if view is not None:
             raise FileError(f"the output is not one of mesoslip run: it has no view {view!r}")
+        if "posterior" in tree.children:
+            return Picture(posterior.overview, posterior.draw_trace)
         if "slope" in tree.data_vars:
             return Picture(theory.force_curve, theory.draw_curve)
         return Picture(theory.slip_onset, theory.draw_drop)

@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 REJECTED = 0.02
 # Parts of predicted traces that have, or have not, a summary for the trace to be unlike them.
 NEARLY_ALL, HARDLY_ANY = 0.95, 0.05
+# Spreads beyond which a deviation is cut off, and what is added to a covariance, in parts of the
+# mean variance.
+LARGEST_DEVIATION = 30.0
+RIDGE = 1e-3
 # Standard deviation of the prior on the unit cube.
 PRIOR_DEVIATION = 12**-0.5
 # Shrinkage from prior to posterior below which a parameter is not determined, and from which it is.
@@ -61,11 +65,12 @@ class Agreement:
     Attributes
     ----------
     probability
-        Part of predicted traces whose worst summary is at least as far off as that of the trace.
+        Part of predicted traces that are at least as unlike the others as the trace is.
     scores
-        Deviation of each summary, NaN where it cannot be compared.
+        Deviation of each summary from the median prediction, in spreads of the predictions; NaN
+        where it cannot be compared.
     worst
-        Summaries that are farthest off, one of each group.
+        Of the groups of summaries that disagree most, the summary that is farthest off.
     """
 
     probability: float
@@ -78,18 +83,24 @@ class Agreement:
         return self.probability < REJECTED
 
 
-def compare(features: Sequence[Feature], predicted: Array, observed: Array) -> Agreement:
-    """Compare a trace with predictions of the posterior, summary by summary.
+def compare(
+    features: Sequence[Feature], simulated: Array, predicted: Array, observed: Array
+) -> Agreement:
+    """Compare a trace with predictions of the posterior.
 
-    The greatest deviation counts, and is judged by those of the predictions, each compared with the
-    others: no law is assumed.
+    Each group of summaries gives a distance, that of Mahalanobis with the covariance of simulations
+    near the posterior, so that a trace is unlike the others if its summaries do not go together as
+    theirs do. Distances are judged by those of the predictions: no law is assumed. The group that
+    disagrees most counts, and is judged by the groups of the predictions that disagree most.
 
     Parameters
     ----------
     features
         The summaries.
+    simulated
+        Summaries of simulations near the posterior, shape (simulations, summaries).
     predicted
-        Summaries of predicted traces, shape (traces, summaries).
+        Summaries of traces that the posterior predicts, shape (traces, summaries).
     observed
         Summaries of the trace.
     """
@@ -98,27 +109,50 @@ def compare(features: Sequence[Feature], predicted: Array, observed: Array) -> A
     missing = (has >= NEARLY_ALL) & ~there
     extra = (has <= HARDLY_ANY) & there
     scores = np.full(len(features), np.nan)
+    compared = there & (has >= NEARLY_ALL)
+    centre = np.full(len(features), np.nan)
+    spread = np.full(len(features), np.nan)
+    centre[compared] = np.nanmedian(predicted[:, compared], axis=0)
+    low, high = np.nanpercentile(predicted[:, compared], [16, 84], axis=0)
+    spread[compared] = (high - low) / 2
+    compared &= spread > 1e-9 * (1 + np.abs(centre))
+    scores[compared] = ((observed - centre) / spread)[compared]
+    names = np.array([one.group for one in features])
+    groups = [one for one in dict.fromkeys(names) if np.any(compared & (names == one))]
+    own, trace = np.zeros((len(predicted), len(groups))), np.zeros(len(groups))
+    for place, group in enumerate(groups):
+        inside = compared & (names == group)
+        reference, others, mine = (
+            np.clip(
+                np.nan_to_num((one[..., inside] - centre[inside]) / spread[inside]),
+                -LARGEST_DEVIATION,
+                LARGEST_DEVIATION,
+            )
+            for one in (simulated, predicted, observed)
+        )
+        covariance = np.cov(reference.T).reshape(len(mine), -1)
+        # What is hardly ever different in simulations is taken to differ a little.
+        covariance += RIDGE * np.mean(np.diag(covariance)) * np.eye(len(mine))
+        inverse = np.linalg.inv(covariance)
+        own[:, place] = np.einsum("ij,jk,ik->i", others, inverse, others)
+        trace[place] = mine @ inverse @ mine
+    # Of each prediction the part of all that are at least as far off, group by group.
+    count = len(predicted)
+    ranks = (count - np.argsort(np.argsort(own, axis=0), axis=0)) / count
+    parts = (1 + np.sum(own >= trace, axis=0)) / (1 + count)
+    least = ranks.min(axis=1, initial=1.0)
+    probability = (1 + np.sum(least <= parts.min(initial=1.0))) / (1 + count)
+    found = []
+    for place in np.argsort(parts):
+        inside = np.where(compared & (names == groups[place]), np.abs(scores), -1.0)
+        farthest = int(np.argmax(inside))
+        found.append(Disagreement(features[farthest], float(scores[farthest])))
     scores[missing], scores[extra] = -np.inf, np.inf
-    compared = np.flatnonzero(there & (has >= NEARLY_ALL))
-    values = predicted[:, compared]
-    centre = np.nanmedian(values, axis=0)
-    low, high = np.nanpercentile(values, [16, 84], axis=0)
-    spread = (high - low) / 2
-    varies = spread > 1e-9 * (1 + np.abs(centre))
-    compared, values = compared[varies], values[:, varies]
-    centre, spread = centre[varies], spread[varies]
-    scores[compared] = (observed[compared] - centre) / spread
-    own = np.nanmax(np.abs(values - centre) / spread, axis=1, initial=0.0)
-    worst = np.max(np.abs(scores[compared]), initial=0.0)
-    if missing.any() or extra.any():
-        worst = np.inf
-    probability = (1 + np.sum(own >= worst)) / (1 + len(own))
-    found: dict[str, Disagreement] = {}
-    for place in np.argsort(-np.nan_to_num(np.abs(scores), nan=-1.0, posinf=1e300)):
-        if not np.isnan(scores[place]):
-            one = Disagreement(features[place], float(scores[place]))
-            found.setdefault(one.feature.group, one)
-    return Agreement(float(probability), scores, tuple(found.values())[:NAMED])
+    for place in np.flatnonzero(missing | extra)[::-1]:
+        one = Disagreement(features[place], float(scores[place]))
+        found = [one, *(other for other in found if other.feature.group != one.feature.group)]
+        probability = 1 / (1 + count)
+    return Agreement(float(probability), scores, tuple(found[:NAMED]))
 
 
 def shrinkage(draws: Array) -> Array:

@@ -146,7 +146,7 @@ def fit(
         forces.append(one[::stride].astype(np.float32))
         slips.append(summarizer.slips(one))
         predicted.append(summarizer(one))
-    agreement = compare(summarizer.features, np.array(predicted), observed)
+    agreement = compare(summarizer.features, estimate.summaries, np.array(predicted), observed)
     information = informed_by(
         summarizer.features, estimate.parameters, estimate.summaries, observed, rng
     )

@@ -224,7 +224,7 @@ class Simulations:
 
     def _read(self, store: Path) -> dict[int, tuple[Array, Array]]:
         try:
-            with np.load(store, allow_pickle=False) as file:
+            with store.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 fingerprint = str(file["fingerprint"])
                 rows = zip(file["numbers"], file["parameters"], file["summaries"], strict=True)
                 kept = {int(number): (point, summary) for number, point, summary in rows}

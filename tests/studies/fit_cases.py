@@ -31,6 +31,19 @@ FREE = {
     "contacts.threshold.relative_width": {"from": 0.003, "to": 0.3, "prior": "logarithmic"},
     "contacts.delay": {"from": "0.01 ms", "to": "10 ms", "prior": "logarithmic"},
 }
+# What a trace may tell, around the truth by factors of two and more.
+ALL = {
+    "contacts.static_force": (1e-5, 6e-5),
+    "contacts.threshold.relative_width": (0.01, 0.15),
+    "contacts.delay": (3e-4, 4e-3),
+    "slider.stiffness": (60.0, 300.0),
+    "slider.mass": (7e-4, 3e-3),
+    "slider.damping_ratio": (0.05, 0.8),
+    "contacts.stiffness": (800.0, 5000.0),
+    "contacts.back_force_ratio": (0.02, 0.4),
+    "contacts.count": (1000, 9000),
+    "contacts.drag_rate": (2e10, 2e13),
+}
 NOISE = 5e-8
 
 
@@ -90,6 +103,14 @@ CASES: dict[str, tuple[Callable[[], Any], dict[str, Any], dict[str, Any]]] = {
         lambda: simulated(HIDDEN),
         {},
         {"slider.stiffness": {"from": "30 N/m", "to": "500 N/m", "prior": "logarithmic"}},
+    ),
+    "all": (
+        lambda: simulated(HIDDEN),
+        {},
+        {
+            key: {"from": low, "to": high, "prior": "logarithmic"}
+            for key, (low, high) in ALL.items()
+        },
     ),
     "klein": (lambda: simulated([]), {}, {}),
     "smooth": (smooth, {}, {}),

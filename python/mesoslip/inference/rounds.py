@@ -9,7 +9,7 @@ it, so early posteriors are too wide rather than wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ CHAINS = 4
 STARTS = 40
 # Least simulations of a likelihood.
 LEAST_VALID = 40
+# By what the limit of a region grows that has too few of them.
+GROWTH = 1.5
 # Least width of the region on the unit cube, beyond which nothing is resolved.
 NARROWEST = 1e-6
 
@@ -53,9 +55,13 @@ class Region:
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Which of the points, shape (points, parameters), lie in it."""
-        away = points - self.centre
-        inside = np.einsum("ij,jk,ik->i", away, self.inverse, away) <= self.limit
+        inside = self.distance(points) <= self.limit
         return np.asarray(inside & np.all((points >= 0) & (points <= 1), axis=1))
+
+    def distance(self, points: Array) -> Array:
+        """Squared distances of points from the centre, shape (points,)."""
+        away = points - self.centre
+        return np.asarray(np.einsum("ij,jk,ik->i", away, self.inverse, away))
 
     @classmethod
     def around(cls, points: Array) -> Region:
@@ -63,9 +69,8 @@ class Region:
         covariance = np.cov(points.T).reshape(points.shape[1], -1)
         covariance += NARROWEST**2 * np.eye(points.shape[1])
         whole = cls(points.mean(axis=0), np.asarray(np.linalg.inv(covariance)), np.inf)
-        away = points - whole.centre
-        distance = np.einsum("ij,jk,ik->i", away, whole.inverse, away)
-        return cls(whole.centre, whole.inverse, float(np.quantile(distance, INSIDE)))
+        limit = float(np.quantile(whole.distance(points), INSIDE))
+        return cls(whole.centre, whole.inverse, limit)
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,12 @@ def close_in(
     each = max(LEAST_NEXT, round(NEXT * total))
     simulations.add(qmc.LatinHypercube(size, rng=rng).random(first))
     region: Region | None = None
+    while (
+        _inside(simulations.parameters, simulations.summaries, observed, None)[0].sum()
+        < LEAST_VALID
+        and len(simulations) + each <= MOST_CLOSING * total
+    ):
+        simulations.add(qmc.LatinHypercube(size, rng=rng).random(each))
     count = 1
     while True:
         estimate = fit_region(simulations, observed, region, rng)
@@ -182,12 +193,8 @@ def fit_region(
         If hardly any simulation is like the trace.
     """
     parameters, summaries = simulations.parameters, simulations.summaries
-    if region is not None:
-        inside = region.contains(parameters)
-        parameters, summaries = parameters[inside], summaries[inside]
-    used = usable(summaries, observed)
-    valid = np.all(np.isfinite(summaries[:, used]), axis=1)
-    if valid.sum() < LEAST_VALID or not used.any():
+    valid, parameters, summaries, region = _inside(parameters, summaries, observed, region)
+    if valid.sum() < LEAST_VALID:
         raise RunError(
             f"only {int(valid.sum())} of {len(valid)} simulations have what the trace has, such as "
             "its slips: no parameters in the ranges of [fit.free] seem to describe it"
@@ -220,6 +227,25 @@ def fit_region(
         summaries[:count],
         float(np.max(parameters.std(axis=0) / np.maximum(spread, NARROWEST))),
     )
+
+
+def _inside(
+    parameters: Array, summaries: Array, observed: Array, region: Region | None
+) -> tuple[NDArray[np.bool_], Array, Array, Region | None]:
+    """Simulations of a region, which is made larger if too few in it have what the trace has.
+
+    Returns
+    -------
+    valid, parameters, summaries, region
+        Which of the simulations have the summaries of the trace; the simulations; the region.
+    """
+    while True:
+        inside = np.full(len(parameters), True) if region is None else region.contains(parameters)
+        used = usable(summaries[inside], observed)
+        valid = np.all(np.isfinite(summaries[inside][:, used]), axis=1) & used.any()
+        if region is None or inside.all() or valid.sum() >= LEAST_VALID:
+            return valid, parameters[inside], summaries[inside], region
+        region = replace(region, limit=GROWTH * region.limit)
 
 
 def _coverage(distance: Array, size: int, freedom: float) -> tuple[float, float]:

@@ -75,26 +75,30 @@ def smooth() -> Any:
 
 
 def rate_and_state() -> Any:
-    """Stick-slip of a slider on a rate-and-state interface with Dieterich's ageing law."""
+    """Stick-slip of a slider on a rate-and-state interface with Dieterich's ageing law.
+
+    Quasi-dynamic, as earthquake cycles are simulated: drag in the place of inertia.
+    """
     from scipy.integrate import solve_ivp
 
-    mass, stiffness, drive, normal = 1.47e-3, 97.0, 1e-7, 30e-6
-    a, b, length, reference = 0.02, 0.06, 3e-9, 0.6
+    stiffness, drive, normal, drag = 97.0, 1e-7, 30e-6, 0.2
+    a, b, length, reference = 0.01, 0.03, 1.5e-9, 0.6
 
-    def rates(moment: float, state: np.ndarray) -> list[float]:
-        displacement, log_velocity, log_age = state
+    def rates(_: float, state: np.ndarray) -> list[float]:
+        log_velocity, log_age = state
         velocity = np.exp(log_velocity)
-        friction = reference + a * (log_velocity - np.log(drive))
-        friction += b * (log_age + np.log(drive / length))
-        force = stiffness * (drive * moment - displacement)
-        # The velocity follows from friction but for inertia, through a little viscosity.
-        acceleration = (force - normal * friction) / mass
-        return [velocity, acceleration / velocity, np.exp(-log_age) - velocity / length]
+        ageing = np.exp(-log_age) - velocity / length
+        growth = stiffness * (drive - velocity) - normal * b * ageing
+        return [growth / (normal * a + drag * velocity), ageing]
 
-    start = [0.0, np.log(1e-12), np.log(1.0)]
     time_ = np.arange(12001) * 1e-3
-    solved = solve_ivp(rates, (0, 12), start, "LSODA", time_, rtol=1e-7, atol=1e-12)
-    return with_force(time_, stiffness * (drive * time_ - solved.y[0]))
+    start = [np.log(1e-14), np.log(1.0)]
+    solved = solve_ivp(rates, (0, 12), start, "LSODA", time_, rtol=1e-8, atol=1e-9)
+    velocity = np.exp(solved.y[0])
+    friction = reference + a * np.log(velocity / drive)
+    friction += b * (solved.y[1] + np.log(drive / length))
+    force = normal * friction + drag * velocity
+    return with_force(time_, force - force[0])
 
 
 CASES: dict[str, tuple[Callable[[], Any], dict[str, Any], dict[str, Any]]] = {

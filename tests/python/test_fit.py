@@ -150,8 +150,14 @@ def test_the_likelihood_learns_means_widths_and_tails():
         np.testing.assert_allclose(deviations, 1, rtol=0.2)
         if np.isfinite(freedom):
             assert 3 <= surrogate.freedom <= 6
-        else:
-            assert surrogate.freedom > 20
+            continue
+        assert surrogate.freedom > 20
+        # Against the normal density itself, its width and all.
+        statistics = np.array([0.3, 0.2])
+        away = (statistics - exact) / (0.1 * np.exp(at[:, :1]))
+        density = -0.5 * np.sum(away**2, axis=1) - 2 * at[:, 0]
+        learnt = surrogate.log_likelihood(statistics, at)
+        assert learnt[0] - learnt[1] == pytest.approx(density[0] - density[1], rel=0.2)
 
 
 def test_summaries_that_few_simulations_have_lower_the_likelihood_where_they_have_not():
@@ -417,3 +423,9 @@ def test_a_trace_without_noise_is_given_some():
     simulator, force = prepare(tree, Plan.from_dict(tables))
     assert simulator.noise == pytest.approx(5e-4 * np.max(np.abs(tree["spring_force"].values)))
     assert np.std(force - tree["spring_force"].values[0]) == pytest.approx(simulator.noise, rel=0.1)
+
+
+def test_without_emcee_it_is_told_before_anything_is_simulated(monkeypatch):
+    monkeypatch.setattr("mesoslip.inference.sampler.find_spec", lambda _: None)
+    with pytest.raises(mesoslip.RunError, match="needs the package emcee"):
+        mesoslip.fit(experiment(), fit_tables())

@@ -15,6 +15,7 @@ from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.inference.checks import Agreement, compare, informed_by
 from mesoslip.inference.plan import Plan
 from mesoslip.inference.rounds import Estimate, close_in
+from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.measured.slips import FoundSlips, estimated_period, noise_level
@@ -121,10 +122,11 @@ def fit(
     FileError, ConfigError
         If the trace cannot be fitted, or the configuration contradicts it.
     RunError
-        If no simulation is like the trace.
+        If no simulation is like the trace, or emcee is not installed.
     mesoslip.inference.simulations.StoppedError
         If it was stopped.
     """
+    check_installed()
     simulator, force = prepare(tree, plan)
     summarizer = simulator.summarizer
     observed = summarizer(force)

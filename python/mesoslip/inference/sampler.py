@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,18 @@ Array = NDArray[np.float64]
 
 # Walkers of an ensemble, steps before the first draw of them, and between two.
 WALKERS, BURN_IN, THIN = 100, 120, 15
+
+
+def check_installed() -> None:
+    """Make sure that emcee is there, before anything is simulated.
+
+    Raises
+    ------
+    RunError
+        If it is not.
+    """
+    if find_spec("emcee") is None:
+        raise RunError("a fit needs the package emcee: pip install 'mesoslip[fit]', or make setup")
 
 
 def draw(
@@ -42,18 +55,9 @@ def draw(
     -------
     numpy.ndarray
         Shape (chains, draws, parameters).
-
-    Raises
-    ------
-    RunError
-        If emcee is not installed.
     """
-    try:
-        import emcee
-    except ImportError:
-        raise RunError(
-            "a fit needs the package emcee: pip install 'mesoslip[fit]', or make setup"
-        ) from None
+    import emcee
+
     size = start.shape[1]
 
     def bounded(points: Array) -> Array:

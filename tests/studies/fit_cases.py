@@ -47,10 +47,10 @@ ALL = {
 NOISE = 5e-8
 
 
-def noisy(tree: Any, seed: int = 1) -> Any:
+def noisy(tree: Any, noise: float = NOISE, seed: int = 1) -> Any:
     """A run with noise on its force."""
     rng = np.random.default_rng(seed)
-    tree["spring_force"] = tree["spring_force"] + NOISE * rng.standard_normal(
+    tree["spring_force"] = tree["spring_force"] + noise * rng.standard_normal(
         tree["spring_force"].shape
     )
     return tree
@@ -64,8 +64,8 @@ def with_force(time_: np.ndarray, force: np.ndarray) -> Any:
     return noisy(tree)
 
 
-def simulated(changes: list[str]) -> Any:
-    return noisy(mesoslip.run(mesoslip.Config.load(KLEIN, changes)))
+def simulated(changes: list[str], noise: float = NOISE) -> Any:
+    return noisy(mesoslip.run(mesoslip.Config.load(KLEIN, changes)), noise)
 
 
 def smooth() -> Any:
@@ -103,6 +103,7 @@ def rate_and_state() -> Any:
 
 CASES: dict[str, tuple[Callable[[], Any], dict[str, Any], dict[str, Any]]] = {
     "hidden": (lambda: simulated(HIDDEN), {"stiffness": 140.0}, {}),
+    "hidden_quiet": (lambda: simulated(HIDDEN, NOISE / 5), {"stiffness": 140.0}, {}),
     "hidden_stiffness": (
         lambda: simulated(HIDDEN),
         {},

@@ -18,11 +18,6 @@ SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
-# Figures need the outputs of runs, but for S18, and two of other commands.
-FIGURE_RUNS := $(filter-out out/S18.nc,\
-  $(patsubst runs/%.toml,out/%.nc,$(wildcard $(addprefix runs/,S*.toml limit-*.toml sizes-*.toml avalanche.toml bundle.toml))))
-FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc out/S19a.onset.nc out/S19b.onset.nc
-
 # meson and meson-python find ninja here.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export UV_PROJECT_ENVIRONMENT := $(CURDIR)/$(VENV)
@@ -33,15 +28,15 @@ export UV_COMPILE_BYTECODE := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
-.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures bench fuzz \
-  reference lint clean
+.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize figures claims \
+  campaign bench fuzz reference lint clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
 	@printf '\nWhat uses what, from left to right (README, "Develop", tells what to touch to add something):\n'
 	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
-	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, command_line\n' | expand -t 16
+	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign and reports, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build
 	@:
@@ -66,9 +61,6 @@ test-sanitize: build/sanitize/build.ninja ## Fortran unit tests with the sanitiz
 	@ninja --quiet -C build/sanitize
 	$(VENV)/bin/meson test -C build/sanitize --no-rebuild --print-errorlogs
 
-figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/figures
-	$(MESOSLIP) figures -o out/figures
-
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py
 
@@ -89,25 +81,6 @@ lint: $(INSTALLED) ## Check the style of all sources
 
 clean: ## Remove the environment, what was built, and outputs
 	rm -rf build out $(VENV)
-
-# An output depends on its run and on what that is based on, not on the program: a build does not make
-# hours of outputs stale. Expanded a second time, when the name of the output is known.
-.SECONDEXPANSION:
-# Looked up once, and only if an output is asked for.
-chains = $(eval chains := $$(shell $(PYTHON) tools/bases runs))$(chains)
-bases = $(patsubst $(1)>%,%,$(filter $(1)>%,$(chains)))
-
-out/%.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
-	$(MESOSLIP) run $< -o $@
-
-out/%.curve.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
-	$(MESOSLIP) curve $< -o $@
-
-out/%.onset.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
-	$(MESOSLIP) onset $< -o $@
-
-out/%.png: out/%.nc | $(INSTALLED)
-	$(MESOSLIP) plot $< -o $@
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)
@@ -135,3 +108,6 @@ build/%/build.ninja: Makefile | $(ENVIRONMENT)
 	@meson setup --reconfigure -Dpython=false -Dtests=true $(PROFILE) $(MESON_ARGS) $(@D) \
 	  >$(@D)/setup.log || { cat $(@D)/setup.log; exit 1; }
 	@touch $@
+
+# Outputs of runs, figures, claims, sweeps.
+include runs/campaign.mk

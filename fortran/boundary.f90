@@ -87,17 +87,19 @@ subroutine set_slider(handle, kind, length, names, values, status, message)
    call report(error, status, message)
 end subroutine set_slider
 
-!> Give a simulation the stages of its drive.
-subroutine set_drive(handle, stages, stage_end, stage_velocity, status, message)
+!> Give a simulation its drive, which has a constant acceleration in each of its parts.
+subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stage, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Number of stages; when each ends [s], and the velocity of the drive in it [m/s]
-   integer, intent(in) :: stages
-   real(8), intent(in) :: stage_end(stages), stage_velocity(stages)
+   !> Number of parts; when each ends [s], velocities of the drive at its start and its end [m/s],
+   !> and the number of the stage that it is of
+   integer, intent(in) :: parts
+   real(8), intent(in) :: part_end(parts), start_velocity(parts), end_velocity(parts)
+   integer, intent(in) :: stage(parts)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
@@ -106,11 +108,46 @@ subroutine set_drive(handle, stages, stage_end, stage_velocity, status, message)
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
-      simulation%stage_end = stage_end
-      simulation%stage_velocity = stage_velocity
+      simulation%part_end = part_end
+      simulation%start_velocity = start_velocity
+      simulation%end_velocity = end_velocity
+      simulation%stage_of_part = stage
+      call simulation%stages%open()
    end if
    call report(error, status, message)
 end subroutine set_drive
+
+!> Tell a simulation when to stop before its drive ends.
+subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, status, message)
+   !f2py threadsafe
+   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of slips, 0 for any
+   integer(8), intent(in) :: slips
+   !> Displacement of the slider to come to [m], 0 for any
+   real(8), intent(in) :: displacement
+   !> Way of the drive in a block whose mean force tells a steady state [m], 0 for none; blocks that
+   !> are compared with as many before; difference of the mean forces that counts as none [N]
+   real(8), intent(in) :: block_way
+   integer, intent(in) :: blocks
+   real(8), intent(in) :: tolerance
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      if (slips > 0) simulation%most_slips = slips
+      simulation%farthest = displacement
+      call simulation%steady%open(block_way, blocks, tolerance)
+   end if
+   call report(error, status, message)
+end subroutine set_stop
 
 !> Tell a simulation, which has its contacts, what to record of the motion.
 subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &

@@ -11,21 +11,26 @@ module mesoslip_simulation
    use mesoslip_contacts_base, only: contacts_type
    use mesoslip_sliders_base, only: slider_type
    use mesoslip_recording_recorder, only: recorder_type, most_samples_in_step
+   use mesoslip_recording_stages, only: stage_recorder_type
+   use mesoslip_recording_steady, only: steady_recorder_type
    implicit none
    private
 
    public :: simulation_type
    public :: energy_length
-   public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides
+   public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides, &
+      & ending_slips, ending_displacement, ending_steady
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
    !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
    integer, parameter :: energy_length = 8
 
    !> Why a run is over: it is not; the drive came to its end; there were as many avalanches as
-   !> wanted; no contact is left to break; contacts break under a force without end
+   !> wanted; no contact is left to break; contacts break under a force without end; there were as
+   !> many slips as wanted; the slider came to its displacement; the state is steady
    integer, parameter :: ending_none = 0, ending_drive = 1, ending_avalanches = 2, &
-      & ending_broken = 3, ending_slides = 4
+      & ending_broken = 3, ending_slides = 4, ending_slips = 5, ending_displacement = 6, &
+      & ending_steady = 7
 
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
@@ -36,6 +41,8 @@ module mesoslip_simulation
 
    !> The origin of displacements follows the slider when it is this many breaking stretches ahead.
    real(wp), parameter :: farthest_stretches = 64.0_wp
+   !> A velocity of the drive that differs by this part is another one.
+   real(wp), parameter :: tiny_part = 1.0e-9_wp
    !> Advances in a row that leave both time and displacement as they were.
    integer, parameter :: most_idle_advances = 1000000
 
@@ -49,10 +56,20 @@ module mesoslip_simulation
       type(recorder_type) :: recorder
       !> The recorder of avalanches and snapshots
       type(avalanche_recorder_type) :: avalanches
-      !> Ends of the stages of the drive, shape (number of stages) [s]
-      real(wp), allocatable :: stage_end(:)
-      !> Velocities of the drive, shape (number of stages) [m/s]
-      real(wp), allocatable :: stage_velocity(:)
+      !> The recorder of stages of the drive
+      type(stage_recorder_type) :: stages
+      !> Whether the state is steady, in the last part of the drive
+      type(steady_recorder_type) :: steady
+      !> Slips after which the run is over
+      integer(i8) :: most_slips = huge(1_i8)
+      !> Displacement of the slider at which it is over [m]; 0 for none
+      real(wp) :: farthest = 0.0_wp
+      !> Ends of the parts of the drive, in which its acceleration is constant, shape (parts) [s]
+      real(wp), allocatable :: part_end(:)
+      !> Its velocities at the start and at the end of each part, shape (parts) [m/s]
+      real(wp), allocatable :: start_velocity(:), end_velocity(:)
+      !> Numbers of the stages that the parts are of, shape (parts)
+      integer, allocatable :: stage_of_part(:)
       !> Advances of the slider so far
       integer(i8) :: advances = 0
       !> Why the run is over, an ending_ code
@@ -69,7 +86,8 @@ module mesoslip_simulation
       !> What comes next; between two calls of run it is over
       type(schedule_type), private :: schedule
 
-      integer, private :: stage = 1
+      !> Part of the drive
+      integer, private :: part = 1
       !> Advances since time or displacement changed
       integer, private :: idle = 0
       real(wp), private :: start_energy = 0.0_wp
@@ -92,8 +110,9 @@ module mesoslip_simulation
       procedure :: restore
       !> Whether all parts are there
       procedure :: is_whole
-      procedure, private :: advance, advance_once, run_ahead, change_stage, follow, finish, &
-         & is_broken, slides, longest_step
+      procedure, private :: advance, advance_once, run_ahead, change_drive, take_part, &
+         & acceleration, follow, finish, is_broken, slides, longest_step, stop_early, is_there, &
+         & look_for_steady
    end type simulation_type
 
 contains
@@ -106,8 +125,9 @@ contains
       logical :: is_whole
 
       is_whole = allocated(self%slider) .and. allocated(self%contacts) &
-         & .and. allocated(self%stage_end) .and. allocated(self%recorder%trace%row) &
-         & .and. allocated(self%avalanches%catalogue%row)
+         & .and. allocated(self%stage_of_part) .and. allocated(self%recorder%trace%row) &
+         & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row) &
+         & .and. allocated(self%recorder%slips%row)
    end function is_whole
 
    !> Prepare the start of a run: contacts drawn, slider at rest and in balance.
@@ -119,14 +139,14 @@ contains
 
       self%is_started = .true.
       call self%contacts%initialize(initial)
-      call self%slider%drive(self%stage_velocity(1))
+      call self%slider%drive(self%start_velocity(1), self%acceleration())
       call self%slider%start(self%contacts%law())
-      if (abs(self%stage_velocity(1)) > 0.0_wp) then
-         self%slider%sense = sign(1.0_wp, self%stage_velocity(1))
-      end if
+      self%slider%sense = self%slider%drive_sense
       call self%contacts%respond(self%slider%pose(), self%slider%pose())
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
+      call self%stages%begin(self%slider, self%stage_of_part(1))
+      call self%look_for_steady()
       call self%recorder%record(self%slider, self%contacts%detached_count, 0.0_wp)
       call self%avalanches%see_response(self%slider, self%contacts, self%contacts%law())
       call self%avalanches%see_advance(self%slider, self%contacts)
@@ -157,6 +177,7 @@ contains
             if (self%advances >= last .or. work >= most_work) exit
             if (self%contacts%breaks > most_breaks) exit
             if (self%recorder%is_full() .or. self%avalanches%is_full()) exit
+            if (self%stages%is_full()) exit
          end if
          advances = self%advances
          time = self%slider%time
@@ -195,8 +216,11 @@ contains
 
       self%schedule%is_over = .true.
       if (self%slider%runs_ahead .and. self%longest_schedule > 0 &
-         & .and. .not. self%avalanches%sees_each()) then
+         & .and. .not. (self%avalanches%sees_each() &
+         & .or. abs(self%slider%drive_acceleration) > 0.0_wp)) then
          call self%contacts%plan(self%slider%pose(), self%longest_schedule, self%schedule)
+         if (abs(self%farthest) > 0.0_wp) call stop_within(self%schedule, &
+            & self%farthest - self%slider%origin, sign(1.0_wp, self%farthest))
       end if
       if (self%schedule%is_over) then
          call self%advance_once(last, most_breaks)
@@ -216,13 +240,14 @@ contains
       type(interface_law_type) :: law
       logical :: turns
 
-      self%schedule%end_time = self%stage_end(self%stage)
+      self%schedule%end_time = min(self%part_end(self%part), self%steady%block_end)
       self%schedule%longest_step = self%longest_step()
       self%schedule%mean_stiffness = self%contacts%parameters%stiffness
       self%schedule%farthest_force = farthest_stretches * self%contacts%parameters%static_force
       before = self%slider%pose()
       do
          watch = self%recorder%watch(self%slider)
+         call self%stages%narrow(watch, self%slider)
          watch%most_steps = last - self%advances
          call self%slider%run_ahead(self%schedule, watch)
          self%advances = self%advances + watch%steps
@@ -231,10 +256,11 @@ contains
          if (watch%is_caught) then
             call self%recorder%record(self%slider, real(self%schedule%detached, wp), &
                & self%contacts%breaks + self%schedule%broken)
+            call self%stages%record(self%slider)
             if (.not. turns) call self%schedule%pass(self%slider%time, self%slider%displacement)
          end if
          if (turns .or. self%schedule%is_over .or. self%advances >= last) exit
-         if (self%recorder%is_full()) exit
+         if (self%recorder%is_full() .or. self%recorder%slips_so_far() >= self%most_slips) exit
       end do
       call self%contacts%settle(self%schedule, self%slider%pose())
       call self%avalanches%pass_over(self%schedule%moments, self%contacts%breaks)
@@ -244,7 +270,7 @@ contains
          call self%contacts%respond(before, self%slider%pose())
          call self%avalanches%see_response(self%slider, self%contacts, law)
       end if
-      call self%change_stage()
+      call self%change_drive()
    end subroutine run_ahead
 
    !> One advance of the slider and the events at its end, or several in the midst of an avalanche.
@@ -265,8 +291,16 @@ contains
          call self%finish(ending_broken)
          return
       end if
-      end_time = min(self%stage_end(self%stage), self%slider%time + self%longest_step())
+      end_time = min(self%part_end(self%part), self%slider%drive_turn, self%steady%block_end, &
+         & self%slider%time + self%longest_step())
       window%end_time = min(window%end_time, end_time)
+      if (abs(self%farthest) > 0.0_wp .and. .not. self%slider%instant) then
+         if (self%farthest > 0.0_wp) then
+            window%upper = min(window%upper, self%farthest - self%slider%origin)
+         else
+            window%lower = max(window%lower, self%farthest - self%slider%origin)
+         end if
+      end if
 
       call self%slider%advance(law, window)
       self%advances = self%advances + 1
@@ -296,15 +330,21 @@ contains
          return
       end if
       call self%recorder%record(self%slider, self%contacts%detached_count, self%contacts%breaks)
+      call self%stages%record(self%slider)
       call self%avalanches%see_advance(self%slider, self%contacts)
       if (self%avalanches%avalanches >= self%avalanches%parameters%most_avalanches) then
          call self%finish(ending_avalanches)
          return
       end if
 
+      if (self%slider%instant .and. self%slider%settled .and. self%is_there()) then
+         call self%finish(ending_displacement)
+         return
+      end if
+
       call self%contacts%respond(before, self%slider%pose())
       call self%avalanches%see_response(self%slider, self%contacts, law)
-      call self%change_stage()
+      call self%change_drive()
    end subroutine advance_once
 
    !> Longest step of the slider, so that it does not come past too many samples [s].
@@ -319,22 +359,125 @@ contains
       step = 0.5_wp * most_samples_in_step * step
    end function longest_step
 
-   !> Go over to the next stage of the drive, or to the end; move the origin along.
-   subroutine change_stage(self)
+   !> Go over to the next part of the drive, or to the end; move the origin along.
+   subroutine change_drive(self)
       class(simulation_type), intent(inout) :: self
 
-      ! An avalanche under a slider without inertia has to end before a stage does.
-      if (self%slider%time >= self%stage_end(self%stage) &
+      call self%stop_early()
+      if (self%ending /= ending_none) return
+      ! An avalanche under a slider without inertia has to end before a part of the drive does.
+      if (self%slider%time >= min(self%part_end(self%part), self%slider%drive_turn) &
          & .and. .not. self%avalanches%size > 0.0_wp) then
-         if (self%stage == size(self%stage_end)) then
+         if (self%slider%time < self%part_end(self%part)) then
+            call self%slider%drive(0.0_wp, self%acceleration())
+            call self%stages%mark(self%slider)
+            self%recorder%drive_changes = .true.
+         else if (self%part == size(self%part_end)) then
             call self%finish(ending_drive)
             return
+         else
+            call self%take_part(self%part + 1)
          end if
-         self%stage = self%stage + 1
-         call self%slider%drive(self%stage_velocity(self%stage))
       end if
       call self%follow()
-   end subroutine change_stage
+   end subroutine change_drive
+
+   !> Go over to a part of the drive, which may be of another stage.
+   subroutine take_part(self, part)
+      class(simulation_type), intent(inout) :: self
+      integer, intent(in) :: part
+
+      real(wp) :: velocity, sense
+      logical :: is_new
+
+      is_new = self%stage_of_part(part) /= self%stage_of_part(self%part)
+      velocity = self%slider%drive_velocity_at(self%slider%time)
+      sense = self%slider%drive_sense
+      if (is_new) call self%stages%finish(self%slider)
+      self%part = part
+      call self%slider%drive(self%start_velocity(part), self%acceleration())
+      if (is_new) then
+         call self%stages%begin(self%slider, self%stage_of_part(part))
+      else
+         call self%stages%mark(self%slider)
+      end if
+      call self%look_for_steady()
+      is_new = is_new .and. abs(self%start_velocity(part) - velocity) &
+         & > tiny_part * max(abs(velocity), abs(self%start_velocity(part)))
+      if (is_new .or. abs(self%slider%drive_sense - sense) > 0.0_wp) then
+         self%recorder%drive_changes = .true.
+      end if
+   end subroutine take_part
+
+   !> In the last part of the drive, at a constant velocity, look for a steady state.
+   subroutine look_for_steady(self)
+      class(simulation_type), intent(inout) :: self
+
+      if (self%part < size(self%part_end) .or. abs(self%acceleration()) > 0.0_wp) return
+      call self%steady%begin(self%slider%time, self%start_velocity(self%part))
+   end subroutine look_for_steady
+
+   !> End the run where it is to stop before its drive ends.
+   subroutine stop_early(self)
+      class(simulation_type), intent(inout) :: self
+
+      logical :: is_steady
+
+      if (self%recorder%slips_so_far() >= self%most_slips) then
+         call self%finish(ending_slips)
+         return
+      end if
+      ! A slider without inertia jumps past a displacement: that is told where it comes to rest.
+      if (self%is_there() .and. .not. self%slider%instant) then
+         call self%finish(ending_displacement)
+         return
+      end if
+      if (self%slider%time < self%steady%block_end) return
+      call self%steady%see_block(self%slider%stage_impulse%total() &
+         & + self%slider%impulse%total(), is_steady)
+      if (is_steady) call self%finish(ending_steady)
+   end subroutine stop_early
+
+   !> Whether the slider has come to the displacement at which the run is over.
+   pure function is_there(self)
+      class(simulation_type), intent(in) :: self
+      logical :: is_there
+
+      is_there = abs(self%farthest) > 0.0_wp .and. sign(1.0_wp, self%farthest) &
+         & * (self%slider%displacement - (self%farthest - self%slider%origin)) >= 0.0_wp
+   end function is_there
+
+   !> Let a schedule end before a displacement.
+   pure subroutine stop_within(schedule, displacement, sense)
+      type(schedule_type), intent(inout) :: schedule
+      !> The displacement [m], and the sense in which it must not be passed, +1 or -1
+      real(wp), intent(in) :: displacement, sense
+
+      if (schedule%is_over) return
+      if (sense * schedule%direction > 0.0_wp) then
+         do while (schedule%breaks > 0)
+            if (schedule%break_coordinate(schedule%breaks) < sense * displacement) exit
+            schedule%breaks = schedule%breaks - 1
+         end do
+         schedule%is_over = schedule%breaks == 0
+      else
+         schedule%behind = max(schedule%behind, schedule%direction * displacement)
+      end if
+   end subroutine stop_within
+
+   !> Acceleration of the drive in its part [m/s2].
+   pure function acceleration(self)
+      class(simulation_type), intent(in) :: self
+      real(wp) :: acceleration
+
+      real(wp) :: start
+
+      acceleration = self%end_velocity(self%part) - self%start_velocity(self%part)
+      start = 0.0_wp
+      if (self%part > 1) start = self%part_end(self%part - 1)
+      if (abs(acceleration) > 0.0_wp) acceleration = acceleration &
+         & / (self%part_end(self%part) - start)
+   end function acceleration
 
    !> Whether contacts break under a force without end.
    pure function slides(self)
@@ -353,7 +496,7 @@ contains
       logical :: is_broken
 
       is_broken = .not. (law%stiffness > 0.0_wp .or. window%end_time < never &
-         & .or. self%stage_end(self%stage) < never .or. self%avalanches%size > 0.0_wp)
+         & .or. self%part_end(self%part) < never .or. self%avalanches%size > 0.0_wp)
    end function is_broken
 
    !> The run is over.
@@ -367,6 +510,7 @@ contains
          call self%avalanches%close(self%slider, self%contacts, self%slider%displacement)
       end if
       call self%recorder%finish()
+      call self%stages%finish(self%slider)
       self%ending = ending
    end subroutine finish
 
@@ -393,7 +537,7 @@ contains
       !> Terms in the order of energy_length [J]
       real(wp) :: energy(energy_length)
 
-      energy(1) = self%slider%drive_work%total()
+      energy(1) = self%slider%drive_work()
       energy(2) = self%slider%energy()
       energy(3) = self%contacts%elastic_energy(self%slider%displacement)
       energy(4) = self%slider%damping_loss%total()
@@ -412,7 +556,7 @@ contains
       type(archive_type), intent(inout) :: archive
 
       call archive%section("simulation")
-      call archive%exchange("stage", self%stage)
+      call archive%exchange("part", self%part)
       call archive%exchange("idle", self%idle)
       call archive%exchange("start_energy", self%start_energy)
       call archive%exchange("advances", self%advances)
@@ -421,6 +565,8 @@ contains
       call self%slider%exchange(archive)
       call self%contacts%exchange(archive)
       call self%recorder%exchange(archive)
+      call self%stages%exchange(archive)
+      call self%steady%exchange(archive)
       call self%avalanches%exchange(archive)
       call archive%finish()
       if (archive%saving .or. allocated(archive%failure)) return
@@ -443,6 +589,8 @@ contains
          buffer => self%recorder%slip_trace
       case ("slips")
          buffer => self%recorder%slips
+      case ("stages")
+         buffer => self%stages%rows
       case ("layers")
          buffer => self%recorder%layers
       case ("avalanches")

@@ -32,7 +32,7 @@ module mesoslip_contacts_partial_moments
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
       !> Exponents, shape (orders)
       real(wp), allocatable, private :: exponent(:)
-      !> Moments above each knot and their slopes, shape (2, orders, cells + 1)
+      !> Moments above each knot and their slopes, shape (orders, 2, cells + 1)
       real(wp), allocatable, private :: table(:, :, :)
    contains
       !> Moments above a threshold, to rounding
@@ -69,27 +69,27 @@ contains
       self%step = (self%coordinate(self%greatest) - self%first) / cells
       call gauss_legendre(self%point, self%weight)
 
-      allocate (self%table(2, size(exponent), cells + 1))
-      self%table(1, :, cells + 1) = 0.0_wp
+      allocate (self%table(size(exponent), 2, cells + 1))
+      self%table(:, 1, cells + 1) = 0.0_wp
       do cell = cells, 1, -1
          knot = self%first + (cell - 1) * self%step
-         self%table(1, :, cell) = self%table(1, :, cell + 1)
+         self%table(:, 1, cell) = self%table(:, 1, cell + 1)
          do node = 1, points
-            self%table(1, :, cell) = self%table(1, :, cell) + self%step * self%weight(node) &
+            self%table(:, 1, cell) = self%table(:, 1, cell) + self%step * self%weight(node) &
                & * self%density(knot + self%step * self%point(node))
          end do
       end do
       ! All of a law is 1, to the last digit: what attaches over and over must not fade away.
       do node = 1, size(exponent)
          if (abs(exponent(node)) > 0.0_wp) cycle
-         self%scale = 1.0_wp / self%table(1, node, 1)
-         self%table(1, :, :) = self%table(1, :, :) * self%scale
+         self%scale = 1.0_wp / self%table(node, 1, 1)
+         self%table(:, 1, :) = self%table(:, 1, :) * self%scale
          exit
       end do
       do cell = 1, cells + 1
          ! Slopes from within the support, at whose ends the density may be discontinuous.
          knot = self%first + min(max(cell - 1.0_wp, 1.0e-9_wp), cells - 1.0e-9_wp) * self%step
-         self%table(2, :, cell) = -self%step * self%density(knot)
+         self%table(:, 2, cell) = -self%step * self%density(knot)
       end do
    end subroutine new_partial_moments
 
@@ -139,7 +139,7 @@ contains
       place = 0.0_wp
       if (threshold > self%least) place = (self%coordinate(threshold) - self%first) / self%step
       cell = min(int(place), cells - 1) + 1
-      moment = self%table(1, :, cell + 1)
+      moment = self%table(:, 1, cell + 1)
       length = max(0.0_wp, cell - place) * self%step
       knot = self%first + cell * self%step - length
       do node = 1, points
@@ -161,7 +161,7 @@ contains
       integer :: cell, order
 
       if (threshold <= self%least) then
-         moment = self%table(1, :, 1)
+         moment = self%table(:, 1, 1)
       else if (threshold >= self%greatest) then
          moment = 0.0_wp
       else
@@ -171,10 +171,10 @@ contains
          s = 1.0_wp - t
          weight = [s**2 * (1.0_wp + 2.0_wp * t), s**2 * t, t**2 * (1.0_wp + 2.0_wp * s), -s * t**2]
          do order = 1, size(moment)
-            moment(order) = weight(1) * self%table(1, order, cell + 1) &
-               & + weight(2) * self%table(2, order, cell + 1) &
-               & + weight(3) * self%table(1, order, cell + 2) &
-               & + weight(4) * self%table(2, order, cell + 2)
+            moment(order) = weight(1) * self%table(order, 1, cell + 1) &
+               & + weight(2) * self%table(order, 2, cell + 1) &
+               & + weight(3) * self%table(order, 1, cell + 2) &
+               & + weight(4) * self%table(order, 2, cell + 2)
          end do
       end if
    end subroutine interpolate

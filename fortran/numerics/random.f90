@@ -92,20 +92,18 @@ contains
       end do
    end subroutine first_uniforms
 
-   !> The 64-bit product of an odd 32-bit word and another, in halves.
-   !>
-   !> The second word is made signed, so that the product does not overflow a signed integer.
-   pure subroutine multiply(odd, word, high, low)
+   !> The 64-bit product of two 32-bit words, in halves.
+   elemental subroutine multiply(odd, word, high, low)
       integer(i8), intent(in) :: odd, word
       integer(i8), intent(out) :: high, low
 
-      integer(i8), parameter :: half = 2_i8**31
-      integer(i8) :: product, sum
+      ! As wide as it takes for the product not to overflow; it is one instruction all the same.
+      integer, parameter :: wide = selected_int_kind(30)
+      integer(wide) :: product
 
-      product = odd * (word - half)
-      sum = iand(product, mask) + half
-      low = iand(sum, mask)
-      high = shifta(product, 32) + shiftr(odd, 1) + shiftr(sum, 32)
+      product = int(odd, wide) * int(word, wide)
+      low = int(iand(product, int(mask, wide)), i8)
+      high = int(shiftr(product, 32), i8)
    end subroutine multiply
 
    !> 52 of 64 random bits as a real in the open interval (0, 1).

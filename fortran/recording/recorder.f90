@@ -102,8 +102,10 @@ module mesoslip_recording_recorder
       integer(i8), private :: traced = 0
       !> Whether a finer trace is taken, and whether it has been of a slip
       logical, private :: is_tracing = .false., has_traced = .false.
-      !> Velocity of the drive in this stage [m/s], and its sign, or the last one
-      real(wp), private :: drive_velocity = 0.0_wp, sense = 1.0_wp
+      !> Whether another stage of the drive begins where it has another velocity, or direction
+      logical :: drive_changes = .false.
+      !> Sign of the velocity of the drive
+      real(wp), private :: sense = 1.0_wp
       !> Velocity of the block above the drive's [m/s], and when it was last fast
       real(wp), private :: last_excess = 0.0_wp, last_fast = 0.0_wp
       !> Time, force and breaks at the start of a fall or slip, and at its least force so far
@@ -123,6 +125,8 @@ module mesoslip_recording_recorder
       procedure :: open
       !> Whether so much waits that it should be taken away
       procedure :: is_full
+      !> Slips that are over
+      procedure :: slips_so_far
       !> Samples of slip traces that can be taken away
       procedure :: final_slip_samples
       !> Take samples of slip traces away
@@ -171,6 +175,16 @@ contains
          & .or. self%slips%count >= many_slips
    end function is_full
 
+   !> Slips that are over.
+   pure function slips_so_far(self) result(number)
+      !> The recorder
+      class(recorder_type), intent(in) :: self
+      !> Their number
+      integer(i8) :: number
+
+      number = self%slip
+   end function slips_so_far
+
    !> Samples of slip traces that can be taken away: not those of what may come to no slip.
    pure function final_slip_samples(self) result(number)
       !> The recorder
@@ -210,10 +224,9 @@ contains
       if (self%next_sample <= slider%time) call self%take_samples(slider, detached)
       if (self%parameters%slip_velocity <= 0.0_wp) return
 
-      if (abs(slider%drive_velocity - self%drive_velocity) > 0.0_wp .or. slider%time <= 0.0_wp) then
-         call self%change_stage(slider, breaks)
-      end if
-      excess = self%sense * (slider%velocity + slider%base_velocity - slider%drive_velocity)
+      if (self%drive_changes .or. slider%time <= 0.0_wp) call self%change_stage(slider, breaks)
+      excess = self%sense * (slider%velocity + slider%base_velocity &
+         & - slider%drive_velocity_at(slider%time))
       turns = excess > 0.0_wp .neqv. self%last_excess > 0.0_wp
       self%last_excess = excess
       if (turns) then
@@ -241,15 +254,15 @@ contains
       real(wp) :: fast
 
       watch%time = self%next_sample
+      watch%reference = slider%drive_velocity
+      watch%sense = self%sense
       if (self%parameters%slip_velocity <= 0.0_wp) return
-      if (abs(slider%drive_velocity - self%drive_velocity) > 0.0_wp .or. slider%time <= 0.0_wp) then
+      if (self%drive_changes .or. slider%time <= 0.0_wp) then
          ! The start of a stage is of interest in itself.
          watch%time = -huge(1.0_wp)
          return
       end if
 
-      watch%reference = slider%drive_velocity
-      watch%sense = self%sense
       if (self%last_excess > 0.0_wp) then
          watch%above = 0.0_wp
       else
@@ -311,7 +324,8 @@ contains
       end do
    end subroutine take_samples
 
-   !> The drive took another velocity at the start of the last advance, or the run started there.
+   !> The drive took another velocity or direction at the start of the last advance, or the run
+   !> started there.
    subroutine change_stage(self, slider, breaks)
       class(recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
@@ -324,10 +338,10 @@ contains
       if (self%phase == phase_slip) call self%close_slip()
       if (self%phase == phase_fall) call self%drop_fall()
       call self%stop_trace()
-      self%drive_velocity = slider%drive_velocity
-      if (abs(slider%drive_velocity) > 0.0_wp) self%sense = sign(1.0_wp, slider%drive_velocity)
-      self%last_excess = self%sense &
-         & * (motion%velocity + motion%base_velocity - slider%drive_velocity)
+      self%drive_changes = .false.
+      self%sense = slider%drive_sense
+      self%last_excess = self%sense * (motion%velocity + motion%base_velocity &
+         & - slider%drive_velocity_at(slider%step_time))
       ! What a faster drive stretches before the block has its velocity is regained too.
       self%minima%count = 0
       call self%add_minimum(motion)
@@ -581,11 +595,11 @@ contains
 
       early = slider%step_time
       late = slider%time
-      was_faster = .not. is_faster(sense, slider%velocity + slider%base_velocity)
+      was_faster = .not. is_faster(slider%velocity + slider%base_velocity, slider%time)
       motion = slider%observe(early)
       do bisection = 1, bisections
          motion = slider%observe(0.5_wp * (early + late))
-         if (is_faster(sense, motion%velocity + motion%base_velocity) .eqv. was_faster) then
+         if (is_faster(motion%velocity + motion%base_velocity, motion%time) .eqv. was_faster) then
             early = motion%time
          else
             late = motion%time
@@ -595,11 +609,11 @@ contains
 
    contains
 
-      !> Whether a velocity is that of a fall of the force.
-      pure logical function is_faster(sense, velocity)
-         real(wp), intent(in) :: sense, velocity
+      !> Whether a velocity at a time is that of a fall of the force.
+      pure logical function is_faster(velocity, time)
+         real(wp), intent(in) :: velocity, time
 
-         is_faster = sense * (velocity - slider%drive_velocity) > 0.0_wp
+         is_faster = sense * (velocity - slider%drive_velocity_at(time)) > 0.0_wp
       end function is_faster
 
    end function pace
@@ -652,7 +666,7 @@ contains
       call archive%exchange("traced", self%traced)
       call archive%exchange("is_tracing", self%is_tracing)
       call archive%exchange("has_traced", self%has_traced)
-      call archive%exchange("drive_velocity", self%drive_velocity)
+      call archive%exchange("drive_changes", self%drive_changes)
       call archive%exchange("sense", self%sense)
       call archive%exchange("last_excess", self%last_excess)
       call archive%exchange("last_fast", self%last_fast)

@@ -7,6 +7,7 @@ module mesoslip_sliders_base
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_extremes, only: extremes_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_schedule, only: schedule_type
    use mesoslip_watch, only: watch_type
@@ -33,6 +34,8 @@ module mesoslip_sliders_base
       real(wp) :: elastic_force = 0.0_wp
       !> Displacement [m] and velocity [m/s] of its base
       real(wp) :: base_displacement = 0.0_wp, base_velocity = 0.0_wp
+      !> Velocity of the slider where the drive's spring pulls it [m/s]
+      real(wp) :: pulled_velocity = 0.0_wp
    end type motion_type
 
    !> A slider: what it has in common whatever its kind.
@@ -49,12 +52,27 @@ module mesoslip_sliders_base
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
       real(wp) :: sense = 1.0_wp
-      !> Velocity of the drive [m/s], and where it was when it took this velocity [s, m]
-      real(wp) :: drive_velocity = 0.0_wp, drive_time = 0.0_wp, drive_displacement = 0.0_wp
+      !> Velocity of the drive at a time [m/s], its place then, from the moving origin [s, m], and
+      !> its acceleration since [m/s2]
+      real(wp) :: drive_velocity = 0.0_wp, drive_time = 0.0_wp, drive_displacement = 0.0_wp, &
+         & drive_acceleration = 0.0_wp
+      !> Time at which the drive will turn round [s]; no step goes beyond
+      real(wp) :: drive_turn = huge(1.0_wp)
+      !> Sign of its velocity until then, or of the last one that was not zero
+      real(wp) :: drive_sense = 1.0_wp
       !> Time at which the last advance started [s]
       real(wp) :: step_time = 0.0_wp
-      !> Work done by the drive, and lost in the drag of contacts and in the slider's damping [J]
-      type(accumulator_type) :: drive_work, drag_loss, damping_loss
+      !> Lost in the drag of contacts and in the slider's damping [J]
+      type(accumulator_type) :: drag_loss, damping_loss
+      !> Impulse of the drive since it took its velocity [N s], by which, times the velocity, its
+      !> work is more than what was added up [J]; none under an acceleration
+      type(accumulator_type) :: impulse, earlier_work
+      !> Impulse of the drive in its stage, but for that [N s]
+      type(accumulator_type) :: stage_impulse
+      !> Extremes of the drive's force in its stage, and whether the slider notes them itself: those
+      !> without inertia, whose force jumps
+      type(extremes_type) :: extremes
+      logical :: notes_extremes = .false.
       !> Whether it has no inertia, and jumps to its equilibrium while the drive stands still
       logical :: instant = .false.
       !> Whether it came to its equilibrium in the last advance, and where [m]
@@ -89,10 +107,15 @@ module mesoslip_sliders_base
       procedure(energy_interface), deferred :: energy
       !> Where it is
       procedure, non_overridable :: pose
-      !> Give the drive another velocity
+      !> Give the drive another velocity and acceleration
       procedure :: drive => drive_slider
-      !> Where the drive is at a time
+      !> Where the drive is at a time, and its velocity
       procedure, non_overridable :: drive_at
+      procedure, non_overridable :: drive_velocity_at
+      !> Work that the drive has done
+      procedure, non_overridable :: drive_work
+      !> Velocity where the drive's spring pulls
+      procedure :: pulled_velocity
       !> Move the origin of displacements
       procedure :: shift_origin => shift_slider
       !> Displacements of the layers at a time of the last advance
@@ -179,17 +202,52 @@ contains
       pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, self%sense)
    end function pose
 
-   !> Give the drive another velocity.
-   subroutine drive_slider(self, velocity)
+   !> Give the drive another velocity and acceleration.
+   subroutine drive_slider(self, velocity, acceleration)
       !> The slider
       class(slider_type), intent(inout) :: self
-      !> Velocity of the drive [m/s]
-      real(wp), intent(in) :: velocity
+      !> Velocity of the drive now [m/s], and its acceleration from now on [m/s2]
+      real(wp), intent(in) :: velocity, acceleration
 
+      if (.not. self%under_force) then
+         call self%earlier_work%add(self%drive_velocity * self%impulse%total())
+      end if
+      call self%stage_impulse%add(self%impulse%total())
+      self%impulse = accumulator_type()
       self%drive_displacement = self%drive_at(self%time)
       self%drive_time = self%time
       self%drive_velocity = velocity
+      self%drive_acceleration = acceleration
+      self%drive_turn = huge(1.0_wp)
+      if (velocity * acceleration < 0.0_wp) self%drive_turn = self%time - velocity / acceleration
+      if (abs(velocity) > 0.0_wp) then
+         self%drive_sense = sign(1.0_wp, velocity)
+      else if (abs(acceleration) > 0.0_wp) then
+         self%drive_sense = sign(1.0_wp, acceleration)
+      end if
    end subroutine drive_slider
+
+   !> Work that the drive has done.
+   pure function drive_work(self) result(work)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Work [J]
+      real(wp) :: work
+
+      work = self%earlier_work%total()
+      ! A drive by force has a rate of that for its velocity.
+      if (.not. self%under_force) work = work + self%drive_velocity * self%impulse%total()
+   end function drive_work
+
+   !> Velocity, at the end of the last advance, where the drive's spring pulls.
+   pure function pulled_velocity(self) result(velocity)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Velocity [m/s]
+      real(wp) :: velocity
+
+      velocity = self%velocity + self%base_velocity
+   end function pulled_velocity
 
    !> Where the drive is at a time.
    pure function drive_at(self, time) result(displacement)
@@ -200,8 +258,25 @@ contains
       !> Displacement of the drive from the moving origin [m]
       real(wp) :: displacement
 
-      displacement = self%drive_displacement + self%drive_velocity * (time - self%drive_time)
+      displacement = self%drive_displacement + (self%drive_velocity &
+         & + 0.5_wp * self%drive_acceleration * (time - self%drive_time)) * (time - self%drive_time)
    end function drive_at
+
+   !> Velocity of the drive at a time.
+   pure function drive_velocity_at(self, time) result(velocity)
+      !> The slider
+      class(slider_type), intent(in) :: self
+      !> Time, until the drive turns round [s]
+      real(wp), intent(in) :: time
+      !> Velocity [m/s]
+      real(wp) :: velocity
+
+      velocity = self%drive_velocity
+      if (.not. abs(self%drive_acceleration) > 0.0_wp) return
+      velocity = velocity + self%drive_acceleration * (time - self%drive_time)
+      ! Rounding must not turn it round early.
+      velocity = self%drive_sense * max(0.0_wp, self%drive_sense * velocity)
+   end function drive_velocity_at
 
    !> Move the origin of displacements; ends what can be observed of the last advance.
    subroutine shift_slider(self, shift)
@@ -211,6 +286,7 @@ contains
       real(wp), intent(in) :: shift
 
       self%drive_displacement = self%drive_at(self%time) - shift
+      self%drive_velocity = self%drive_velocity_at(self%time)
       self%drive_time = self%time
       self%displacement = self%displacement - shift
       self%origin = self%origin + shift
@@ -249,8 +325,14 @@ contains
       call archive%exchange("drive_velocity", self%drive_velocity)
       call archive%exchange("drive_time", self%drive_time)
       call archive%exchange("drive_displacement", self%drive_displacement)
+      call archive%exchange("drive_acceleration", self%drive_acceleration)
+      call archive%exchange("drive_turn", self%drive_turn)
+      call archive%exchange("drive_sense", self%drive_sense)
       call archive%exchange("step_time", self%step_time)
-      call archive%exchange("drive_work", self%drive_work)
+      call archive%exchange("impulse", self%impulse)
+      call archive%exchange("earlier_work", self%earlier_work)
+      call archive%exchange("stage_impulse", self%stage_impulse)
+      call self%extremes%exchange(archive)
       call archive%exchange("drag_loss", self%drag_loss)
       call archive%exchange("damping_loss", self%damping_loss)
       call archive%exchange("instant", self%instant)

@@ -20,8 +20,8 @@ module mesoslip_sliders_layered
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law, &
-      & shift_slider
+   use mesoslip_sliders_base, only: motion_type, slider_type, drive_slider, exchange_slider, &
+      & exchange_law, shift_slider
    use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf
    implicit none
    private
@@ -71,8 +71,8 @@ module mesoslip_sliders_layered
       type(interface_law_type) :: law
       !> Mass of a layer [kg], stiffness [N/m] and damping [N s/m] between two
       real(wp) :: layer_mass = 1.0_wp, spring = 1.0_wp, dashpot = 0.0_wp
-      !> Displacement [m] and velocity [m/s] of the drive at the start
-      real(wp) :: drive = 0.0_wp, drive_velocity = 0.0_wp
+      !> Displacement [m] and velocity [m/s] of the drive at the start, and its acceleration [m/s2]
+      real(wp) :: drive = 0.0_wp, drive_velocity = 0.0_wp, drive_acceleration = 0.0_wp
    end type system_type
 
    !> An elastic slider.
@@ -105,6 +105,8 @@ module mesoslip_sliders_layered
       !> What CVODE did before the run was put away
       integer(i8), private :: counts_before(3) = 0_i8
    contains
+      procedure :: drive
+      procedure :: pulled_velocity
       procedure :: start
       procedure :: advance
       procedure :: observe
@@ -112,7 +114,7 @@ module mesoslip_sliders_layered
       procedure :: energy
       procedure :: shift_origin
       procedure :: exchange
-      procedure, private :: expand, step_cvode, restart, take_back, add_work
+      procedure, private :: expand, step_cvode, restart, take_back, add_work, see_drive
       final :: close
    end type slider_layered_type
 
@@ -198,6 +200,36 @@ contains
       self%system%law = law
    end subroutine start
 
+   !> Give the drive another velocity and acceleration; CVODE starts anew.
+   subroutine drive(self, velocity, acceleration)
+      !> The slider
+      class(slider_layered_type), intent(inout) :: self
+      !> Velocity of the drive now [m/s], and its acceleration from now on [m/s2]
+      real(wp), intent(in) :: velocity, acceleration
+
+      call drive_slider(self, velocity, acceleration)
+      self%is_stale = .true.
+   end subroutine drive
+
+   !> Velocity, at the end of the last advance, of the layer that the drive's spring pulls.
+   pure function pulled_velocity(self) result(velocity)
+      !> The slider
+      class(slider_layered_type), intent(in) :: self
+      !> Velocity [m/s]
+      real(wp) :: velocity
+
+      velocity = self%state(self%parameters%layers, 2)
+   end function pulled_velocity
+
+   !> Let the system know the drive as it is now.
+   subroutine see_drive(self)
+      class(slider_layered_type), intent(inout) :: self
+
+      self%system%drive = self%drive_at(self%time)
+      self%system%drive_velocity = self%drive_velocity_at(self%time)
+      self%system%drive_acceleration = self%drive_acceleration
+   end subroutine see_drive
+
    !> Move until the first end of a window, or less far.
    subroutine advance(self, law, window)
       !> The slider
@@ -214,8 +246,7 @@ contains
       if (self%parameters%solver /= solver_series .and. .not. self%is_stale) then
          self%is_stale = abs(law%stiffness - self%system%law%stiffness) > 0.0_wp .or. &
             & abs(law%offset - self%system%law%offset) > 0.0_wp .or. &
-            & abs(law%drag - self%system%law%drag) > 0.0_wp .or. &
-            & abs(self%drive_velocity - self%system%drive_velocity) > 0.0_wp
+            & abs(law%drag - self%system%law%drag) > 0.0_wp
       end if
       self%step_time = self%time
       self%start_displacement = self%displacement
@@ -228,8 +259,7 @@ contains
       end if
 
       if (self%parameters%solver == solver_series) then
-         self%system%drive = self%drive_at(self%time)
-         self%system%drive_velocity = self%drive_velocity
+         call self%see_drive()
          rate = fastest_rate(self%system)
          ends = step * rate <= longest_step
          if (.not. ends) step = longest_step / rate
@@ -379,7 +409,8 @@ contains
 
       last = system%parameters%layers
       acceleration(last) = acceleration(last) + system%spring * (system%drive &
-         & + system%drive_velocity * time) / system%layer_mass
+         & + (system%drive_velocity + 0.5_wp * system%drive_acceleration * time) * time) &
+         & / system%layer_mass
       acceleration(1) = acceleration(1) + system%law%offset / system%layer_mass
       if (system%parameters%base_mass > 0.0_wp) then
          acceleration(0) = acceleration(0) - system%law%offset / system%parameters%base_mass
@@ -400,6 +431,9 @@ contains
          if (term == 0) call push(self%system, 0.0_wp, self%series(:, 2, 1))
          if (term == 1) self%series(last, 2, 2) = self%series(last, 2, 2) &
             & + self%system%spring * self%system%drive_velocity / self%system%layer_mass
+         if (term == 2) self%series(last, 2, 3) = self%series(last, 2, 3) &
+            & + 0.5_wp * self%system%spring * self%system%drive_acceleration &
+            & / self%system%layer_mass
          self%series(:, 2, term + 1) = self%series(:, 2, term + 1) * inverse(term + 1)
          self%series(:, 1, term + 1) = self%series(:, 2, term) * inverse(term + 1)
       end do
@@ -462,8 +496,7 @@ contains
 
       self%start_time = self%time
       self%local_time = 0.0_wp
-      self%system%drive = self%drive_at(self%time)
-      self%system%drive_velocity = self%drive_velocity
+      call self%see_drive()
       if (.not. associated(self%vector)) allocate (self%vector(size(self%state)))
       self%vector(1::2) = self%state(:, 1)
       self%vector(2::2) = self%state(:, 2)
@@ -581,19 +614,33 @@ contains
       real(wp), intent(in) :: step
 
       real(wp) :: way, extension, sliding, drag, damped, velocity(0:self%parameters%layers)
-      real(wp) :: drive_velocity, drive
+      real(wp) :: drive_velocity, drive_acceleration, drive, lever
       integer :: last, node, term
 
       last = self%parameters%layers
-      drive_velocity = self%drive_velocity
+      drive_velocity = self%drive_velocity_at(self%step_time)
+      drive_acceleration = self%drive_acceleration
       drive = self%drive_at(self%step_time)
       way = 0.0_wp
       do term = self%terms, 0, -1
          way = way * step + self%series(last, 1, term) * inverse(term + 1)
       end do
       way = way * step
-      extension = step * (drive + 0.5_wp * drive_velocity * step) - way
-      call self%drive_work%add(drive_velocity * self%system%spring * extension)
+      extension = step * (drive + step * (0.5_wp * drive_velocity &
+         & + drive_acceleration * step / 6.0_wp)) - way
+      if (abs(drive_acceleration) > 0.0_wp) then
+         lever = 0.0_wp
+         do term = self%terms, 0, -1
+            lever = lever * step + self%series(last, 1, term) * inverse(term + 2)
+         end do
+         lever = step**2 * (0.5_wp * drive + step * (drive_velocity / 3.0_wp &
+            & + 0.125_wp * drive_acceleration * step) - lever)
+         call self%stage_impulse%add(self%system%spring * extension)
+         call self%earlier_work%add(self%system%spring &
+            & * (drive_velocity * extension + drive_acceleration * lever))
+      else
+         call self%impulse%add(self%system%spring * extension)
+      end if
 
       drag = 0.0_wp
       damped = 0.0_wp
@@ -635,6 +682,7 @@ contains
       last = value_of(layers, 1)
       motion%time = time
       motion%base_velocity = value_of(0, 2)
+      motion%pulled_velocity = value_of(layers, 2)
       motion%velocity = value_of(1, 2) - motion%base_velocity
       motion%drive_displacement = self%origin + drive
       motion%displacement = self%origin + first - base
@@ -734,6 +782,7 @@ contains
       call exchange_law(self%system%law, archive)
       call archive%exchange("drive", self%system%drive)
       call archive%exchange("drive_velocity", self%system%drive_velocity)
+      call archive%exchange("drive_acceleration", self%system%drive_acceleration)
       state = self%state
       call archive%exchange("state", state)
       if (all(shape(state) == shape(self%state))) self%state = state

@@ -45,18 +45,20 @@ contains
       call parameters%finish(error)
       if (allocated(error)) return
       self%runs_ahead = .true.
+      self%notes_extremes = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_prescribed
 
-   !> Give the drive another velocity: the slider has it at once.
-   subroutine drive(self, velocity)
+   !> Give the drive another velocity and acceleration: the slider has them at once.
+   subroutine drive(self, velocity, acceleration)
       !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> Velocity of the drive [m/s]
-      real(wp), intent(in) :: velocity
+      !> Velocity of the drive now [m/s], and its acceleration from now on [m/s2]
+      real(wp), intent(in) :: velocity, acceleration
 
-      call drive_slider(self, velocity)
+      call drive_slider(self, velocity, acceleration)
       self%velocity = velocity
+      self%acceleration = acceleration
       if (abs(velocity) > 0.0_wp) self%sense = sign(1.0_wp, velocity)
    end subroutine drive
 
@@ -81,10 +83,15 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      call step_on(self, law, window)
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         call speed_up(self, law, window)
+      else
+         call step_on(self, law, window)
+      end if
    end subroutine advance
 
-   !> Move through a schedule until it ends, or until a step is of interest.
+   !> Move through a schedule until it ends, or until a step is of interest; the drive has no
+   !> acceleration.
    subroutine run_ahead(self, schedule, watch)
       !> The slider
       class(slider_prescribed_type), intent(inout) :: self
@@ -102,13 +109,13 @@ contains
       end do
    end subroutine run_ahead
 
-   !> One step.
+   !> One step at a constant velocity.
    pure subroutine step_on(self, law, window)
       type(slider_prescribed_type), intent(inout) :: self
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
 
-      real(wp) :: limit, start, step, arrival
+      real(wp) :: limit, start, step, arrival, middle, half
 
       self%law = law
       self%step_time = self%time
@@ -124,15 +131,96 @@ contains
          self%displacement = limit
       else
          self%time = window%end_time
-         self%displacement = self%drive_at(self%time)
+         self%displacement = self%drive_displacement &
+            & + self%velocity * (self%time - self%drive_time)
       end if
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
 
       step = self%displacement - start
-      call self%drive_work%add(step * (law%stiffness * (start + 0.5_wp * step) - law%offset &
-         & + law%drag * self%velocity))
+      middle = law%stiffness * (start + 0.5_wp * step) - law%offset + law%drag * self%velocity
+      call self%impulse%add((self%time - self%step_time) * middle)
       call self%drag_loss%add(step * law%drag * self%velocity)
+      half = abs(0.5_wp * law%stiffness * step)
+      if (middle + half > self%extremes%greatest .or. middle - half < self%extremes%least) then
+         call note(self, self%step_time, start, self%velocity)
+         call note(self, self%time, self%displacement, self%velocity)
+      end if
    end subroutine step_on
+
+   !> One step while the drive has an acceleration, in which it does not turn round.
+   pure subroutine speed_up(self, law, window)
+      type(slider_prescribed_type), intent(inout) :: self
+      type(interface_law_type), intent(in) :: law
+      type(window_type), intent(in) :: window
+
+      real(wp) :: limit, start, step, way, early, late, time, pace
+
+      self%law = law
+      self%step_time = self%time
+      self%acceleration = self%drive_acceleration
+      self%start_acceleration = self%drive_acceleration
+      start = self%displacement
+      early = self%drive_velocity_at(self%time)
+      limit = merge(window%upper, window%lower, self%drive_sense > 0.0_wp)
+
+      self%displacement = self%drive_at(window%end_time)
+      if (self%drive_sense * (self%displacement - limit) >= 0.0_wp) then
+         way = limit - self%drive_displacement
+         late = self%drive_sense * sqrt(max(0.0_wp, &
+            & self%drive_velocity**2 + 2.0_wp * self%drive_acceleration * way))
+         ! Of two forms of the root the one in which nothing cancels.
+         pace = self%drive_velocity + late
+         if (self%drive_sense * self%drive_velocity < 0.0_wp) then
+            time = (late - self%drive_velocity) / self%drive_acceleration
+         else if (abs(pace) > 0.0_wp) then
+            time = 2.0_wp * way / pace
+         else
+            time = 0.0_wp
+         end if
+         self%time = min(max(self%drive_time + time, self%time), window%end_time)
+         self%displacement = limit
+      else
+         self%time = window%end_time
+         late = self%drive_velocity_at(self%time)
+      end if
+      self%velocity = late
+      if (abs(late) > 0.0_wp) self%sense = sign(1.0_wp, late)
+
+      way = self%displacement - start
+      step = self%time - self%step_time
+      call self%earlier_work%add(way * (law%stiffness * (start + 0.5_wp * way) - law%offset) &
+         & + law%drag * square())
+      call self%drag_loss%add(law%drag * square())
+      call self%stage_impulse%add(step * (law%stiffness * (start + step * (0.5_wp * early &
+         & + self%drive_acceleration * step / 6.0_wp)) - law%offset) + law%drag * way)
+      call note(self, self%step_time, start, early)
+      call note(self, self%time, self%displacement, late)
+      if (law%stiffness > 0.0_wp) then
+         ! Where contacts pull more by as much as drag pulls less.
+         time = -law%drag / law%stiffness - early / self%drive_acceleration
+         if (time > 0.0_wp .and. time < step) call note(self, self%step_time + time, start + time &
+            & * (early + 0.5_wp * self%drive_acceleration * time), &
+            & early + self%drive_acceleration * time)
+      end if
+
+   contains
+
+      !> Integral of the velocity squared over the step.
+      pure real(wp) function square()
+         square = step * (early**2 + early * late + late**2) / 3.0_wp
+      end function square
+
+   end subroutine speed_up
+
+   !> Note the contact force at a place in the last step.
+   pure subroutine note(self, time, displacement, velocity)
+      type(slider_prescribed_type), intent(inout) :: self
+      !> Time [s], displacement [m] and velocity [m/s]
+      real(wp), intent(in) :: time, displacement, velocity
+
+      call self%extremes%note(self%law%stiffness * displacement - self%law%offset &
+         & + self%law%drag * velocity, time, self%origin + displacement)
+   end subroutine note
 
    !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)
@@ -149,9 +237,10 @@ contains
       motion%time = time
       motion%displacement = self%origin + displacement
       motion%drive_displacement = motion%displacement
-      motion%velocity = self%velocity
+      motion%velocity = self%drive_velocity_at(time)
+      motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
-         & + self%law%drag * self%velocity
+         & + self%law%drag * motion%velocity
       motion%spring_force = motion%contact_force
    end function observe
 

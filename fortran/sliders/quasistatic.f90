@@ -52,6 +52,7 @@ contains
       call parameters%finish(error)
       if (allocated(error)) return
       self%under_force = .not. self%stiffness > 0.0_wp
+      self%notes_extremes = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_quasistatic
 
@@ -79,13 +80,15 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      real(wp) :: stiffness, start, target, way, pull, rate, limit
+      real(wp) :: stiffness, start, target, way, pull, rate, limit, middle, change
+      real(wp) :: arrival, step
       logical :: reaches
 
       self%instant = .true.
       self%law = law
       self%step_time = self%time
       self%velocity = 0.0_wp
+      self%acceleration = 0.0_wp
       self%settled = .false.
       stiffness = self%stiffness + law%stiffness
       if (.not. stiffness > 0.0_wp) then
@@ -102,23 +105,27 @@ contains
       if (abs(way) > 0.0_wp) then
          self%sense = sign(1.0_wp, way)
          call self%damping_loss%add(way * stiffness * (target - start - 0.5_wp * way))
-         if (.not. self%stiffness > 0.0_wp) call self%drive_work%add(way * pull)
+         if (.not. self%stiffness > 0.0_wp) call self%earlier_work%add(way * pull)
       end if
+      call note(self)
       if (.not. self%settled) return
 
       start = self%displacement
       self%rest_displacement = start
-      rate = self%drive_velocity
-      if (self%stiffness > 0.0_wp) rate = rate * self%stiffness
-      self%velocity = rate / stiffness
-      limit = window%upper
-      if (self%velocity < 0.0_wp) limit = window%lower
-      reaches = .false.
-      if (abs(self%velocity) > 0.0_wp) then
-         reaches = (limit - start) / self%velocity <= window%end_time - self%time
+      rate = self%drive_velocity_at(self%time)
+      change = self%drive_acceleration
+      if (self%stiffness > 0.0_wp) then
+         rate = rate * self%stiffness
+         change = change * self%stiffness
       end if
+      self%velocity = rate / stiffness
+      self%acceleration = change / stiffness
+      limit = window%upper
+      if (self%drive_sense < 0.0_wp) limit = window%lower
+      arrival = time_of(limit - start, self%velocity, self%acceleration)
+      reaches = arrival < huge(1.0_wp) .and. arrival <= window%end_time - self%time
       if (reaches) then
-         self%time = min(self%time + (limit - start) / self%velocity, window%end_time)
+         self%time = min(self%time + arrival, window%end_time)
          self%displacement = limit
       else
          self%time = window%end_time
@@ -129,14 +136,51 @@ contains
 
       way = self%displacement - start
       if (abs(way) > 0.0_wp) self%sense = sign(1.0_wp, way)
-      if (self%stiffness > 0.0_wp) then
-         ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
-         call self%drive_work%add(self%drive_velocity * (self%time - self%step_time) &
-            & * (law%stiffness * (start + 0.5_wp * way) - law%offset))
+      step = self%time - self%step_time
+      ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
+      middle = law%stiffness * (start + 0.5_wp * way) - law%offset
+      if (abs(self%acceleration) > 0.0_wp) then
+         call self%earlier_work%add(step * (self%drive_velocity_at(self%step_time) &
+            & + 0.5_wp * self%drive_acceleration * step) * middle)
+         call self%stage_impulse%add(step * (law%stiffness * (start + step * (0.5_wp &
+            & * self%velocity + self%acceleration * step / 6.0_wp)) - law%offset))
+         self%velocity = self%velocity + self%acceleration * step
+      else if (self%stiffness > 0.0_wp) then
+         call self%impulse%add(step * middle)
       else
-         call self%drive_work%add(way * (pull + 0.5_wp * rate * (self%time - self%step_time)))
+         call self%earlier_work%add(way * (pull + 0.5_wp * rate * step))
+         call self%impulse%add(step * (pull + 0.5_wp * rate * step))
       end if
+      call note(self)
    end subroutine advance
+
+   !> Time in which a motion makes a way, without turning round; huge if it does not move.
+   pure function time_of(way, velocity, acceleration) result(time)
+      !> Way [m], velocity at first [m/s], acceleration [m/s2]
+      real(wp), intent(in) :: way, velocity, acceleration
+      real(wp) :: time
+
+      real(wp) :: square, pace
+
+      time = huge(1.0_wp)
+      if (abs(acceleration) > 0.0_wp) then
+         square = velocity**2 + 2.0_wp * acceleration * way
+         if (square < 0.0_wp) return
+         pace = abs(velocity) + sqrt(square)
+         if (abs(way) > 0.0_wp .and. pace > abs(way) / time) time = 2.0_wp * abs(way) / pace
+         if (.not. abs(way) > 0.0_wp) time = 0.0_wp
+      else if (abs(velocity) > 0.0_wp) then
+         time = way / velocity
+      end if
+   end function time_of
+
+   !> Note the force of the drive where the slider is.
+   pure subroutine note(self)
+      type(slider_quasistatic_type), intent(inout) :: self
+
+      call self%extremes%note(self%pull(self%time) - self%stiffness * self%displacement, &
+         & self%time, self%origin + self%displacement)
+   end subroutine note
 
    !> Force of the drive on a slider without displacement.
    pure function pull(self, time) result(force)
@@ -157,12 +201,16 @@ contains
       !> The motion; under a force the drive is where the slider is
       type(motion_type) :: motion
 
-      real(wp) :: displacement
+      real(wp) :: displacement, step
 
-      displacement = self%rest_displacement + self%velocity * (time - self%step_time)
+      ! The velocity is that at the end.
+      step = time - self%step_time
+      motion%velocity = self%velocity + self%acceleration * (time - self%time)
+      displacement = self%rest_displacement &
+         & + (motion%velocity - 0.5_wp * self%acceleration * step) * step
       motion%time = time
       motion%displacement = self%origin + displacement
-      motion%velocity = self%velocity
+      motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset
       motion%spring_force = self%pull(time) - self%stiffness * displacement
       motion%elastic_force = motion%spring_force

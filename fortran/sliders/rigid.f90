@@ -38,6 +38,7 @@ module mesoslip_sliders_rigid
    real(wp), parameter :: fair_a_2 = 2.0e-2_wp, fair_a_3 = 1.0e-3_wp
 
    !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
+   integer, parameter :: most_nodes = 6
    real(wp), parameter :: point_3(3) = [0.11270166537925831148_wp, 0.5_wp, &
       & 0.88729833462074168852_wp]
    real(wp), parameter :: weight_3(3) = [5.0_wp / 18.0_wp, 4.0_wp / 9.0_wp, 5.0_wp / 18.0_wp]
@@ -52,22 +53,23 @@ module mesoslip_sliders_rigid
       & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
       & 0.085662246189585172520_wp]
 
-   !> Coefficients of the equation of motion, per mass of the slider.
+   !> Coefficients of the equation of motion, per mass of the slider:
+   !> V' = spring gap - (K_c X - S)/M - drag V - D and D' = eta_S (V' - D), with D = eta_S (V - W).
    type :: system_type
-      !> One over the mass [1/kg], (K + K_c)/M [1/s2], C/M [1/s], K/M [1/s2]
-      real(wp) :: inverse_mass, stiffness, drag, spring
-      !> Coefficients of the equation of the third order: 2 eta_S + C/M [1/s], (K + K_c)/M
-      !> + eta_S C/M [1/s2], eta_S (K + K_c)/M [1/s3], and eta_S K/M times the drive's velocity
-      real(wp) :: first, second, third, driving
-      !> How far the drive is ahead of the slider at the start of a step [m]
-      real(wp) :: drive_gap
+      !> One over the mass [1/kg], and K/M [1/s2]
+      real(wp) :: inverse_mass, spring
+      !> (K + K_c)/M [1/s2], C/M [1/s], and K/M times the drive's velocity at the start of a step
+      !> [m/s3] and times its acceleration [m/s4]
+      real(wp) :: stiffness, drag, driving, driving_rate
+      !> How far the drive is ahead of the slider at the start of a step [m], and its velocity [m/s]
+      real(wp) :: drive_gap, drive_velocity
    end type system_type
 
-   !> Velocity of the slider with derivatives, and the same of the damper.
+   !> Velocity and acceleration of the slider, and the same of the damper.
    type :: motion_rates_type
-      !> Velocity, acceleration and jerk of the slider
-      real(wp) :: velocity, acceleration, jerk
-      !> eta_S (V - W) [m/s2] and its rate [m/s3]
+      !> Velocity [m/s] and acceleration [m/s2]
+      real(wp) :: velocity, acceleration
+      !> D = eta_S (V - W) [m/s2] and its rate [m/s3]
       real(wp) :: damper, damper_rate
    end type motion_rates_type
 
@@ -75,8 +77,8 @@ module mesoslip_sliders_rigid
    type, extends(slider_type) :: slider_rigid_type
       !> Mass M [kg], stiffness of the drive's spring K [N/m], damping rate eta_S [1/s]
       real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp, damping = 0.0_wp
-      !> Running mean of the velocity, W [m/s]
-      real(wp) :: mean_velocity = 0.0_wp
+      !> Deceleration by the damper, D = eta_S (V - W), W being the mean velocity [m/s2]
+      real(wp) :: damper = 0.0_wp
       !> Contact force during the last advance, and displacement at its start [m]
       type(interface_law_type), private :: law
       real(wp), private :: start_displacement = 0.0_wp
@@ -124,7 +126,7 @@ contains
 
       self%law = law
       self%velocity = 0.0_wp
-      self%mean_velocity = 0.0_wp
+      self%damper = 0.0_wp
       self%start_displacement = self%displacement
       self%drive_displacement = (law%stiffness * self%displacement - law%offset) / self%stiffness
       self%series = 0.0_wp
@@ -139,7 +141,8 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      call step_on(self, law, window)
+      self%law = law
+      call step_on(self, constants(self), window)
    end subroutine advance
 
    !> Move through a schedule until it ends, or until a step is of interest.
@@ -151,8 +154,12 @@ contains
       !> What to stop at
       type(watch_type), intent(inout) :: watch
 
+      type(system_type) :: system
+
+      system = constants(self)
       do
-         call step_on(self, schedule%law(), schedule%window(self%time))
+         self%law = schedule%law()
+         call step_on(self, system, schedule%window(self%time))
          call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)
@@ -160,33 +167,49 @@ contains
       end do
    end subroutine run_ahead
 
+   !> What in the equation of motion does not change with the contacts.
+   pure function constants(self) result(system)
+      type(slider_rigid_type), intent(in) :: self
+      type(system_type) :: system
+
+      system%inverse_mass = 1.0_wp / self%mass
+      system%spring = self%stiffness * system%inverse_mass
+      system%drive_velocity = self%drive_velocity
+      system%driving = system%spring * self%drive_velocity
+      system%driving_rate = 0.0_wp
+      system%stiffness = 0.0_wp
+      system%drag = 0.0_wp
+      system%drive_gap = 0.0_wp
+   end function constants
+
    !> One step: by the short way, which nearly all steps between two events can take, or by any.
-   subroutine step_on(self, law, window)
+   subroutine step_on(self, constant, window)
       type(slider_rigid_type), intent(inout) :: self
-      type(interface_law_type), intent(in) :: law
+      type(system_type), intent(in) :: constant
       type(window_type), intent(in) :: window
 
       type(system_type) :: system
       type(motion_rates_type) :: early
       logical :: is_done
 
-      self%law = law
       self%step_time = self%time
       self%start_displacement = self%displacement
 
-      system%inverse_mass = 1.0_wp / self%mass
-      system%stiffness = (self%stiffness + law%stiffness) * system%inverse_mass
-      system%drag = law%drag * system%inverse_mass
-      system%spring = self%stiffness * system%inverse_mass
-      system%first = 2.0_wp * self%damping + system%drag
-      system%second = system%stiffness + system%drag * self%damping
-      system%third = system%stiffness * self%damping
-      system%driving = self%damping * system%spring * self%drive_velocity
-      system%drive_gap = self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time)
-      early = rates(self, system, system%drive_gap)
-
-      call glide(self, system, window, early, is_done)
+      system = constant
+      system%stiffness = system%spring + self%law%stiffness * system%inverse_mass
+      system%drag = self%law%drag * system%inverse_mass
+      is_done = .false.
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         system%drive_velocity = self%drive_velocity_at(self%time)
+         system%driving = system%spring * system%drive_velocity
+         system%driving_rate = system%spring * self%drive_acceleration
+         system%drive_gap = self%drive_at(self%time) - self%displacement
+         early = rates(self, system, system%drive_gap)
+      else
+         system%drive_gap = uniform_gap(self)
+         early = rates(self, system, system%drive_gap)
+         call glide(self, system, window, early, is_done)
+      end if
       if (.not. is_done) call move_on(self, system, window, early)
    end subroutine step_on
 
@@ -195,18 +218,21 @@ contains
    !> With p the time in which the way to the next break would be made at the present velocity, the
    !> series of the displacement is way/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion
    !> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), exact to
-   !> rounding or nearly so. Other steps, one in eight in Klein's case, are left to move_on.
+   !> rounding or nearly so. Other steps, one in eight in Klein's case, are left to move_on, as are
+   !> those under a drive that speeds up or slows down.
    subroutine glide(self, system, window, early, is_done)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
-      !> Whether the step was made; if not, nothing has changed but the series
+      !> Whether the step was made; if not, nothing has changed
       logical, intent(out) :: is_done
 
-      real(wp) :: target, way, pace, rest, passage, longest, step, change
-      real(wp) :: a_2, a_3, a_4, a_5, inverse_pace, series(0:few_terms - 1)
+      real(wp) :: target, way, pace, rest, passage, longest, step, change, square
+      real(wp) :: inverse_pace, a_2, a_3, a_4, a_5, velocity_loss, damper_loss
+      real(wp) :: jerk, snap, crackle, pop, damper_2, damper_3, damper_4
+      type(motion_rates_type) :: late
       logical :: crosses, nears
       integer :: term
 
@@ -229,29 +255,45 @@ contains
       if (longest**2 * (2.0_wp * abs(system%stiffness) &
          & + 2.0_wp * (system%drag + 2.0_wp * self%damping)**2) > short_step**2) return
 
-      call expand(system, early, few_terms, series)
+      ! Derivatives of acceleration and damper, each from the equation of motion, the damper put in.
+      associate (loss => system%drag + self%damping)
+         jerk = (system%driving - system%stiffness * early%velocity &
+            & + self%damping * early%damper) - loss * early%acceleration
+         damper_2 = self%damping * (jerk - early%damper_rate)
+         snap = (self%damping * early%damper_rate - system%stiffness * early%acceleration) &
+            & - loss * jerk
+         damper_3 = self%damping * (snap - damper_2)
+         crackle = (self%damping * damper_2 - system%stiffness * jerk) - loss * snap
+         damper_4 = self%damping * (crackle - damper_3)
+         pop = (self%damping * damper_3 - system%stiffness * snap) - loss * crackle
+      end associate
+      self%series(0) = early%velocity
+      self%series(1) = early%acceleration
+      self%series(2) = inverse(2) * jerk
+      self%series(3) = inverse(6) * snap
+      self%series(4) = (1.0_wp / 24.0_wp) * crackle
+      self%series(5) = (1.0_wp / 120.0_wp) * pop
+
       if (nears) then
          change = passage * inverse_pace
-         a_2 = inverse(2) * series(1) * change
-         change = change * passage
-         a_3 = inverse(3) * series(2) * change
-         change = change * passage
-         a_4 = inverse(4) * series(3) * change
-         a_5 = inverse(5) * series(4) * (change * passage)
+         a_2 = early%acceleration * (inverse(2) * change)
+         a_3 = jerk * (inverse(6) * change * passage)
+         a_4 = snap * ((1.0_wp / 24.0_wp) * change * passage**2)
+         a_5 = crackle * ((1.0_wp / 120.0_wp) * change * passage * passage**2)
          if (abs(a_2) > fair_a_2 .or. abs(a_3) > fair_a_3) return
          step = passage - passage * (a_2 - (2.0_wp * a_2**2 - a_3) &
             & + (a_2 * (5.0_wp * a_2**2 - 5.0_wp * a_3) + a_4) &
             & - (7.0_wp * a_2**2 * (2.0_wp * a_2**2 - 3.0_wp * a_3) + 6.0_wp * a_2 * a_4 &
             & + 3.0_wp * a_3**2 - a_5))
          if (abs(a_2) > most_a_2 .or. abs(a_3) > most_a_3 .or. abs(a_4) > most_a_4 &
-            & .or. abs(a_5) > most_a_5) step = nearer(series, way, step)
+            & .or. abs(a_5) > most_a_5) step = nearer(self%series, way, step)
          crosses = step <= rest
          if (.not. crosses) step = rest
       else
          ! Too far from any break to come to it in the time that is left.
          change = 0.0_wp
          do term = few_terms - 1, 1, -1
-            change = (change + abs(series(term))) * rest
+            change = (change + abs(self%series(term))) * rest
          end do
          if (.not. change < 0.5_wp * pace) return
          crosses = .false.
@@ -260,19 +302,38 @@ contains
 
       is_done = .true.
       self%terms = few_terms
-      self%series(:few_terms - 1) = series
+      square = step**2
       if (crosses) then
-         way = target - self%displacement
          self%displacement = target
          self%time = self%time + step
       else
-         way = integral(series, few_terms, step)
-         self%displacement = self%displacement + way
+         self%displacement = self%displacement + step * (early%velocity &
+            & + inverse(2) * step * (early%acceleration + inverse(3) * step * jerk) &
+            & + (1.0_wp / 24.0_wp) * step * square * (snap + inverse(5) * step * crackle &
+            & + (1.0_wp / 30.0_wp) * square * pop))
          self%time = window%end_time
       end if
-      self%velocity = horner(series, few_terms, step)
-      ! A share of (rate times step)**2 of the balance of momentum: four terms do.
-      call balance(self, system, early, step, way, second_integral(series, 4, step), few_terms)
+      self%velocity = early%velocity + (step * early%acceleration + inverse(2) * square &
+         & * ((jerk + inverse(3) * step * snap) + inverse(12) * square &
+         & * (crackle + inverse(5) * step * pop)))
+      self%damper = early%damper + (step * early%damper_rate + inverse(2) * square &
+         & * ((damper_2 + inverse(3) * step * damper_3) + inverse(12) * square * damper_4))
+      ! A share of (rate times step)**2 of the balance: four terms do.
+      call pull(self, system, step, inverse(2) * square * (early%velocity &
+         & + inverse(3) * step * (early%acceleration + inverse(4) * step * (jerk &
+         & + inverse(5) * step * snap))))
+      call arrive(self, system, early, uniform_gap(self), late)
+      ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
+      ! fastest rate, of terms that are a small part of the balance.
+      velocity_loss = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
+         & + inverse(6) * step * (early%velocity * early%acceleration &
+         & - late%velocity * late%acceleration))
+      damper_loss = step * (0.5_wp * (early%damper * early%velocity + late%damper * late%velocity) &
+         & + inverse(12) * step * (early%damper_rate * early%velocity &
+         & + early%damper * early%acceleration - late%damper_rate * late%velocity &
+         & - late%damper * late%acceleration))
+      call self%drag_loss%add(self%law%drag * velocity_loss)
+      call self%damping_loss%add(self%mass * damper_loss)
    end subroutine glide
 
    !> A time of a crossing made exact by one step of Halley's method, the error of which is cubic.
@@ -344,11 +405,13 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, way, change, reach, target, sense, series(0:most_terms - 1)
+      real(wp) :: step, change, reach, target, sense
+      real(wp) :: series(0:most_terms - 1), damper(0:most_terms - 1)
+      type(motion_rates_type) :: late
       logical :: crosses, turns
       integer :: term
 
-      call expand(system, early, terms, series)
+      call expand(system, self%damping, early, terms, series, damper)
       self%terms = terms
       self%series(:terms - 1) = series(:terms - 1)
 
@@ -368,11 +431,10 @@ contains
          target = merge(window%upper, window%lower, sense > 0.0_wp)
       end if
 
-      way = integral(series, terms, step)
       if (crosses) then
          self%displacement = target
       else
-         self%displacement = self%displacement + way
+         self%displacement = self%displacement + integral(series, terms, step)
       end if
       if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
          self%time = window%end_time
@@ -381,45 +443,84 @@ contains
       end if
       self%velocity = horner(series, terms, step)
       if (turns) self%velocity = 0.0_wp
-      call balance(self, system, early, step, way, second_integral(series, terms, step), terms)
+      self%damper = horner(damper, terms, step)
+      if (abs(self%drive_acceleration) > 0.0_wp) then
+         call pull_unevenly(self, system, step, second_integral(series, terms, step), &
+            & lever(series, terms, step))
+         call arrive(self, system, early, self%drive_at(self%time) - self%displacement, late)
+      else
+         call pull(self, system, step, second_integral(series, terms, step))
+         call arrive(self, system, early, uniform_gap(self), late)
+      end if
+      select case (terms)
+      case (some_terms)
+         call add_losses(self, damper, step, terms, point_3, weight_3)
+      case (many_terms)
+         call add_losses(self, damper, step, terms, point_4, weight_4)
+      case default
+         call add_losses(self, damper, step, terms, point_6, weight_6)
+      end select
    end subroutine move
 
-   !> The mean velocity after a step, and the balance of energy.
-   subroutine balance(self, system, early, step, way, swept, terms)
+   !> Add the drive's impulse of a step to the balance, its velocity being constant.
+   subroutine pull(self, system, step, swept)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> Length of the step [s], and integral of the way over the time [m s]
+      real(wp), intent(in) :: step, swept
+
+      call self%impulse%add(self%stiffness &
+         & * (step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept))
+   end subroutine pull
+
+   !> Add the drive's impulse and work of a step to the balance, under an acceleration.
+   subroutine pull_unevenly(self, system, step, swept, moment)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> Length of the step [s], integrals of the way [m s] and of the way times the time [m s2]
+      real(wp), intent(in) :: step, swept, moment
+
+      real(wp) :: extension
+
+      associate (velocity => system%drive_velocity, acceleration => self%drive_acceleration)
+         extension = step * (system%drive_gap + step * (0.5_wp * velocity &
+            & + inverse(6) * acceleration * step)) - swept
+         call self%stage_impulse%add(self%stiffness * extension)
+         call self%earlier_work%add(self%stiffness * (velocity * extension + acceleration &
+            & * (step**2 * (0.5_wp * system%drive_gap + step &
+            & * (inverse(3) * velocity + 0.125_wp * acceleration * step)) - moment)))
+      end associate
+   end subroutine pull_unevenly
+
+   !> What there is to note at the end of any step.
+   subroutine arrive(self, system, early, drive_gap, late)
       !> The slider, where it is at the end of the step
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
-      !> Length of the step [s], way in it [m], and the integral of the way over the time [m s]
-      real(wp), intent(in) :: step, way, swept
-      !> Terms of the series
-      integer, intent(in) :: terms
-
-      real(wp) :: drive_gap, extension
-      type(motion_rates_type) :: late
+      !> How far the drive is ahead of the slider at the end of the step [m]
+      real(wp), intent(in) :: drive_gap
+      !> The motion at the end of the step
+      type(motion_rates_type), intent(out) :: late
 
       if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
-
-      extension = step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept
-      ! From the balance of momentum, M dV + M dW = the impulse of spring and contacts.
-      if (self%damping > 0.0_wp) then
-         self%mean_velocity = self%mean_velocity - (self%velocity - early%velocity) &
-            & + system%spring * extension - system%drag * way + system%inverse_mass * (step &
-            & * (self%law%offset - self%law%stiffness * self%start_displacement) &
-            & - self%law%stiffness * swept)
-      end if
-
-      drive_gap = self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time)
       late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
       self%start_acceleration = early%acceleration
-      call self%drive_work%add(self%stiffness * self%drive_velocity * extension)
-      call add_losses(self, early, late, step, terms)
-   end subroutine balance
+   end subroutine arrive
 
-   !> Velocity and its derivatives, from the equation of motion.
+   !> How far a drive of constant velocity is ahead of the slider.
+   pure function uniform_gap(self) result(drive_gap)
+      type(slider_rigid_type), intent(in) :: self
+      !> The gap [m]
+      real(wp) :: drive_gap
+
+      drive_gap = self%drive_displacement - self%displacement &
+         & + self%drive_velocity * (self%time - self%drive_time)
+   end function uniform_gap
+
+   !> Velocity and damper with their rates, from the equation of motion.
    pure function rates(self, system, drive_gap) result(motion)
       type(slider_rigid_type), intent(in) :: self
       type(system_type), intent(in) :: system
@@ -428,25 +529,23 @@ contains
       type(motion_rates_type) :: motion
 
       motion%velocity = self%velocity
-      motion%damper = self%damping * (self%velocity - self%mean_velocity)
-      motion%acceleration = system%spring * drive_gap - system%inverse_mass &
-         & * (self%law%stiffness * self%displacement - self%law%offset) &
-         & - system%drag * self%velocity - motion%damper
+      motion%damper = self%damper
+      motion%acceleration = ((system%spring * drive_gap - system%inverse_mass &
+         & * (self%law%stiffness * self%displacement - self%law%offset)) &
+         & - system%drag * self%velocity) - self%damper
       motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
-      motion%jerk = system%spring * self%drive_velocity - system%stiffness * self%velocity &
-         & - system%drag * motion%acceleration - motion%damper_rate
    end function rates
 
-   !> Taylor coefficients of the velocity.
-   !>
-   !> Without its running mean, S40 with S41 is an equation of the third order for the velocity.
-   pure subroutine expand(system, early, terms, series)
+   !> Taylor coefficients of the velocity and of the damper, from the equation of motion.
+   pure subroutine expand(system, damping, early, terms, series, damper)
       type(system_type), intent(in) :: system
+      !> Damping rate [1/s]
+      real(wp), intent(in) :: damping
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
       integer, intent(in) :: terms
       !> The coefficients
-      real(wp), intent(out) :: series(0:terms - 1)
+      real(wp), intent(out) :: series(0:terms - 1), damper(0:terms - 1)
 
       real(wp) :: driving
       integer :: term
@@ -454,74 +553,50 @@ contains
       driving = system%driving
       series(0) = early%velocity
       series(1) = early%acceleration
-      series(2) = 0.5_wp * early%jerk
-      do term = 3, terms - 1
-         series(term) = inverse(term) * ((driving - system%third * series(term - 3)) &
-            & * (inverse(term - 1) * inverse(term - 2)) &
-            & - (system%second * inverse(term - 1)) * series(term - 2) &
-            & - system%first * series(term - 1))
+      damper(0) = early%damper
+      damper(1) = early%damper_rate
+      do term = 2, terms - 1
+         series(term) = inverse(term) * (inverse(term - 1) * (driving &
+            & - system%stiffness * series(term - 2)) - system%drag * series(term - 1) &
+            & - damper(term - 1))
+         damper(term) = damping * (series(term) - inverse(term) * damper(term - 1))
          driving = 0.0_wp
+         if (term == 2) driving = system%driving_rate
       end do
    end subroutine expand
 
-   !> Add the losses of a step to the energy balance: the integrals of C V**2 and M eta_S (V - W) V.
-   subroutine add_losses(self, early, late, step, terms)
+   !> Add the losses of a step to the energy balance, the integrals of C V**2 and M D V, by a Gauss
+   !> rule.
+   subroutine add_losses(self, damper, step, terms, point, weight)
       type(slider_rigid_type), intent(inout) :: self
-      !> The motion at both ends
-      type(motion_rates_type), intent(in) :: early, late
+      !> Coefficients of the damper
+      real(wp), intent(in) :: damper(0:)
       !> Length of the step [s]
       real(wp), intent(in) :: step
       integer, intent(in) :: terms
-
-      real(wp) :: square, damped
-
-      select case (terms)
-      case (few_terms)
-         ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
-         ! fastest rate, of terms that are a small part of the balance.
-         square = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
-            & + step * (1.0_wp / 6.0_wp) * (early%velocity * early%acceleration &
-            & - late%velocity * late%acceleration))
-         damped = step * (0.5_wp * (early%damper * early%velocity + late%damper * late%velocity) &
-            & + step * (1.0_wp / 12.0_wp) * (early%damper_rate * early%velocity &
-            & + early%damper * early%acceleration - late%damper_rate * late%velocity &
-            & - late%damper * late%acceleration))
-      case (some_terms)
-         call integrate_losses(self, early%damper, step, terms, point_3, weight_3, square, damped)
-      case (many_terms)
-         call integrate_losses(self, early%damper, step, terms, point_4, weight_4, square, damped)
-      case default
-         call integrate_losses(self, early%damper, step, terms, point_6, weight_6, square, damped)
-      end select
-      call self%drag_loss%add(self%law%drag * square)
-      call self%damping_loss%add(self%mass * damped)
-   end subroutine add_losses
-
-   !> Integrals of V**2 and eta_S (V - W) V over a step by a Gauss rule.
-   pure subroutine integrate_losses(self, damper, step, terms, point, weight, square, damped)
-      type(slider_rigid_type), intent(in) :: self
-      !> eta_S (V - W) at the start [m/s2], length of the step [s]
-      real(wp), intent(in) :: damper, step
-      integer, intent(in) :: terms
       real(wp), intent(in), contiguous :: point(:), weight(:)
-      real(wp), intent(out) :: square, damped
 
-      real(wp) :: velocity, series(0:most_terms - 1)
-      integer :: node, term
+      real(wp) :: velocity(most_nodes), deceleration(most_nodes), velocity_loss, damper_loss
+      integer :: term, node
 
-      series(0) = damper
-      do term = 1, terms - 1
-         series(term) = self%damping * (self%series(term) - series(term - 1) * inverse(term))
+      ! Node by node in the inner loop: they do not wait for each other.
+      velocity = 0.0_wp
+      deceleration = 0.0_wp
+      do term = terms - 1, 0, -1
+         do node = 1, size(point)
+            velocity(node) = velocity(node) * (point(node) * step) + self%series(term)
+            deceleration(node) = deceleration(node) * (point(node) * step) + damper(term)
+         end do
       end do
-      square = 0.0_wp
-      damped = 0.0_wp
+      velocity_loss = 0.0_wp
+      damper_loss = 0.0_wp
       do node = 1, size(point)
-         velocity = horner(self%series, terms, point(node) * step)
-         square = square + step * weight(node) * velocity**2
-         damped = damped + step * weight(node) * velocity &
-            & * horner(series, terms, point(node) * step)
+         velocity_loss = velocity_loss + weight(node) * velocity(node)**2
+         damper_loss = damper_loss + weight(node) * velocity(node) * deceleration(node)
       end do
-   end subroutine integrate_losses
+      call self%drag_loss%add(self%law%drag * (step * velocity_loss))
+      call self%damping_loss%add(self%mass * (step * damper_loss))
+   end subroutine add_losses
 
    !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)
@@ -553,6 +628,7 @@ contains
       motion%displacement = self%origin + displacement
       motion%spring_force = self%stiffness * (drive - displacement)
       motion%elastic_force = motion%spring_force
+      motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity
    end function observe
@@ -589,7 +665,7 @@ contains
 
       call archive%section("rigid slider")
       call exchange_slider(self, archive)
-      call archive%exchange("mean_velocity", self%mean_velocity)
+      call archive%exchange("damper", self%damper)
       call exchange_law(self%law, archive)
       call archive%exchange("start_displacement", self%start_displacement)
       call archive%exchange("terms", self%terms)
@@ -612,6 +688,21 @@ contains
       end do
       value = time**2 * horner(twice, terms, time)
    end function second_integral
+
+   !> Integral of the way, the integral of a series from zero, times the time.
+   pure function lever(series, terms, time) result(value)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: value
+
+      integer :: term
+
+      value = 0.0_wp
+      do term = terms - 1, 0, -1
+         value = value * time + series(term) * (inverse(term + 1) / (term + 3))
+      end do
+      value = value * time**3
+   end function lever
 
    include "motion_series.inc"
 

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from mesoslip.api import (
         avalanche_summary,
         avalanches,
+        claims,
         curve,
+        example,
         figures,
         fit,
         group,
@@ -25,12 +27,17 @@ if TYPE_CHECKING:
         plot,
         read,
         read_trace,
+        regime,
+        report,
+        response,
         run,
         slips,
+        sweep,
     )
     from mesoslip.configuration.config import Config
     from mesoslip.configuration.threshold_law import ThresholdLaw
     from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",
@@ -39,10 +46,13 @@ __all__ = [
     "ForceCurve",
     "MesoslipError",
     "RunError",
+    "SteadySliding",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "claims",
     "curve",
+    "example",
     "figures",
     "fit",
     "group",
@@ -51,18 +61,25 @@ __all__ = [
     "plot",
     "read",
     "read_trace",
+    "regime",
+    "report",
+    "response",
     "run",
     "slips",
+    "sweep",
 ]
 
 # What takes long to import is imported when it is asked for.
 _LAZY = {
     "Config": "configuration.config",
     "ForceCurve": "theory.force_curve",
+    "SteadySliding": "theory.steady_sliding",
     "ThresholdLaw": "configuration.threshold_law",
     "avalanche_summary": "api",
     "avalanches": "api",
+    "claims": "api",
     "curve": "api",
+    "example": "api",
     "figures": "api",
     "fit": "api",
     "group": "api",
@@ -71,8 +88,12 @@ _LAZY = {
     "plot": "api",
     "read": "api",
     "read_trace": "api",
+    "regime": "api",
+    "report": "api",
+    "response": "api",
     "run": "api",
     "slips": "api",
+    "sweep": "api",
 }
 
 

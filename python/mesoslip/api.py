@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from mesoslip.analysis import slips as catalogue
 from mesoslip.configuration.config import Config
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output import files, layout
 from mesoslip.simulation.checkpoint import Checkpoint
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.runner import Results, checked_workers, run_realizations
 from mesoslip.simulation.stop import StopFlag
 from mesoslip.theory.derived import Derived, derived_quantities
 
@@ -21,9 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from mesoslip.inference.plan import Plan
+    from mesoslip.campaign.claims import Judgement
+    from mesoslip.campaign.plan import Plan
+    from mesoslip.campaign.runner import Sweep
+    from mesoslip.campaign.store import Store
+    from mesoslip.inference import plan as fit_plans
 
 PathLike = str | os.PathLike[str]
+
+# What ends a sweep that somebody has stopped.
+INTERRUPTED = "interrupted"
 
 
 def as_config(
@@ -52,6 +61,7 @@ def run(
     config: PathLike | Mapping[str, Any] | Config,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.DataTree:
     """Simulate.
@@ -63,6 +73,9 @@ def run(
     workers
         Realizations at the same time; as many as there are processors by default. The result does
         not depend on it.
+    scheduler
+        Address of a Dask scheduler, or its ``--scheduler-file``, whose workers are to run the
+        realizations.
     progress
         Called now and then with the part of the work that is done, 0 to 1.
 
@@ -79,13 +92,15 @@ def run(
     RunError
         If the run fails.
     """
-    return layout.build_tree(simulate(as_config(config), workers=workers, progress=progress))
+    results = simulate(as_config(config), workers=workers, scheduler=scheduler, progress=progress)
+    return layout.build_tree(results)
 
 
 def simulate(
     config: Config,
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
     stop: StopFlag | None = None,
     checkpoint: Checkpoint | None = None,
@@ -94,9 +109,125 @@ def simulate(
 
     See `run`, and `mesoslip.simulation.runner.run_realizations`.
     """
+    if scheduler is not None:
+        from mesoslip.campaign.cluster import connected
+        from mesoslip.campaign.ensemble import run_on_cluster
+
+        with connected(scheduler) as client:
+            return run_on_cluster(
+                config, client, progress=progress, stop=stop, checkpoint=checkpoint
+            )
     return run_realizations(
         config, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
     )
+
+
+def sweep(
+    plan: PathLike | Mapping[str, Any] | Plan,
+    *,
+    store: PathLike | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    pool: str = "both",
+    progress: Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Run a configuration over a range of parameters, and measure each run.
+
+    Parameters
+    ----------
+    plan
+        The file of a sweep, nested tables, or a `mesoslip.campaign.plan.Plan`.
+    store
+        Folder where each point is kept as soon as it is done, and taken from when the sweep is
+        called again; nowhere by default.
+    workers
+        Points at the same time; as many as there are processors by default. The result does not
+        depend on it.
+    scheduler
+        Address of a Dask scheduler, or its ``--scheduler-file``, whose workers are to compute the
+        points.
+    pool
+        What points are computed on: "threads", "processes", or "both", that is threads first and
+        processes in a sweep that takes long.
+    progress
+        Called now and then with the part of the points that are there, 0 to 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions: each swept key, and ``realization``; variables: ``status`` (0 ok, 1 failed, 2
+        missing) and the measures. Its attribute ``failures`` tells why points failed.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the sweep cannot be read or is wrong, or a combination cannot be run.
+    RunError
+        If the scheduler is gone, or workers cannot be started, before every point was computed.
+    """
+    from mesoslip.campaign.store import Store
+
+    checked = as_plan(plan)
+    kept = None if store is None else Store(Path(store))
+    with kept or nullcontext():
+        done = run_plan(
+            checked,
+            store=kept,
+            workers=workers,
+            scheduler=scheduler,
+            pool=pool,
+            progress=progress,
+        )
+    if done.missing and done.ending != INTERRUPTED:
+        raise RunError(done.ending)
+    return done.dataset
+
+
+def as_plan(plan: PathLike | Mapping[str, Any] | Plan, overrides: Iterable[str] = ()) -> Plan:
+    """A sweep from its file or from nested tables.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If the sweep is wrong.
+    """
+    from mesoslip.campaign.plan import Plan
+
+    if isinstance(plan, Plan):
+        return plan
+    if isinstance(plan, Mapping):
+        return Plan.from_dict(plan)
+    return Plan.load(plan, overrides)
+
+
+def run_plan(
+    plan: Plan,
+    *,
+    store: Store | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    pool: str = "both",
+    progress: Callable[[float], None] | None = None,
+    stop: StopFlag | None = None,
+) -> Sweep:
+    """Compute what is missing of a sweep; see `sweep` and `mesoslip.campaign.runner.run_sweep`."""
+    from mesoslip.campaign import cluster, execution, runner
+
+    count = checked_workers(workers)
+    if pool not in execution.POOLS:
+        raise ConfigError(
+            [Problem("", "pool", f"must be one of {', '.join(execution.POOLS)}", pool)]
+        )
+    # Before a cluster is asked.
+    _ = plan.combinations
+    if scheduler is None:
+        executor = execution.on_this_machine(count, pool)
+        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
+    with cluster.connected(scheduler) as client:
+        executor = cluster.on_dask(client)
+        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
 
 
 def info(config: PathLike | Mapping[str, Any] | Config) -> dict[str, Derived]:
@@ -196,7 +327,7 @@ def read_trace(
 
 def fit(
     output: PathLike | xr.DataTree,
-    config: PathLike | Mapping[str, Any] | Plan,
+    config: PathLike | Mapping[str, Any] | fit_plans.Plan,
     *,
     store: PathLike | None = None,
     workers: int | None = None,
@@ -296,6 +427,28 @@ def slips(output: PathLike | xr.DataTree) -> xr.Dataset:
     return catalogue.slips(_as_tree(output))
 
 
+def regime(output: PathLike | xr.DataTree) -> xr.Dataset:
+    """Which motion each realization of an output shows: smooth, stick-slip, irregular, transient.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``realization``; ``regime`` is 0 smooth, 1 stick-slip, 2 irregular, 3 transient,
+        beside the numbers by which it is judged, see `mesoslip.analysis.regime`.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read or is not of a run.
+    """
+    from mesoslip.analysis.regime import regimes
+
+    if isinstance(output, str | os.PathLike):
+        with files.opened_run(Path(output)) as tree:
+            return regimes(tree, os.fspath(output))
+    return regimes(output)
+
+
 def avalanches(
     output: PathLike | xr.DataTree, *, after: float = 0.0, force_above: float | None = None
 ) -> xr.Dataset:
@@ -347,33 +500,118 @@ def avalanche_summary(
     )
 
 
-def plot(
-    output: PathLike | xr.DataTree,
-    file: PathLike | None = None,
-    *,
-    view: str | None = None,
-    snapshot: int | None = None,
-    figure: Figure | SubFigure | None = None,
-    ax: Axes | None = None,
-) -> Figure | SubFigure:
-    """Draw an output of any command.
+def _several(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
+) -> Sequence[PathLike | xr.DataTree]:
+    """Outputs, of which there may be one."""
+    is_one = isinstance(output, str | os.PathLike) or not isinstance(output, Sequence)
+    return cast("Sequence[PathLike | xr.DataTree]", [output] if is_one else output)
 
-    Of a run: spring force with one slip in an inset, velocity, detached contacts; of a slider
-    without inertia: force and avalanches; of a force curve: the force and its slope; of an onset of
-    slip: the drop of the spring force.
+
+def _opened(
+    outputs: Sequence[PathLike | xr.DataTree], stack: ExitStack
+) -> tuple[list[xr.DataTree], list[str]]:
+    """Outputs, of which only what is used is read, and what they are called."""
+    trees, names = [], []
+    for number, one in enumerate(outputs):
+        if isinstance(one, str | os.PathLike):
+            names.append(str(one))
+            trees.append(stack.enter_context(files.opened(Path(one))))
+        else:
+            names.append(one.attrs.get("title", f"output {number}"))
+            trees.append(one)
+    return trees, names
+
+
+def response(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
+    *,
+    normal_force: float | None = None,
+    fit: bool = True,
+    free_stiffness: bool = False,
+) -> xr.DataTree:
+    """What those who measure friction read off an output, or several: see ``docs/response.md``.
 
     Parameters
     ----------
     output
-        The output.
+        Output of a run, or several of them.
+    normal_force
+        If it is given [N], forces are told over it too, as coefficients of friction; else over the
+        static force.
+    fit
+        Whether rate-and-state parameters are fitted, which takes some seconds.
+    free_stiffness
+        Whether the stiffness is fitted along with them, and not that of the run.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``steady``: the mean force of each stage at one velocity, with its error; ``steps``:
+        direct and evolving change and relaxation displacement of each velocity step; ``holds``:
+        relaxation, restart peak and healing of each hold; ``rate_and_state``: a, b, D_c of each
+        law, and whether it describes the output. Variables have units and long names.
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, is none of a run, or is driven by a force.
+    """
+    from mesoslip.analysis import response as responses
+    from mesoslip.analysis.experiment import Experiment
+
+    experiments = [
+        Experiment(
+            _as_tree(one),
+            os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+        )
+        for number, one in enumerate(_several(output))
+    ]
+    return responses.response(
+        experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
+    )
+
+
+def plot(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree],
+    file: PathLike | None = None,
+    *,
+    view: str | None = None,
+    snapshot: int | None = None,
+    realization: int | None = None,
+    start: float = -math.inf,
+    end: float = math.inf,
+    x: str | None = None,
+    figure: Figure | SubFigure | None = None,
+    ax: Axes | None = None,
+) -> Figure | SubFigure:
+    """Draw an output of any command, or several of one command over each other.
+
+    Of a run: force, velocity and detached contacts, with the largest slip beside them; of a slider
+    without inertia: force and avalanches; of a force curve: the force and its slope; of an onset of
+    slip: the drop of the spring force. The title has what the run changes of what it is based on,
+    the legend of several outputs how they differ.
+
+    Parameters
+    ----------
+    output
+        The output, or several.
     file
         Where to save the picture; nowhere by default. If its name ends in ``.gif`` it is an
         animation of the lattice: of the avalanche that spreads before a snapshot, or of all
         snapshots.
     view
-        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot.
+        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot, "layers"
+        for the waves in an elastic slider, "response" for steady forces, velocity steps and holds.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
+    realization
+        Number of the realization of a run; by default the first one, with others behind it.
+    start, end
+        Times of a run [s] between which it is drawn.
+    x
+        What a run is drawn against: "time", "displacement", or "drive" for the displacement of the
+        drive; by default the time, of a slider without inertia its displacement.
     figure
         Figure, or part of one, to draw into; a new one by default.
     ax
@@ -387,27 +625,99 @@ def plot(
     Raises
     ------
     FileError
-        If the output cannot be read or does not have what is to be drawn, or the picture cannot be
+        If an output cannot be read or does not have what is to be drawn, or the picture cannot be
         written.
     ConfigError
-        If there is no such view.
+        If there is no such view, or nothing to draw it against.
     """
     from mesoslip.plots import avalanches as avalanche_plots
     from mesoslip.plots.draw import draw
+    from mesoslip.plots.run import Extent
     from mesoslip.plots.style import save
 
-    if isinstance(output, str | os.PathLike):
-        with files.opened(Path(output)) as tree:
-            return plot(tree, file, view=view, snapshot=snapshot, figure=figure, ax=ax)
+    outputs = _several(output)
+    if not outputs:
+        raise FileError("there is no output to draw")
+    extent = Extent(realization, start, end, x)
     path = None if file is None else Path(file)
-    if path is not None and path.suffix == ".gif":
-        if view not in {None, "lattice"}:
-            raise FileError(f"{path}: only the lattice can be shown in motion, not {view!r}")
-        return avalanche_plots.animate(output, path, snapshot)
-    drawn = draw(output, view, snapshot, figure=figure, axes=ax)
-    if path is not None:
-        save(drawn, path)
+    is_moving = path is not None and path.suffix == ".gif"
+    if is_moving and (view not in {None, "lattice"} or len(outputs) > 1):
+        what = "of one output" if len(outputs) > 1 else f"not {view!r}"
+        raise FileError(f"{path}: only the lattice can be shown in motion, {what}")
+    with ExitStack() as stack:
+        trees, names = _opened(outputs, stack)
+        if path is not None and is_moving:
+            return avalanche_plots.animate(trees[0], path, snapshot)
+        drawn = draw(trees, names, view, snapshot, extent=extent, figure=figure, axes=ax)
+        if path is not None:
+            save(drawn, path)
     return drawn
+
+
+def report(
+    output: PathLike | xr.DataTree | Sequence[PathLike | xr.DataTree], file: PathLike
+) -> None:
+    """Write a page about an output of any command, or about several of one command side by side.
+
+    What differs, pictures, slips or avalanches with their distributions, the balance of energy,
+    the configuration, and where it comes from. The page needs nothing else: no network, no scripts.
+
+    Parameters
+    ----------
+    output
+        The output, or several.
+    file
+        The page (HTML).
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, outputs are of different commands, or the page cannot be
+        written.
+    """
+    from mesoslip.reports.content import Subject
+    from mesoslip.reports.page import write
+
+    with ExitStack() as stack:
+        outputs = _several(output)
+        trees, names = _opened(outputs, stack)
+        stems = [
+            Path(name).stem if isinstance(one, str | os.PathLike) else name
+            for name, one in zip(names, outputs, strict=True)
+        ]
+        numbered = [f"{name} ({number})" for number, name in enumerate(names, 1)]
+        # The shortest by which they can be told apart.
+        short = next(one for one in (stems, names, numbered) if len(set(one)) == len(one))
+        write([Subject(*one) for one in zip(short, trees, strict=True)], Path(file))
+
+
+def example(name: str, file: PathLike | None = None) -> list[Path]:
+    """Write a run that comes with the program, and beside it what it is based on.
+
+    See `mesoslip.examples.examples` for those that there are.
+
+    Parameters
+    ----------
+    name
+        Such as "klein".
+    file
+        Where to write it; a file of that name with the ending ``.toml`` here by default.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files that were written; what it is based on is not if it is there already.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such run.
+    FileError
+        If there is a file of the name already, or it cannot be written.
+    """
+    from mesoslip import examples
+
+    return examples.example(name, Path(file or f"{Path(name).name}{examples.ENDING}"))
 
 
 def figures(
@@ -430,3 +740,23 @@ def figures(
     from mesoslip.plots import source_figures
 
     return source_figures.draw(names, Path(outputs), Path(folder))
+
+
+def claims(names: Iterable[str] = (), *, outputs: PathLike = "out") -> list[Judgement]:
+    """Judge claims of the source, all by default, from the outputs of their runs.
+
+    Returns
+    -------
+    list of mesoslip.campaign.claims.Judgement
+        Each with its claim, what was measured, and the verdict.
+
+    Raises
+    ------
+    FileError
+        If an output is missing.
+    ConfigError
+        If there is no claim of a name.
+    """
+    from mesoslip.campaign.claims import judge
+
+    return judge(names, Path(outputs))

@@ -27,10 +27,14 @@ program test_ageing_law
    ! 0.5 (1 + 0.4 z) = 0.1 for z = -2.
    call check_close(thresholds%minimum, 0.8_wp, 1.0e-14_wp, "the weakest young cannot attach")
    call consistent()
+   call meeting()
 
    call take("relax", [1.0_wp, width])
    call check_close(thresholds%minimum, 0.1_wp, 0.0_wp, "young like old: the same contacts attach")
    call check_close(law%threshold(1.2_wp, 1.0_wp, 0.3_wp), 1.2_wp, 0.0_wp, "young like old")
+   call check(.not. law%acts() .and. law%is_constant(1.2_wp, 1.0_wp), "nothing changes")
+   call check_close(law%meet(1.2_wp, 1.0_wp, 0.3_wp, 0.1_wp, 0.7_wp), 1.2_wp, 0.0_wp, &
+      & "young like old break where they would")
 
    call take("log", [0.05_wp])
    call check(.not. allocated(error), "log")
@@ -39,6 +43,8 @@ program test_ageing_law
       & 1.0e-14_wp, "three e-folds")
    call check(.not. law%falls(9.0_wp, 1.0_wp) .and. .not. law%is_old(1.0e9_wp), "grows for ever")
    call consistent()
+   call meeting()
+   call check(law%acts() .and. .not. law%is_constant(1.2_wp, 1.0_wp), "thresholds change")
 
    call take("relax", [0.0_wp, 0.4_wp])
    call check(allocated(error), "young without force are refused")
@@ -93,5 +99,44 @@ contains
             & 1.0e-8_wp * threshold, 1.0e-22_wp, "unit")
       end do
    end subroutine consistent
+
+   !> A contact breaks where its stretch is its threshold, and does so there for the first time.
+   subroutine meeting()
+      real(wp), parameter :: configured(6) = [0.82_wp, 0.9_wp, 1.0_wp, 1.3_wp, 1.6_wp, 1.9_wp]
+      real(wp), parameter :: speeds(8) = [1.0e-3_wp, 0.1_wp, 0.2_wp, 0.3_wp, 0.5_wp, 2.0_wp, &
+         & 1.0e2_wp, 1.0e6_wp]
+      real(wp), parameter :: ages(3) = [0.0_wp, 0.7_wp, 5.0_wp], stretch = 0.1_wp
+      real(wp) :: found, time, together(size(configured))
+      integer :: speed, age, place, part
+      logical :: is_first
+
+      do speed = 1, size(speeds)
+         call law%meet_newborn(configured, 1.0_wp, stretch, speeds(speed), together)
+         do age = 1, size(ages)
+            do place = 1, size(configured)
+               found = law%meet(configured(place), 1.0_wp, ages(age), stretch, speeds(speed))
+               time = (found - stretch) / speeds(speed)
+               call check_close(law%threshold(configured(place), 1.0_wp, ages(age) + time), found, &
+                  & 1.0e-13_wp, "the threshold where it is met")
+               is_first = .true.
+               do part = 1, 99
+                  is_first = is_first .and. law%threshold(configured(place), 1.0_wp, ages(age) &
+                     & + 0.01_wp * part * time) > stretch + 0.01_wp * part * (found - stretch)
+               end do
+               call check(is_first, "it was not met before")
+               if (law%falls(configured(place), 1.0_wp)) cycle
+               call check(law%meet_least(configured(place), 1.0_wp, ages(age), stretch, &
+                  & speeds(speed)) <= found + 1.0e-15_wp, "a bound from below")
+               call check(law%meet_least(configured(place), 1.0_wp, ages(age), found - 1.0e-4_wp, &
+                  & speeds(speed)) >= law%threshold(configured(place), 1.0_wp, ages(age)), &
+                  & "not below the threshold of now")
+            end do
+         end do
+         do place = 1, size(configured)
+            call check_close(together(place), law%meet(configured(place), 1.0_wp, 0.0_wp, stretch, &
+               & speeds(speed)), 0.0_wp, "many together, to the bit")
+         end do
+      end do
+   end subroutine meeting
 
 end program test_ageing_law

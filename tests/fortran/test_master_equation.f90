@@ -179,7 +179,7 @@ contains
          before = after
       end do
       call check(step < 20000, "the way is made in so many steps")
-      call check_close(contacts%pinned() + contacts%detached_count, 1.0_wp, &
+      call check_close(contacts%pinned_count() + contacts%detached_count, 1.0_wp, &
          & 1.0e-12_wp, "contacts are conserved")
       call check(contacts%breaks > 2.5_wp, "contacts break")
       call check_close(contacts%elastic_energy(before%displacement) - start, &

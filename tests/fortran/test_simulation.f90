@@ -125,18 +125,18 @@ contains
       integer :: segment, table
       character(len=:), allocatable :: name
       real(wp), parameter :: short(3) = [0.024_wp, 0.03_wp, 0.05_wp]
-      character(len=10), parameter :: tables(6) = [character(len=10) :: &
-         & "trace", "slip_trace", "slips", "layers", "avalanches", "snapshots"]
+      character(len=10), parameter :: tables(7) = [character(len=10) :: &
+         & "trace", "slip_trace", "slips", "layers", "avalanches", "snapshots", "stages"]
 
       name = contacts // ", " // slider // ", solver " // achar(iachar("0") + solver)
       call build(whole, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
-      whole%stage_end = short
+      whole%part_end = short
       call whole%start(initial_relaxed)
       call whole%run(forever, any_work, error)
 
       allocate (now)
       call build(now, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
-      now%stage_end = short
+      now%part_end = short
       call now%start(initial_relaxed)
       do segment = 1, 100000
          ! Longer and longer, so that all phases of a run are cut, and the test ends.
@@ -147,7 +147,7 @@ contains
          if (.not. allocated(error)) call now%fetch(words, error)
          allocate (next)
          call build(next, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
-         next%stage_end = short
+         next%part_end = short
          if (.not. allocated(error)) call next%restore(words, error)
          deallocate (words)
          deallocate (now)
@@ -181,8 +181,8 @@ contains
       integer(i8) :: length
       integer :: number, segment, table
       character(len=:), allocatable :: name
-      character(len=10), parameter :: tables(3) = [character(len=10) :: &
-         & "trace", "slip_trace", "slips"]
+      character(len=10), parameter :: tables(4) = [character(len=10) :: &
+         & "trace", "slip_trace", "slips", "stages"]
 
       call prepare(whole, slider, law, width, delay, 0)
       call whole%start(initial_steady)
@@ -360,8 +360,12 @@ contains
       end if
       call make_slider(simulation%slider, slider, parameters, error)
       call check(.not. allocated(error), "slider: " // slider)
-      simulation%stage_end = [0.03_wp, 0.05_wp, 0.15_wp]
-      simulation%stage_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
+      simulation%part_end = [0.03_wp, 0.05_wp, 0.15_wp]
+      simulation%start_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
+      simulation%end_velocity = simulation%start_velocity
+      simulation%stage_of_part = [0, 1, 2]
+      call simulation%stages%open()
+      call simulation%steady%open(0.0_wp, 1, 0.0_wp)
       call simulation%recorder%open(recorder)
       call simulation%avalanches%open(avalanche_parameters_type(least_size=1.0_wp, &
          & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%followed())

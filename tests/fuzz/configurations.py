@@ -144,6 +144,10 @@ def _drive(random: Random, tables: Tables, duration: float, speed: float) -> Non
             }
             for _ in range(count)
         ]
+        for stage in stages:
+            if random.random() < 0.3:
+                stage["start_velocity"] = stage.pop("velocity")
+                stage["end_velocity"] = random.choice([1, 0, -1]) * speed
         tables["drive"] = {"stage": stages}
     ends = ["duration", "drive_displacement"]
     if slider["kind"] == "quasistatic" or "interaction" in tables:

@@ -75,6 +75,7 @@ def broken(tree: xr.DataTree, config: Config) -> Iterator[str]:
     if residual > promised and (is_exact(config) or tree.attrs["audit"] == "passed"):
         yield f"energy: residual {residual:.2g}, at most {promised:g}, and nothing said"
     yield from _wrong_slips(tree, config)
+    yield from _wrong_stages(tree, config)
     if "avalanches" in tree.children:
         yield from _wrong_avalanches(tree, config)
 
@@ -138,7 +139,7 @@ def _wrong_slips(tree: xr.DataTree, config: Config) -> Iterator[str]:
     slips = tree["slips"].to_dataset(inherit=False)
     yield from _wrong_owners(slips, tree, "slips")
     slack = ROUNDING * max(1.0, float(tree["breaks"].values.max()))
-    velocities = [stage.velocity for stage in config.drive_stages]
+    directions = set[float]().union(*(part.directions for part in config.drive_parts))
     for number, mine in _owned(slips, tree):
         start, end = mine["start_time"].values, mine["end_time"].values
         if np.any(end < start):
@@ -152,12 +153,35 @@ def _wrong_slips(tree: xr.DataTree, config: Config) -> Iterator[str]:
             yield f"slips: {counts.sum():g} breaks of {tree['breaks'].values[number]:g}"
         drops = mine["force_drop"].values
         least = ROUNDING * config.contacts.static_force
-        if len(velocities) == 1 and np.any(drops * np.sign(velocities[0]) < -least):
+        one_way = len(config.drive_parts) == len(directions) == 1
+        if one_way and np.any(drops * min(directions) < -least):
             yield f"slips: a drop against the drive, {drops.min():g} to {drops.max():g} N"
         if np.any(mine["peak_velocity"].values == 0):
             yield "slips: one does not move"
     if "slip_traces" in tree.children:
         yield from _wrong_slip_traces(tree, slips)
+
+
+def _wrong_stages(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    stages = tree["stages"].to_dataset(inherit=False)
+    yield from _wrong_owners(stages, tree, "stages")
+    slack = ROUNDING * max(
+        config.contacts.static_force,
+        float(np.max(np.abs(stages["greatest_force"].values), initial=0.0)),
+    )
+    for _, mine in _owned(stages, tree):
+        start, end = mine["stage_start_time"].values, mine["stage_end_time"].values
+        if np.any(end < start) or np.any(start[1:] != end[:-1]):
+            yield "stages: one does not follow on another"
+        least, greatest = mine["least_force"].values, mine["greatest_force"].values
+        for name in ("start_force", "mean_force", "end_force"):
+            force = mine[name].values
+            if np.any(force < least - slack) or np.any(force > greatest + slack):
+                yield f"stages: {name} is beyond the extremes"
+        for name in ("least_force_time", "greatest_force_time"):
+            time = mine[name].values
+            if np.any(time < start) or np.any(time > end):
+                yield f"stages: {name} is outside the stage"
 
 
 def _wrong_slip_traces(tree: xr.DataTree, slips: xr.Dataset) -> Iterator[str]:

@@ -30,6 +30,15 @@ SNAPSHOTS = {"interaction": PLACES, "output__snapshots": [0.01, 0.03], "output__
 
 # Contacts that grow stronger but for the strongest of them.
 RELAX = {"law": "relax", "time": 3e-3, "young_force_ratio": 0.6, "young_relative_width": 0.3}
+RAMPS = {
+    "drive": {
+        "stage": [
+            {"duration": 0.04, "start_velocity": 0.0, "end_velocity": 2e-5},
+            {"duration": 0.01, "hold": True},
+            {"duration": 0.05, "start_velocity": 1e-5, "end_velocity": -2e-5},
+        ]
+    }
+}
 AGEING = {"contacts__coupling": "equal", "contacts__ageing": RELAX}
 
 KINDS: dict[str, dict[str, Any]] = {
@@ -40,6 +49,21 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, lattice": SNAPSHOTS,
     "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
     "rigid, me": {"run__engine": "me"},
+    "rigid, ramps": RAMPS,
+    "rigid, to a displacement": {"run__stop": {"displacement": 2.01e-7}},
+    "rigid, to a slip": {"run__stop": {"slips": 1}},
+    "rigid, to a steady state": {
+        "drive": {"velocity": 1e-5},
+        "run": {
+            "duration": 0.2,
+            "stop": {"steady": {"displacement": 1e-7, "blocks": 3, "tolerance": 0.3}},
+        },
+    },
+    "rigid, ageing, ramps": AGEING | RAMPS,
+    "prescribed, ramps": RAMPS | {"slider": {"kind": "prescribed"}},
+    "prescribed, me, ramps": RAMPS | {"slider": {"kind": "prescribed"}, "run__engine": "me"},
+    "layered, adams, ramps": RAMPS | {"slider": LAYERED | {"solver": {"method": "adams"}}},
+    "quasistatic, ramps": RAMPS | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
     "prescribed": {"slider": {"kind": "prescribed"}},
     "prescribed, lattice": {"slider": {"kind": "prescribed"}} | SNAPSHOTS,
     "prescribed, me": {"slider": {"kind": "prescribed"}, "run__engine": "me"},

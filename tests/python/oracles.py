@@ -332,8 +332,8 @@ def fixed_step(config: Config, step: float) -> tuple[np.ndarray, Contacts]:
     """The model at a fixed step, events at ends of steps; trace columns time, X_d, X, V, F_d, F."""
     contacts = Contacts(config)
     prescribed = config.slider.kind == "prescribed"
-    ends = np.cumsum([stage.duration for stage in config.drive_stages])
-    velocities = [stage.velocity for stage in config.drive_stages]
+    ends = np.cumsum([part.duration for part in config.drive_parts])
+    velocities = [part.start_velocity for part in config.drive_parts]
     steps = round(config.duration / step)
     every = round(config.output_interval / step)
     x = v = w = drive = 0.0
@@ -362,11 +362,11 @@ def fixed_step(config: Config, step: float) -> tuple[np.ndarray, Contacts]:
 def exact_events(config: Config, scan: float) -> Contacts:
     """Breaks by matrix exponentials and root finding; crossings are looked for at a fine scan."""
     contacts = Contacts(config)
-    (stage,) = config.drive_stages
+    (part,) = config.drive_parts
     state = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
     time = 0.0
     while time < config.duration:
-        system = matrix(config, contacts.sums(), stage.velocity)
+        system = matrix(config, contacts.sums(), part.start_velocity)
         due = contacts.due[~np.isnan(contacts.due)] if config.contacts.reattach else np.array([])
         end = min([time + scan, config.duration, *due])
 

@@ -264,8 +264,7 @@ def test_a_way_of_stages(klein, way, duration):
     drive = {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
     config = klein(run={"drive_displacement": way}, drive=drive)
     assert config.duration == pytest.approx(duration)
-    travelled = [abs(stage.velocity) * stage.duration for stage in config.drive_stages]
-    assert math.fsum(travelled) == pytest.approx(way)
+    assert math.fsum(part.way for part in config.drive_parts) == pytest.approx(way)
 
 
 def test_a_way_that_stages_do_not_go():
@@ -473,7 +472,7 @@ def test_a_base_is_laid_under(tmp_path):
     assert config.contacts.count == 4080
     assert config.slider.damping_rate == 7
     # The last stage lasts until the end of the run.
-    assert config.drive_stages == ((3, 1e-6), (7, 0))
+    assert config.drive_parts == ((3, 1e-6, 1e-6, 0), (7, 0, 0, 1))
     (tmp_path / "block.toml").write_text('base = "base.toml"\n[slider]\nkind = "prescribed"\n')
     assert Config.load(tmp_path / "block.toml").slider.kind == "prescribed"
 
@@ -802,7 +801,8 @@ def test_stages_and_duration(stages, duration, expected):
         run__duration=duration,
         drive={"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]},
     )
-    assert Config.from_dict(tables).drive_stages == expected
+    parts = Config.from_dict(tables).drive_parts
+    assert tuple((part.duration, part.start_velocity) for part in parts) == expected
 
 
 def test_derived_quantities_of_klein(klein):

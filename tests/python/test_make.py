@@ -26,12 +26,15 @@ def checkout(tmp_path):
     shutil.copytree(ROOT / "tools", tmp_path / "tools")
     (tmp_path / "mesoslip").write_text(PROGRAM)
     (tmp_path / "mesoslip").chmod(0o755)
+    (tmp_path / "runs").mkdir()
+    shutil.copy(ROOT / "runs" / "campaign.mk", tmp_path / "runs")
     texts = {
         "runs/klein.toml": 'title = "first"\n',
         "runs/slow.toml": "# The first.\nbase = 'klein.toml'  # beside it\n[run]\nseed = 1\n",
         "runs/slower.toml": 'base = "slow.toml"\n[run]\nseed = 2\n',
         "runs/elsewhere.toml": 'base = "../mine/own.toml"\n',
         "runs/other.toml": '[sweep]\nbase = "klein.toml"\n',
+        "runs/sweeps/map.toml": 'base = "../slow.toml"\n',
         "mine/own.toml": 'title = "own"\n',
     }
     for name, text in texts.items():
@@ -97,6 +100,15 @@ def test_pictures_curves_and_onsets_follow(checkout):
     assert made(checkout, *targets) == []
     edit(checkout, "runs/klein.toml")
     assert made(checkout, *targets) == [*expected, "run runs/slower.toml"]
+
+
+def test_sweeps_follow_their_base(checkout):
+    target = "out/sweeps/map.nc"
+    assert made(checkout, target) == ["sweep runs/sweeps/map.toml"]
+    assert made(checkout, target) == []
+    os.utime(checkout / target, (1.1e9, 1.1e9))
+    os.utime(checkout / "runs/klein.toml", (1.2e9, 1.2e9))
+    assert made(checkout, target) == ["sweep runs/sweeps/map.toml"]
 
 
 def test_a_changed_chain_counts_at_once(checkout):

@@ -213,6 +213,7 @@ class Rows:
             yield rows
 
 tables = {"trace": Rows(1_500_000, 9), "slip_trace": Rows(1_500_000, 10), "slips": Rows(0, 7)}
+tables["stages"] = Rows(0, 17)
 one = SimpleNamespace(
     rows=tables.get, number=0, time=1.0, ending="", breaks=1, advances=1, kernel_seconds=1.0,
     energy=np.ones(8), energy_residual=0.0, force_error=0.0,

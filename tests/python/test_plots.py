@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import ROOT
+from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.plots import run as run_plots
+from mesoslip.plots.run import Extent
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,7 @@ def test_pictures_of_the_theory(klein):
 
 
 def test_an_unknown_view_is_told(old):
-    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, lattice"):
+    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, "):
         mesoslip.plot(old, view="foo")
 
 
@@ -61,34 +63,37 @@ def many_samples(count, realizations=1):
     force[0, count // 3] = 7.0
     return xr.DataTree(
         xr.Dataset(
-            {"spring_force": (("realization", "time"), force)},
+            {
+                "spring_force": (("realization", "time"), force),
+                "displacement": (("realization", "time"), np.sqrt(times) * np.ones_like(force)),
+            },
             coords={"time": times, "realization": np.arange(realizations)},
         )
     )
 
 
 @pytest.mark.parametrize("block", [2**20, 997])
-def test_a_line_shows_the_extremes_of_many_samples(monkeypatch, block):
-    """Far fewer points than samples, none of the spikes lost."""
+@pytest.mark.parametrize("against", ["time", "displacement"])
+def test_a_line_shows_the_extremes_of_many_samples(monkeypatch, block, against):
+    """Far fewer points than samples, all of them samples, none of the spikes lost."""
     monkeypatch.setattr(run_plots, "BLOCK", block)
     tree = many_samples(200_000)
-    axes = Figure().subplots()
-    run_plots.draw_series(axes, tree, "spring_force")
-    times, values = axes.lines[0].get_data()
-    assert len(times) <= 2 * run_plots.MOST_PARTS
-    samples, force = tree["time"].values, tree["spring_force"].values[0] * 1e6
-    assert values.max() == force.max()
-    assert values.min() == force.min()
-    # Each pair of points is the least and greatest of the samples in its part of the time.
-    edges = np.linspace(0, 10, run_plots.MOST_PARTS + 1)
-    place = np.clip(np.searchsorted(edges, samples, "right") - 1, 0, run_plots.MOST_PARTS - 1)
+    extent = Extent(against=against)
+    x, y = run_plots.line(tree, (extent.abscissa[0], "spring_force"), extent, (0.0, 10.0))
+    assert len(x) <= 5 * run_plots.MOST_PARTS + 2 * 200_000 / block
+    along, force = tree[extent.abscissa[0]].values.ravel(), tree["spring_force"].values[0]
+    assert y.max() == force.max()
+    assert set(zip(x, y, strict=True)) <= set(zip(along, force, strict=True))
+    # Of the samples in each part of the time, which here are as many, the least and the greatest.
     for part in (0, 17, run_plots.MOST_PARTS // 3, run_plots.MOST_PARTS - 1):
-        inside = force[place == part]
-        np.testing.assert_allclose(values[2 * part : 2 * part + 2], [inside.min(), inside.max()])
+        inside = slice(part * 50, (part + 1) * 50)
+        near = (x >= along[inside].min()) & (x <= along[inside].max())
+        assert y[near].min() <= force[inside].min()
+        assert y[near].max() >= force[inside].max()
     # A window with few samples shows each.
-    run_plots.draw_series(axes, tree, "spring_force", window=(1.0, 1.1))
-    window = (samples >= 1.0) & (samples <= 1.1)
-    np.testing.assert_array_equal(axes.lines[1].get_ydata(), force[window])
+    _, values = run_plots.line(tree, ("time", "spring_force"), extent, (1.0, 1.1))
+    times = tree["time"].values
+    np.testing.assert_array_equal(values, force[(times >= 1.0) & (times <= 1.1)])
 
 
 def test_what_is_not_drawn_is_not_read():
@@ -131,3 +136,232 @@ def test_pictures_on_threads_leave_the_style_of_the_session(old):
         one.join()
     assert not errors
     assert dict(mpl.rcParams) == before
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Short runs with slips, by what is special about them."""
+    klein = ROOT / "runs" / "klein.toml"
+    changes = {
+        "plain": [],
+        "slow": ["contacts.delay=2 ms"],
+        "several": ["run.realizations=3"],
+        "layered": ["slider.kind=layered", "slider.layers=4", "output.layers=true"],
+        "sliding": ["slider.kind=prescribed"],
+        "quasistatic": ["slider.kind=quasistatic"],
+        "no avalanche": ["slider.kind=quasistatic", "run.duration=0.1 s"],
+        "no slip": ["run.duration=0.1 s"],
+        "few": ["contacts.count=20", "contacts.threshold.relative_width=0.3"],
+        "me": ["run.engine=me"],
+        "two samples": ["run.duration=0.1 s", "output.interval=0.1 s"],
+    }
+    common = ["run.duration=2.2 s", "contacts.count=200", "output.interval=2 ms"]
+    trees = {}
+    for name, own in changes.items():
+        config = mesoslip.Config.load(klein, ["title=Costs $5 or $6", *common])
+        trees[name] = mesoslip.run(config.replace(*own) if own else config)
+    trees["macroscopic"] = mesoslip.run(
+        {
+            "run": {"duration": "1 h"},
+            "drive": {"velocity": "-1 mm/s"},
+            "slider": {"mass": "2 t", "stiffness": "20 kN/m", "damping_ratio": 0.5},
+            "contacts": {
+                **{"count": 100, "static_force": "50 kN", "stiffness": "9 MN/m"},
+                **{"delay": "1 s", "threshold": {"law": "weibull", "relative_width": 0.5}},
+            },
+            "output": {"interval": "1 s"},
+        }
+    )
+    return trees
+
+
+NAMES = [
+    *("plain", "slow", "several", "layered", "sliding", "quasistatic", "no avalanche"),
+    *("no slip", "few", "me", "two samples", "macroscopic"),
+]
+
+
+def overlapping(figure):
+    """Pairs of axes of a figure, with their labels, titles and legends, that cover each other."""
+    figure.draw_without_rendering()
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    width, height = figure.bbox.width, figure.bbox.height
+    outside = [
+        box
+        for box in boxes
+        if box.x0 < -2 or box.y0 < -2 or box.x1 > width + 2 or box.y1 > height + 2
+    ]
+    pairs = [
+        (one, other)
+        for number, one in enumerate(boxes)
+        for other in boxes[number + 1 :]
+        if min(one.x1, other.x1) - max(one.x0, other.x0) > 2
+        and min(one.y1, other.y1) - max(one.y0, other.y0) > 2
+    ]
+    return outside + pairs
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("x", [None, "displacement", "drive", "time"])
+def test_nothing_covers_anything_else(runs, name, x):
+    """Whatever the run, no panel, label or legend reaches into another one or out of the figure."""
+    assert overlapping(mesoslip.plot(runs[name], x=x)) == []
+
+
+def test_a_title_is_no_formula(runs):
+    figure = mesoslip.plot(runs["plain"])
+    assert figure.axes[0].get_title("left").startswith(r"Costs \$5 or \$6")
+    figure.draw_without_rendering()
+
+
+def test_units_suit_the_data(runs):
+    labels = [axes.get_ylabel() for axes in mesoslip.plot(runs["macroscopic"]).axes]
+    assert "spring force (kN)" in labels
+    for name, unit in (("plain", "µN"), ("no slip", "nN")):
+        axes = mesoslip.plot(runs[name]).axes[0]
+        assert axes.get_ylabel() == f"spring force ({unit})"
+    drawn = mesoslip.plot(runs["no slip"]).axes[0].lines[0].get_ydata()
+    np.testing.assert_allclose(drawn, runs["no slip"]["spring_force"].values[0] * 1e9)
+    assert mesoslip.plot(runs["macroscopic"]).axes[0].lines[0].get_xdata().max() == pytest.approx(
+        60
+    )
+
+
+def test_the_caption_has_the_keys_that_a_run_changes(runs):
+    title = mesoslip.plot(runs["slow"]).axes[0].get_title("left")
+    assert "contacts.delay = 2 ms (was 500 µs)" in title
+    assert "count" not in title
+    elastic = mesoslip.plot(runs["layered"]).axes[0].get_title("left")
+    # Of another kind what is set, neither its defaults nor what is gone.
+    assert "slider.kind = layered (was rigid)" in elastic
+    assert "slider.layers = 4" in elastic
+    assert "damping" not in elastic
+
+
+def test_a_realization_and_a_window_are_what_is_drawn(runs):
+    tree = runs["several"]
+    (line,) = mesoslip.plot(tree, realization=2, start=0.5, end=0.6).axes[0].lines
+    times = tree["time"].values
+    inside = (times >= 0.5) & (times <= 0.6)
+    np.testing.assert_allclose(line.get_xdata(), times[inside] * 1e3)
+    np.testing.assert_allclose(line.get_ydata(), tree["spring_force"].values[2, inside] * 1e6)
+    behind = mesoslip.plot(tree).axes[0].lines
+    assert len(behind) == 3
+    # Against the displacement.
+    (line,) = mesoslip.plot(tree, realization=1, end=0.05, x="displacement").axes[0].lines
+    inside = times <= 0.05
+    np.testing.assert_allclose(line.get_xdata(), tree["displacement"].values[1, inside] * 1e12)
+
+
+def test_several_outputs_say_how_they_differ(runs):
+    figure = mesoslip.plot([runs["plain"], runs["slow"]])
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["contacts.delay = 500 µs", "contacts.delay = 2 ms"]
+    first, second = figure.axes[0].lines
+    for line, name in ((first, "plain"), (second, "slow")):
+        parts = runs[name]["spring_force"], runs[name]["slip_traces/spring_force"]
+        top = max(one.values.max() for one in parts)
+        assert line.get_ydata().max() == pytest.approx(top * 1e6)
+    assert overlapping(figure) == []
+    # Those that do not differ are told apart by their names.
+    figure = mesoslip.plot([runs["plain"], runs["plain"]])
+    assert len(figure.legends[0].get_texts()) == 2
+    axes = Figure().subplots()
+    mesoslip.plot([runs["plain"], runs["slow"]], ax=axes)
+    assert len(axes.get_legend().get_texts()) == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "told"),
+    [
+        (["several"], {"realization": 3}, "no realization 3; the last one is 2"),
+        (["plain"], {"start": 3.0}, "from 3 s to inf s: the run goes from 0 s to 2.2 s"),
+        (["plain"], {"start": 2.0, "end": 1.0}, "2 s is not before 1 s"),
+        (["plain"], {"x": "force"}, "choose of time, displacement, drive"),
+        (["plain"], {"view": "layers"}, "output.layers = true"),
+        (["plain", "slow"], {"view": "lattice"}, "of one output, not of several"),
+        (["plain", "slow"], {"view": "avalanches"}, "has no avalanches"),
+        ([], {}, "no output"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(runs, given, options, told):
+    with pytest.raises(mesoslip.MesoslipError, match=told):
+        mesoslip.plot([runs[name] for name in given], **options)
+
+
+def test_outputs_of_different_commands_are_not_drawn_together(runs, klein):
+    with pytest.raises(mesoslip.FileError, match=r"is a run.* is a force curve"):
+        mesoslip.plot([runs["plain"], mesoslip.curve(klein())])
+
+
+def test_what_is_of_no_known_command_is_told(runs):
+    other = xr.DataTree(xr.Dataset(attrs={"configuration": runs["plain"].attrs["configuration"]}))
+    with pytest.raises(mesoslip.FileError, match="neither a run"):
+        mesoslip.plot(other)
+
+
+def test_waves_are_the_velocities_of_the_layers(runs):
+    tree = runs["layered"]
+    times, velocity = run_plots.layer_motion(tree, Extent(), (1.9, 2.0))
+    data = tree["layer_displacement"].isel(realization=0).sel(time=slice(1.9, 2.0))
+    moved = np.sum(velocity * np.diff(times)[:, None], axis=0)
+    np.testing.assert_allclose(moved, (data[-1] - data[0]).values, rtol=1e-10)
+    figure = mesoslip.plot(tree, view="layers")
+    assert overlapping(figure) == []
+    assert figure.axes[0].get_ylabel() == "layer, 1 at the contacts"
+
+
+def test_curves_have_dimensions_and_their_instability(klein):
+    tree = mesoslip.curve(klein())
+    figure = mesoslip.plot(tree)
+    axes = figure.axes[0]
+    assert axes.get_ylabel() == "force $F$ (µN)"
+    assert figure.axes[1].get_xlabel() == "displacement $X$ (nm)"
+    marks = [line for line in axes.lines if line.get_marker() == "o"]
+    assert marks[0].get_xdata()[0] == pytest.approx(tree.attrs["X_c"] * 1e9)
+    texts = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert f"instability at $X_c$ = {tree.attrs['X_c'] * 1e9:.4g} nm" in texts
+    assert overlapping(figure) == []
+
+
+def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein):
+    tree = mesoslip.onset(klein())
+    axes = mesoslip.plot(tree).axes[0]
+    melting = tree["melting"].to_dataset()
+    line = next(one for one in axes.lines if "S47" in str(one.get_label()))
+    static = klein().contacts.static_force
+    least = melting["relative_force_drop"].values.min() * static * 1e6
+    assert line.get_ydata().min() == pytest.approx(least)
+    assert axes.get_xlabel().endswith("(ms)")
+    none = mesoslip.plot(mesoslip.onset(klein(slider__stiffness=1e6)))
+    assert "there is no onset" in none.axes[0].texts[0].get_text()
+    # A curve and an onset have neither realizations nor times.
+    with pytest.raises(mesoslip.FileError, match="no realizations"):
+        mesoslip.plot(tree, realization=1)
+
+
+@pytest.mark.parametrize("kind", ["rigid, lattice", "quasistatic, lattice"])
+def test_avalanches_of_several_outputs(kind):
+    trees = [mesoslip.run(configuration(kind, run__seed=seed)) for seed in (1, 2)]
+    figure = mesoslip.plot(trees, view="avalanches")
+    assert len(figure.legends[0].get_texts()) == 2
+    assert overlapping(figure) == []
+
+
+def test_the_command_takes_windows_with_units(tmp_path, command):
+    output = tmp_path / "run.nc"
+    told = command(
+        *("run", ROOT / "runs" / "klein.toml", "-o", output, "--quiet"),
+        *("--set", "run.duration=0.1 s", "--set", "contacts.count=100"),
+    )
+    assert told[0] == 0
+    picture = tmp_path / "picture.svg"
+    window = ("--from", "10 ms", "--to", "0.05 s", "--x", "drive", "--realization", "0")
+    assert command("plot", output, output, "-o", picture, *window)[0] == 0
+    assert "displacement of the drive (nm)" in picture.read_text()
+    status, _, errors = command("plot", output, "-o", picture, "--from", "1 m")
+    assert status == 2
+    assert "--from" in errors
+    status, _, errors = command("plot", output, "-o", picture, "--from", "1 s", "--to", "2 s")
+    assert status == 2
+    assert "the run goes from 0 s to 0.1 s" in errors

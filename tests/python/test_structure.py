@@ -15,12 +15,16 @@ FORTRAN = ROOT / "fortran"
 # what moves or is recorded.
 MAY_USE: dict[str, set[str]] = {
     "numerics": set(),
+    "extremes": {"numerics"},
     "interface_law": {"numerics"},
     "schedule": {"numerics", "interface_law"},
     "watch": {"numerics"},
     "contacts": {"numerics", "interface_law", "schedule"},
-    "sliders": {"numerics", "interface_law", "schedule", "watch"},
-    "recording": {"numerics", "interface_law", "schedule", "watch", "contacts", "sliders"},
+    "sliders": {"numerics", "extremes", "interface_law", "schedule", "watch"},
+    "recording": {
+        *("numerics", "extremes", "interface_law", "schedule", "watch"),
+        *("contacts", "sliders"),
+    },
     "theory": {"numerics", "contacts"},
     "simulation": {
         *("numerics", "interface_law", "schedule", "watch"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +133,7 @@ def statistics(
     result["largest_size"] = float(sizes.max())
     result["largest_part"] = float(sizes.max() / config.contacts.count)
     result["triggered_share"] = float(1 - sizes.size / sizes.sum())
-    directions = {math.copysign(1, one.velocity) for one in config.drive_stages if one.velocity}
+    directions = set[float]().union(*(part.directions for part in config.drive_parts))
     if "slip" in data and is_whole and len(directions) == 1:
         root = tree.to_dataset()
         moved = float(np.abs(root["end_displacement"]).sum())

@@ -1,4 +1,4 @@
-"""``mesoslip slips`` and ``mesoslip avalanches``."""
+"""``mesoslip slips``, ``mesoslip avalanches`` and ``mesoslip regime``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show
+from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show, time_of
 
 # Scale and unit of the statistics of slips: those of the table above them.
 SHOWN = {
@@ -98,7 +98,7 @@ def avalanches(
     if table is not None:
         files.check_writable(table, [output])
     tree = files.read_run(output)
-    start = _time(after, "--after")
+    start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)
     if table is not None:
         avalanche_catalogue.write_csv(data, table)
@@ -132,19 +132,32 @@ def avalanches(
         typer.echo(f"warning: {warning}")
 
 
+def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
+    """Show which motion it is: smooth, stick-slip, irregular, or not settled yet."""
+    from mesoslip import api
+    from mesoslip.analysis.regime import NAMES, REGIME, judgements, told
+
+    data = api.regime(output)
+    judged = judgements(data)
+    if as_json:
+        names = [NAMES[one.regime] for one in judged]
+        columns = {str(name): data[name].values.tolist() for name in data.variables}
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        print_json([{**row, "regime": name} for row, name in zip(rows, names, strict=True)])
+        return
+    for number, one in zip(data["realization"].values.tolist(), judged, strict=True):
+        if len(judged) > 1:
+            typer.echo(f"realization {number}")
+        for name, meaning in REGIME.items():
+            if name != "regime":
+                show(name, getattr(one, name), meaning.units, meaning.attributes["long_name"])
+        typer.echo(one.told)
+    if len(judged) > 1:
+        typer.echo(told(judged))
+
+
 def _known(value: float | None, scale: float, form: str) -> str:
     """A number of a column, or a dash if a measurement does not tell it."""
     return (
         format("-", f">{form.partition('.')[0]}") if value is None else format(scale * value, form)
     )
-
-
-def _time(text: str, option: str) -> float:
-    """A time given to an option [s]."""
-    from mesoslip.configuration.units import to_si
-    from mesoslip.errors import ConfigError, Problem
-
-    try:
-        return to_si(text, "s", "2 s")
-    except ValueError as error:
-        raise ConfigError([Problem("", option, str(error), text)]) from None

@@ -11,12 +11,25 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line import catalogues, fit, pictures, run, theory, trace
+from mesoslip.command_line import (
+    catalogues,
+    claims,
+    example,
+    fit,
+    pictures,
+    report,
+    response,
+    run,
+    sweep,
+    theory,
+    trace,
+)
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
 
 COMMANDS = (
     run.run,
+    sweep.sweep,
     theory.info,
     theory.curve,
     theory.onset,
@@ -24,9 +37,17 @@ COMMANDS = (
     fit.fit,
     catalogues.slips,
     catalogues.avalanches,
+    catalogues.regime,
+    response.response,
     pictures.plot,
     pictures.figures,
+    claims.claims,
+    report.report,
+    example.example,
 )
+
+# Where the libraries come from that the kernels are linked to.
+LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev libsundials-fortran-dev"
 
 app = typer.Typer(
     name="mesoslip",
@@ -75,6 +96,12 @@ def main() -> None:
         status = error.exit_status
     except KeyboardInterrupt:
         status = run.INTERRUPTED
+    except ImportError as error:
+        # What the kernels are linked to; whatever else is missing is a fault of the program.
+        if "shared object" not in str(error) and "Library not loaded" not in str(error):
+            raise
+        typer.echo(f"mesoslip: a library is missing: {error}; {LIBRARIES}", err=True)
+        status = 1
     except MemoryError:
         typer.echo("mesoslip: there is not enough memory for this", err=True)
         status = 1

@@ -13,12 +13,23 @@ ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
 ]
 OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metavar="OUT.nc")]
+OutputsArgument = Annotated[
+    list[Path], typer.Argument(help="Outputs of mesoslip", metavar="OUT.nc...")
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         help="Change one key, as in contacts.delay=1ms; may be repeated",
         metavar="KEY=VALUE",
+    ),
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        help="Dask scheduler whose workers do the computing, or its --scheduler-file",
+        metavar="ADDRESS",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
@@ -48,10 +59,8 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def quantity(
-    text: str | None, option: str, unit: str, example: str, *, positive: bool = False
-) -> float | None:
-    """A quantity given to an option, in SI; None if it is not given.
+def quantity(text: str, option: str, unit: str, example: str, *, positive: bool = False) -> float:
+    """A quantity given to an option, in SI.
 
     Raises
     ------
@@ -61,8 +70,6 @@ def quantity(
     from mesoslip.configuration.units import to_si
     from mesoslip.errors import ConfigError, Problem
 
-    if text is None:
-        return None
     try:
         value = to_si(text, unit, example)
     except ValueError as error:
@@ -70,3 +77,15 @@ def quantity(
     if positive and value <= 0:
         raise ConfigError([Problem("", option, "must be greater than 0", text)])
     return value
+
+
+def quantity_or_none(
+    text: str | None, option: str, unit: str, example: str, *, positive: bool = False
+) -> float | None:
+    """A quantity given to an option, in SI; None if the option is not given. See `quantity`."""
+    return None if text is None else quantity(text, option, unit, example, positive=positive)
+
+
+def time_of(text: str, option: str) -> float:
+    """A time given to an option [s]."""
+    return quantity(text, option, "s", "2 s")

@@ -2,38 +2,42 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import OutputArgument
+from mesoslip.command_line.options import OutputsArgument, time_of
 
 
-class View(StrEnum):
-    """Pictures of a run."""
+class Against(StrEnum):
+    """What a run is drawn against."""
 
-    RUN = "run"
-    AVALANCHES = "avalanches"
-    LATTICE = "lattice"
+    TIME = "time"
+    DISPLACEMENT = "displacement"
+    DRIVE = "drive"
 
 
 def plot(
-    output: OutputArgument,
+    outputs: OutputsArgument,
     figure: Annotated[
         Path | None,
         typer.Option(
             "-o",
             "--output",
-            help="Picture; beside the output by default; a .gif shows the lattice in motion",
+            help="Picture; beside the first output by default; a .gif shows the lattice in motion",
             metavar="FIG",
         ),
     ] = None,
     view: Annotated[
-        View | None,
+        str | None,
         typer.Option(
-            help="Of a run: what happened, sizes of avalanches, contacts on their lattice"
+            help="Of a run: run, what happened; avalanches, their sizes; lattice, the contacts on "
+            "it; layers, waves in an elastic slider; response, steady forces, steps and holds. Of "
+            "a sweep: a measure",
+            metavar="VIEW",
         ),
     ] = None,
     snapshot: Annotated[
@@ -44,15 +48,44 @@ def plot(
             metavar="NUMBER",
         ),
     ] = None,
+    realization: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            help="Which realization of a run; the first one, with others behind it, by default",
+            metavar="NUMBER",
+        ),
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option("--from", help="Time, such as '2 s'", metavar="TIME")
+    ] = None,
+    end: Annotated[
+        str | None, typer.Option("--to", help="Time, such as '2.5 s'", metavar="TIME")
+    ] = None,
+    x: Annotated[
+        Against | None,
+        typer.Option("--x", help="What a run is drawn against; drive: the drive's displacement"),
+    ] = None,
 ) -> None:
-    """Draw an output."""
+    """Draw an output, or several over each other."""
     from mesoslip import api
     from mesoslip.output import files
 
-    path = figure or output.parent / f"{output.stem or 'output'}.png"
-    if output.is_file():
-        files.check_writable(path, [output])
-    api.plot(output, path, view=view.value if view is not None else None, snapshot=snapshot)
+    first = outputs[0]
+    path = figure or first.parent / f"{first.stem or 'output'}.png"
+    there = [one for one in outputs if one.is_file()]
+    if there:
+        files.check_writable(path, there)
+    api.plot(
+        outputs,
+        path,
+        view=view,
+        snapshot=snapshot,
+        realization=realization,
+        x=None if x is None else x.value,
+        start=-math.inf if start is None else time_of(start, "--from"),
+        end=math.inf if end is None else time_of(end, "--to"),
+    )
     typer.echo(str(path), err=True)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import ConfigArgument, SetOption
+from mesoslip.command_line.options import ConfigArgument, SchedulerOption, SetOption
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.command_line.signals import Stop, stopped_by_signals
 from mesoslip.errors import FileError
@@ -48,6 +48,7 @@ def run(
         int | None,
         typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
     ] = None,
+    scheduler: SchedulerOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
 ) -> None:
     """Simulate, and write an output file.
@@ -74,7 +75,12 @@ def run(
     ):
         with progress_shown(quiet) as progress:
             results = api.simulate(
-                checked, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
+                checked,
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+                stop=stop,
+                checkpoint=checkpoint,
             )
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
@@ -87,10 +93,10 @@ def run(
                     "--resume writes them"
                 ) from error
             raise
+        if not quiet:
+            _tell_results(results, checked, path)
         _partial(path).unlink(missing_ok=True)
         checkpoint.remove()
-    if not quiet:
-        _tell_results(results, checked, path)
 
 
 def _partial(path: Path) -> Path:
@@ -119,6 +125,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
 
 
 def _tell_results(results: Results, config: Config, path: Path) -> None:
+    from mesoslip.analysis import regime
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS
 
@@ -132,6 +139,7 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
         f"energy balance to {abs(told['energy_residual']):.0e}, "
         f"{told['wall_seconds']:.2f} s",
     )
+    say(f"{path}: {regime.told(list(regime.regimes_of_results(results)))}")
     if told["audit"] != "passed":
         say(f"{path}: warning: {told['audit']}")
     if told["ending"] != ENDINGS[1]:

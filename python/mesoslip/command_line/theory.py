@@ -18,6 +18,9 @@ from mesoslip.command_line.options import (
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
+# Work that the stability of steady sliding may take after a force curve, some seconds.
+MOST_WORK = 400_000
+
 
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
     """Show derived quantities."""
@@ -54,6 +57,7 @@ def curve(
     from mesoslip import api
     from mesoslip.output import files
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
+    from mesoslip.theory.steady_sliding import steady_sliding
 
     checked = api.as_config(config, changes or ())
     if output is not None:
@@ -69,6 +73,9 @@ def curve(
         for name, value in summary.items():
             show(name, value, *SUMMARY[name])
         typer.echo(force_curve.verdict)
+        sliding = steady_sliding(checked, MOST_WORK)
+        if sliding is not None and sliding.told is not None:
+            typer.echo(sliding.told)
     if force_curve.error > checked.curve.tolerance:
         typer.echo(
             f"the force has {force_curve.digits} digits; more would take too much work, as its "

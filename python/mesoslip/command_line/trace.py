@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import quantity
+from mesoslip.command_line.options import quantity_or_none
 
 
 def trace(
@@ -74,13 +74,13 @@ def trace(
     tree = api.read_trace(
         table,
         columns=columns,
-        rate=quantity(rate, "--rate", "1/s", "1 kHz", positive=True),
-        largest_gap=quantity(largest_gap, "--largest-gap", "s", "10 ms", positive=True),
-        drive_velocity=quantity(velocity, "--velocity", "m/s", "0.1 um/s"),
-        stiffness=quantity(stiffness, "--stiffness", "N/m", "97 N/m", positive=True),
+        rate=quantity_or_none(rate, "--rate", "1/s", "1 kHz", positive=True),
+        largest_gap=quantity_or_none(largest_gap, "--largest-gap", "s", "10 ms", positive=True),
+        drive_velocity=quantity_or_none(velocity, "--velocity", "m/s", "0.1 um/s"),
+        stiffness=quantity_or_none(stiffness, "--stiffness", "N/m", "97 N/m", positive=True),
         config=config,
-        noise=quantity(noise, "--noise", "N", "0.1 uN"),
-        period=quantity(period, "--period", "s", "25 ms", positive=True),
+        noise=quantity_or_none(noise, "--noise", "N", "0.1 uN"),
+        period=quantity_or_none(period, "--period", "s", "25 ms", positive=True),
     )
     files.write(tree, path)
     time, known = tree.to_dataset()["time"].values, tree.attrs

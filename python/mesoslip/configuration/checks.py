@@ -9,9 +9,10 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
+from mesoslip.configuration.drive import DrivePart
 from mesoslip.configuration.sliders import SLIDERS, base
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Curve, DriveStage, Run
+from mesoslip.configuration.tables import Curve, Run
 
 # What a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
 # snapshot [bytes].
@@ -34,7 +35,7 @@ class Setting(base.Setting, Protocol):
     @property
     def duration(self) -> float: ...
     @property
-    def drive_stages(self) -> Sequence[DriveStage]: ...
+    def drive_parts(self) -> Sequence[DrivePart]: ...
     @property
     def output_interval(self) -> float: ...
     @property
@@ -51,22 +52,23 @@ def drive_problems(config: Setting) -> Complaints:
         way = run.drive_displacement
         if run.duration is not None:
             yield Complaint("run.drive_displacement", "give either this or run.duration", way)
-        elif drive.stage is None and not drive.velocity:
+        elif not drive.last_velocity and not any(part.way for part in drive.parts):
             yield Complaint(
                 "run.drive_displacement",
                 "needs a drive.velocity that is not 0, or stages that move",
                 way,
             )
         elif math.isinf(config.duration):
-            reach = math.fsum(abs(one.velocity) * one.duration for one in drive.stage or ())
+            reach = math.fsum(part.way for part in drive.parts)
             yield Complaint(
                 "run.drive_displacement",
                 f"is never reached: the stages move the drive by {reach:g} m, and the last one "
-                "stands still"
-                if drive.stage is not None
+                f"{'stands still' if drive.goes_on else 'ends'}"
+                if drive.parts
                 else f"takes for ever at {drive.velocity:g} m/s",
                 way,
             )
+    yield from _stop_problems(config)
     if run.avalanches is not None:
         if not config.has_avalanches:
             yield Complaint(
@@ -84,6 +86,26 @@ def drive_problems(config: Setting) -> Complaints:
         yield Complaint("run.duration", "needed, as the drive has no stages")
     elif config.duration <= 0:
         yield Complaint("run.duration", "needed, as the drive has no stages")
+
+
+def _stop_problems(config: Setting) -> Complaints:
+    """What is wrong with what ends the run before its time."""
+    stop = config.run.stops
+    if stop.slips is not None and config.slider.slip_velocity(config) == 0:
+        yield Complaint(
+            "run.stop.slips",
+            "needs slips, which a slider with inertia has while the drive moves",
+            stop.slips,
+        )
+    if stop.steady is not None:
+        parts = config.drive_parts
+        last = parts[-1]
+        if not config.drive.goes_on or last.start_velocity != last.end_velocity or not last.way:
+            yield Complaint(
+                "run.stop.steady", "needs a drive that comes to a constant velocity, not 0"
+            )
+        elif config.drive.force_rate is not None:
+            yield Complaint("run.stop.steady", "has no meaning for a force that grows")
 
 
 def output_problems(config: Setting) -> Complaints:
@@ -200,7 +222,7 @@ def _breaks(config: Setting) -> float:
     contacts = config.contacts
     if not contacts.reattach or config.drive.force_rate is not None:
         return contacts.count
-    way = math.fsum(abs(stage.velocity) * stage.duration for stage in config.drive_stages)
+    way = math.fsum(part.way for part in config.drive_parts)
     return contacts.count * way / contacts.break_stretch
 
 

@@ -9,21 +9,30 @@ import html
 import math
 import os
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import ValidationError, model_validator
+from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from mesoslip.configuration import checks
 from mesoslip.configuration.contacts import contact_kind
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
-from mesoslip.configuration.files import Change, on_base, override, parse_toml, read_toml
+from mesoslip.configuration.drive import Drive, DrivePart
+from mesoslip.configuration.files import (
+    Change,
+    base_of,
+    on_base,
+    override,
+    parse_toml,
+    read_toml,
+)
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
-from mesoslip.configuration.tables import Curve, Drive, DriveStage, Output, Run
+from mesoslip.configuration.tables import Curve, Output, Run
 from mesoslip.errors import ConfigError
 
 
@@ -38,6 +47,27 @@ class Config(Table):
     interaction: Interaction | None = None
     output: Output = Output()
     curve: Curve = Curve()
+
+    # The tables that the configuration was laid over, for those who ask what it changes.
+    _base: Mapping[str, Any] | None = PrivateAttr(default=None)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another configuration is of the same run, whatever they were laid over."""
+        return isinstance(other, Config) and self.__dict__ == other.__dict__
+
+    @property
+    def base(self) -> Config | None:
+        """What the configuration was laid over, if that can be run by itself.
+
+        The file under its own, or without such a file that without the changes, or the
+        configuration that it replaces.
+        """
+        if self._base is None:
+            return None
+        try:
+            return self.model_validate(self._base)
+        except ValidationError:
+            return None
 
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
@@ -79,29 +109,16 @@ class Config(Table):
         """Length of the force curve [m]; twenty mean breaking stretches unless given."""
         return self.curve.length or 20 * self.contacts.break_stretch
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
-            return self.run.duration
+            # What does not go on ends the run.
+            most = math.inf if self.drive.goes_on else self.drive.length
+            return min(self.run.duration, most)
         if self.run.drive_displacement is not None:
-            return self._time_for(self.run.drive_displacement)
-        if self.drive.stage is not None:
-            return math.fsum(stage.duration for stage in self.drive.stage)
-        return math.inf
-
-    def _time_for(self, way: float) -> float:
-        """Time in which the drive goes a way, there and back both counted [s]."""
-        time = speed = 0.0
-        for stage in self.drive.stage or ():
-            speed = abs(stage.velocity)
-            if speed * stage.duration >= way:
-                return time + way / speed
-            time += stage.duration
-            way -= speed * stage.duration
-        # The last stage lasts as long as the run.
-        speed = speed if self.drive.stage else abs(self.drive.velocity or 0.0)
-        return time + way / speed if speed > 0 else math.inf
+            return self.drive.time_for(self.run.drive_displacement)
+        return self.drive.length
 
     @property
     def expected_duration(self) -> float:
@@ -120,6 +137,16 @@ class Config(Table):
         return (loading + sliding) / abs(self.drive.velocity or math.nan)
 
     @property
+    def steady_block(self) -> float:
+        """Way of the drive whose mean force tells whether the state is steady [m]: unless given,
+        that which loads spring and contacts to the static force; 0 if it is not asked for."""
+        steady = self.run.stops.steady
+        if steady is None:
+            return 0.0
+        loading = self.contacts.break_stretch + self.contacts.static_force / self.spring_stiffness
+        return steady.displacement or loading
+
+    @property
     def bond_stiffness(self) -> float:
         """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without interaction."""
         return 0.0 if self.interaction is None else self.interaction.bond_stiffness(self.contacts)
@@ -136,28 +163,18 @@ class Config(Table):
 
     @property
     def drive_speed(self) -> float:
-        """Speed of the first stage of the drive that moves [m/s]; 0 if none does."""
+        """Speed of the first stage of the drive that moves, the greatest of a ramp, the mean of a
+        measured history [m/s]; 0 if none moves."""
         if self.drive.force_rate is not None:
             return 0.0
-        return next((abs(one.velocity) for one in self.drive_stages if one.velocity), 0.0)
+        if self.drive.history is not None:
+            return math.fsum(part.way for part in self.drive_parts) / self.duration
+        return next((part.greatest_speed for part in self.drive_parts if part.way > 0), 0.0)
 
-    @property
-    def drive_stages(self) -> tuple[DriveStage, ...]:
-        """Stages of the drive; the last one ends with the run."""
-        if self.drive.stage is None:
-            rate = self.drive.velocity if self.drive.force_rate is None else self.drive.force_rate
-            return (DriveStage(self.duration, rate or 0.0),)
-        stages = []
-        left = self.duration
-        for stage, is_last in zip(
-            self.drive.stage, [False] * (len(self.drive.stage) - 1) + [True], strict=True
-        ):
-            length = left if is_last else min(stage.duration, left)
-            stages.append(DriveStage(length, stage.velocity))
-            left -= length
-            if left <= 0:
-                break
-        return tuple(stages)
+    @cached_property
+    def drive_parts(self) -> tuple[DrivePart, ...]:
+        """Parts of the drive until the end of the run."""
+        return self.drive.until(self.duration)
 
     @property
     def output_interval(self) -> float:
@@ -182,8 +199,10 @@ class Config(Table):
         ConfigError
             If anything in it is wrong.
         """
-        path = Path(path)
-        return cls._checked(override(read_toml(path), overrides), str(path))
+        path, overrides = Path(path), tuple(overrides)
+        tables = read_toml(path)
+        base = base_of(path) or (tables if overrides else None)
+        return cls._checked(override(tables, overrides), str(path), base)
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
@@ -200,17 +219,30 @@ class Config(Table):
 
     @classmethod
     def from_toml(
-        cls, text: str, source: str = "configuration", overrides: Iterable[Change] = ()
+        cls,
+        text: str,
+        source: str = "configuration",
+        overrides: Iterable[Change] = (),
+        base: str | None = None,
     ) -> Config:
-        """Check a configuration given as the text of a TOML file, with changes laid over it."""
-        return cls._checked(override(parse_toml(text, source), overrides), source)
+        """Check a configuration given as the text of a TOML file, with changes laid over it.
+
+        Without changes, it is taken to have been laid over ``base``, if that is given.
+        """
+        tables, overrides = parse_toml(text, source), tuple(overrides)
+        below = None if base is None else parse_toml(base, source)
+        return cls._checked(override(tables, overrides), source, tables if overrides else below)
 
     @classmethod
-    def _checked(cls, tables: Mapping[str, Any], source: str) -> Config:
+    def _checked(
+        cls, tables: Mapping[str, Any], source: str, base: Mapping[str, Any] | None = None
+    ) -> Config:
         try:
-            return cls.model_validate(tables)
+            config = cls.model_validate(tables)
         except ValidationError as error:
             raise ConfigError(problems(error, source, cls)) from None
+        config._base = base
+        return config
 
     def replace(self, *changes: Change, **tables: Any) -> Config:
         """A configuration with changes, checked like any other.
@@ -227,7 +259,8 @@ class Config(Table):
         ConfigError
             If anything in it is wrong.
         """
-        return self._checked(override(self.to_dict(), (*changes, tables)), "configuration")
+        old = self.to_dict()
+        return self._checked(override(old, (*changes, tables)), "configuration", old)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; with other tables, if they can be run.

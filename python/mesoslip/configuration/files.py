@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import re
-import stat
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.sliders import DEFAULT, SLIDERS
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, Problem
 
 # Keys that exclude each other: laid over a base, one replaces the other.
 EXCLUSIVE = {
     "run": ("duration", "drive_displacement"),
-    "drive": ("velocity", "stage", "force_rate"),
+    "drive": ("velocity", "stage", "cycle", "history", "force_rate"),
+    "cycle": ("velocity", "frequency"),
+    "history": ("file", "time", "displacement"),
     "slider": ("damping", "damping_ratio"),
 }
-
-# Size of the longest file that is read [bytes]; a million stages take less.
-LONGEST_FILE = 2**26
 
 Change = str | Mapping[str, Any]
 
@@ -38,6 +37,12 @@ def read_toml(path: Path) -> dict[str, Any]:
     return _read(path, ())
 
 
+def base_of(path: Path) -> dict[str, Any] | None:
+    """Tables of the file that a file names as its base, if it names one; see `read_toml`."""
+    base = parse_toml(text_of(path, "a configuration file"), str(path)).get("base")
+    return None if base is None else _read(path.parent / base, (path,))
+
+
 def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> dict[str, Any]:
     """Tables laid over those of the file that their key ``base`` names, relative to a folder.
 
@@ -50,13 +55,19 @@ def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> dict[str, A
 
 
 def _read(path: Path, outer: tuple[Path, ...]) -> dict[str, Any]:
-    return _on_base(parse_toml(_text(path), str(path)), str(path), path.parent, (*outer, path))
+    return _on_base(
+        parse_toml(text_of(path, "a configuration file"), str(path)),
+        str(path),
+        path.parent,
+        (*outer, path),
+    )
 
 
 def _on_base(
     tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]
 ) -> dict[str, Any]:
     base = tables.pop("base", None)
+    _place_history(tables, folder)
     if base is None:
         return tables
     if not isinstance(base, str) or not base or "\0" in base:
@@ -67,6 +78,14 @@ def _on_base(
     return _lay(_read(path, outer), tables)
 
 
+def _place_history(tables: dict[str, Any], folder: Path) -> None:
+    """The file of a history of the drive is beside the file that names it."""
+    match tables:
+        case {"drive": {"history": {"file": str(name)} as history} as drive} if name:
+            placed = {**history, "file": str(folder / name)}
+            tables["drive"] = {**drive, "history": placed}
+
+
 def _are_the_same(path: Path, other: Path) -> bool:
     """Whether two names are of one file, whatever links lead to it."""
     try:
@@ -74,36 +93,6 @@ def _are_the_same(path: Path, other: Path) -> bool:
     # What cannot be found or read is told by who reads it.
     except OSError:
         return False
-
-
-def _text(path: Path) -> str:
-    """Text of a file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, is no regular file, which may have no end, or is too long.
-    """
-    try:
-        state = path.stat()
-        if stat.S_ISDIR(state.st_mode):
-            raise FileError(f"{path}: is a directory, not a configuration file")
-        if not stat.S_ISREG(state.st_mode):
-            raise FileError(f"{path}: is not a regular file")
-        if state.st_size > LONGEST_FILE:
-            raise FileError(
-                f"{path}: {state.st_size / 2**20:.0f} MiB are too much for a configuration file, "
-                f"which may have {LONGEST_FILE / 2**20:.0f} MiB"
-            )
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise FileError(f"{path}: no such file") from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not a text in UTF-8: {error.reason}") from None
-    except ValueError as error:
-        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -136,7 +125,10 @@ def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") ->
     merged = dict(base)
     exclusive = EXCLUSIVE.get(table, ())
     if any(key in over for key in exclusive):
-        merged = {key: value for key, value in merged.items() if key not in exclusive}
+        dropped = {key for key in exclusive if key not in over}
+        # What stages are repeated goes with them.
+        dropped |= {"repeat"} if "stage" in dropped else set()
+        merged = {key: value for key, value in merged.items() if key not in dropped}
     for key, value in over.items():
         below = merged.get(key)
         if isinstance(value, Mapping) and isinstance(below, Mapping):

@@ -75,6 +75,8 @@ def _about_unknown(place: list[Any], slider: str, whole: type[Table]) -> str:
     table, name = _dotted(place[:-1]), str(place[-1])
     if (table, name) == ("", "base"):
         return "names the file under another one, and cannot be laid over it"
+    if (table, name) == ("", "sweep"):
+        return "is of many runs; the command for it is mesoslip sweep"
     kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
     if table == "slider" and kinds:
         named = " or ".join(f'"{kind}"' for kind in kinds)
@@ -92,7 +94,7 @@ def _table_at(place: list[Any], slider: str, whole: type[Table]) -> type[Table]:
     table = whole
     for name in place:
         if isinstance(name, str):
-            inner = _tables_in(table.model_fields[name].annotation)
+            inner = tables_in(table.model_fields[name].annotation)
             table = SLIDERS[slider] if name == "slider" else next(inner)
     return table
 
@@ -101,13 +103,13 @@ def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
     """Dotted names of all keys."""
     for name, field in table.model_fields.items():
         yield outer + name
-        for inner in _tables_in(field.annotation):
+        for inner in tables_in(field.annotation):
             yield from all_keys(inner, f"{outer}{name}.")
 
 
-def _tables_in(annotation: Any) -> Iterator[type[Table]]:
+def tables_in(annotation: Any) -> Iterator[type[Table]]:
     """The tables that an annotation names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
     for part in get_args(annotation):
-        yield from _tables_in(part)
+        yield from tables_in(part)

@@ -57,6 +57,9 @@ ForceRate = Annotated[float, _quantity("N/s", "1 uN/s", 1e-24, 1e18)]
 # From an atom's nucleus to the Earth.
 Area = Annotated[float, _quantity("m^2", "1e-10 m^2", 1e-24, 1e15)]
 Length = Annotated[float, _quantity("m", "3.5 nm", 1e-18, 1e9)]
+# What is measured may come as near to zero as it likes.
+MeasuredTime = Annotated[float, _quantity("s", "0.5 ms", 0.0, 1e18)]
+MeasuredLength = Annotated[float, _quantity("m", "3.5 nm", 0.0, 1e9)]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3", 1e-12, 1e18)]
 Pressure = Annotated[float, _quantity("Pa", "70 GPa", 1e-9, 1e18)]
 Number = Annotated[float, _quantity("1", "0.2", 1e-300, 1e12)]

@@ -1,15 +1,14 @@
 """The tables of a configuration file that are nobody's kind; those of sliders and of contacts have
-rooms of their own. Adding a key is adding a field.
+rooms of their own, and so has the drive. Adding a key is adding a field.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from mesoslip.configuration.table import (
-    ForceRate,
     Length,
     Number,
     Table,
@@ -20,56 +19,57 @@ from mesoslip.configuration.table import (
 )
 
 
+def _or_flag(value: object) -> object:
+    """A table, or true for one of defaults and false for none."""
+    if isinstance(value, bool):
+        return {} if value else None
+    return value
+
+
+class Steady(Table):
+    """When a state is steady: the mean of the spring force over some blocks, and that over as many
+    before, agree within their standard error, or within a part of the static force, and the latter
+    do not scatter twice as much. Each block is a way of the drive."""
+
+    displacement: Annotated[Length, Field(gt=0)] | None = None
+    blocks: Annotated[Whole, Field(ge=2, le=10_000)] = 10
+    tolerance: Annotated[Number, Field(ge=0, lt=1)] = 1e-4
+
+
+class Stop(Table):
+    """What ends a run before its time."""
+
+    slips: Annotated[Whole, Field(ge=1, lt=2**62)] | None = None
+    displacement: Length | None = None
+    steady: Annotated[Steady | None, BeforeValidator(_or_flag)] = None
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> Self:
+        if self.displacement == 0:
+            raise problem("displacement", "must not be 0, where the slider starts")
+        return self
+
+
 class Run(Table):
     """What is computed, for how long, and with which random numbers.
 
-    A run is over after its duration, or as soon as it has had as many avalanches as are wanted.
+    A run is over after its duration, or as soon as it has had as many avalanches as are wanted, or
+    what its table stop says has come.
     """
 
     engine: Literal["eq", "me"] = "eq"
     duration: Annotated[Time, Field(gt=0)] | None = None
     drive_displacement: Annotated[Length, Field(gt=0)] | None = None
     avalanches: Annotated[Whole, Field(ge=1, lt=2**62)] | None = None
+    stop: Stop | None = None
     realizations: Annotated[Whole, Field(ge=1, lt=2**31)] = 1
     seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 1
     resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
 
-
-class Stage(Table):
-    """A stage of the drive: a constant velocity, of either sign or zero, for a time."""
-
-    duration: Annotated[Time, Field(gt=0)]
-    velocity: Velocity
-
-
-class Drive(Table):
-    """How the drive moves: one velocity, or stages one after another; or a force that grows."""
-
-    velocity: Velocity | None = None
-    stage: tuple[Stage, ...] | None = None
-    force_rate: ForceRate | None = None
-
-    @model_validator(mode="after")
-    def _one_of_them(self) -> Self:
-        if [self.velocity, self.stage, self.force_rate].count(None) != 2:
-            raise problem(
-                "velocity",
-                "give either a velocity or [[drive.stage]] tables, or a force_rate to a "
-                "quasistatic slider",
-            )
-        if self.force_rate == 0:
-            raise problem("force_rate", "must not be 0")
-        if self.stage is not None and not self.stage:
-            raise problem("stage", "must have at least one stage")
-        return self
-
-
-class DriveStage(NamedTuple):
-    """A stage of the drive as it is run: its duration [s], and its velocity [m/s] or, for a drive
-    by force, the rate of the force [N/s]."""
-
-    duration: float
-    velocity: float
+    @property
+    def stops(self) -> Stop:
+        """What ends it before its time, if anything does."""
+        return self.stop or Stop()
 
 
 class Output(Table):

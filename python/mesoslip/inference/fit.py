@@ -19,7 +19,7 @@ from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.measured.slips import FoundSlips, estimated_period, noise_level
-from mesoslip.measured.trace import even_trace
+from mesoslip.measured.trace import even_trace, first_velocity
 from mesoslip.simulation.stop import StopFlag
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
         "run": {"engine": "eq", "realizations": 1},
         "output": {"interval": interval},
     }
-    if plan.config.drive.stage is None:
+    if not plan.config.drive.parts:
         # A little longer, so that rounding does not cost the last sample.
         changes["run"]["duration"] = (len(force) - 0.5) * interval
     tables = plan.config.to_dict()
@@ -211,7 +211,7 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
         more = np.random.default_rng([plan.seed, 1]).standard_normal(len(force))
         force = force + math.sqrt(least**2 - noise**2) * more
         noise = least
-    velocity = next((one.velocity for one in config.drive_stages if one.velocity), 1.0)
+    velocity = first_velocity(config) or 1.0
     summarizer = Summarizer(
         time[: len(force)],
         noise,

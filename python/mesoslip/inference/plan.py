@@ -11,12 +11,15 @@ from typing import Any
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.files import Change, on_base, override, read_toml
+from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.inference.prior import Free, Prior, known_keys, unit_of
+from mesoslip.inference.prior import Free, Prior
 
 KEYS = ("free", "noise", "after", "simulations", "seed")
 RANGE_KEYS = ("from", "to", "prior")
+# What says nothing of the experiment.
+NOT_FITTED = ("run.", "output.", "curve.")
 PRIORS = ("uniform", "logarithmic")
 LEAST_SIMULATIONS = 300
 
@@ -146,20 +149,20 @@ class _Reader:
             return
         for key, ranges in _flat(table):
             place = f"fit.free.{key}"
-            kind = unit_of(key)
-            if kind is None or key.startswith(("run.", "output.", "curve.")):
-                near = difflib.get_close_matches(key, known_keys(), 1)
+            kind = key_kind(key)
+            takes_number = kind is not None and kind.cf_units is not None and kind.is_single
+            if kind is None or not takes_number or key.startswith(NOT_FITTED):
+                near = [one for one in nearest_keys(key) if one != key]
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 self.wrong(place, f"is no key that can be fitted{hint}")
                 continue
-            one = self._range(place, key, ranges, *kind)
+            one = self._range(place, key, ranges, kind)
             if one is not None:
                 self._try(place, one, config)
                 yield one
 
-    def _range(
-        self, place: str, key: str, ranges: object, unit: str, is_whole: bool
-    ) -> Free | None:
+    def _range(self, place: str, key: str, ranges: object, kind: KeyKind) -> Free | None:
+        unit = kind.unit or "1"
         if not isinstance(ranges, Mapping):
             self.wrong(place, 'must be a table such as { from = "5 uN", to = "100 uN" }', ranges)
             return None
@@ -187,7 +190,7 @@ class _Reader:
                 f"{place}.from", "must be greater than 0 with a logarithmic prior", ranges["from"]
             )
             return None
-        return Free(key, low, high, prior == "logarithmic", unit, is_whole)
+        return Free(key, low, high, prior == "logarithmic", unit, kind.is_whole)
 
     def _try(self, place: str, one: Free, config: Config) -> None:
         """Make sure that both ends of a range can be run."""

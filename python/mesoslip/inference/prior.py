@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
-
-from mesoslip.configuration.config import Config
-from mesoslip.configuration.messages import all_keys
-from mesoslip.configuration.table import Table
 
 Array = NDArray[np.float64]
 
@@ -84,48 +78,3 @@ class Prior:
             one.key: int(value) if one.is_whole else float(value)
             for one, value in zip(self.free, values, strict=True)
         }
-
-
-def unit_of(key: str) -> tuple[str, bool] | None:
-    """SI unit of the values of a key, and whether they are whole; None if it takes no number."""
-    *outer, last = key.split(".")
-    tables: list[type[Table]] = [Config]
-    for name in outer:
-        tables = [
-            inner
-            for table in tables
-            if name in table.model_fields
-            for inner in _tables_in(table.model_fields[name].annotation)
-        ]
-    for table in tables:
-        if last not in table.model_fields:
-            continue
-        field = table.model_fields[last]
-        parts = [*field.metadata, *_parts(field.annotation)]
-        for part in parts:
-            keywords: Mapping[str, Any] = getattr(getattr(part, "func", None), "keywords", {})
-            if isinstance(part, BeforeValidator) and "unit" in keywords:
-                return str(keywords["unit"]), False
-        if int in parts:
-            return "1", True
-    return None
-
-
-def known_keys() -> list[str]:
-    """All keys that take numbers."""
-    return [key for key in dict.fromkeys(all_keys(Config)) if unit_of(key) is not None]
-
-
-def _parts(annotation: Any) -> Iterator[Any]:
-    """Everything that an annotation is made of."""
-    yield annotation
-    yield from getattr(annotation, "__metadata__", ())
-    for part in get_args(annotation):
-        yield from _parts(part)
-
-
-def _tables_in(annotation: Any) -> Iterator[type[Table]]:
-    """The tables that an annotation names."""
-    for part in _parts(annotation):
-        if isinstance(part, type) and issubclass(part, Table):
-            yield part

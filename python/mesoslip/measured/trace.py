@@ -33,6 +33,7 @@ class Known:
     title: str
     drive_velocity: float | None
     stiffness: float | None
+    base: None = None
 
     def to_toml(self) -> str:
         """The part of a configuration that is known."""
@@ -154,12 +155,15 @@ def _even(time: Array, force: Array) -> tuple[Array, Array]:
 def _as_measured(config: Config, measured: Measurements, title: str) -> Config:
     """The configuration of an experiment, with the duration and the interval of its trace."""
     time = measured.time
-    duration = float(time[-1] - time[0])
+    # As people write them, without the rounding of differences.
+    duration, interval = (
+        float(f"{one:.9g}") for one in (time[-1] - time[0], np.median(np.diff(time)))
+    )
     changes: dict[str, Any] = {
         "title": config.title or title,
-        "output.interval": min(float(np.median(np.diff(time))), duration),
+        "output.interval": min(interval, duration),
     }
-    if config.drive.stage is None:
+    if not config.drive.parts:
         changes["run.duration"] = duration
     return config.replace(changes)
 
@@ -177,14 +181,8 @@ def _drive(
         # The slider starts at 0.
         start = measured.force[0] / stiffness
     if config is not None and config.drive.force_rate is None:
-        stages = config.drive_stages
-        velocity = next((one.velocity for one in stages if one.velocity), 0.0)
-        ends = np.cumsum([0.0, *(one.duration for one in stages)])
-        ways = np.cumsum([0.0, *(one.duration * one.velocity for one in stages)])
-        drive = start + np.interp(time, ends, ways)
-        # Beyond the last stage, which ends with the run, the drive goes on.
-        beyond = time > ends[-1]
-        drive[beyond] += (time[beyond] - ends[-1]) * stages[-1].velocity
+        velocity = first_velocity(config)
+        drive = start + _way(config, time)
     elif velocity is not None:
         drive = start + velocity * time
     else:
@@ -194,6 +192,29 @@ def _drive(
             velocity = float(np.polyfit(time, measured.drive, 1)[0])
         drive = measured.drive
     return drive, velocity
+
+
+def first_velocity(config: Config) -> float:
+    """The first velocity of a drive that is not 0 [m/s], or the rate of its force [N/s]; 0 if there
+    is none."""
+    parts = config.drive_parts
+    velocities = (one for part in parts for one in (part.start_velocity, part.end_velocity))
+    return next((one for one in velocities if one), 0.0)
+
+
+def _way(config: Config, time: Array) -> Array:
+    """Displacement of a drive since its start [m]."""
+    duration, start, end, _ = np.array(config.drive_parts).T
+    begin = np.cumsum(duration) - duration
+    ways = np.cumsum(0.5 * (start + end) * duration)
+    place = np.searchsorted(begin, time, "right") - 1
+    since = time - begin[place]
+    # Beyond its last part, which ends with the run, the drive goes on.
+    within = np.minimum(since, duration[place])
+    ramp = 0.5 * (end - start)[place] / duration[place] * within**2
+    before = np.concatenate([[0.0], ways])[place]
+    way: Array = before + start[place] * within + ramp + end[place] * (since - within)
+    return way
 
 
 def _displacement(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import math
 import os
 import platform
 import re
 import shutil
+import tempfile
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +22,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output import layout, variables
 from mesoslip.output.layout import Entry, GroupLayout, RunResults
+from mesoslip.output.provenance import version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +44,10 @@ DAMAGES = (
     TypeError,
     ValueError,
 )
+NO_LOCKS = (
+    "its file system gives no locks ({}); the environment variable HDF5_USE_FILE_LOCKING=FALSE "
+    "does without them"
+)
 # Slots of the table in which the chunks of a variable in memory are found.
 CACHE_SLOTS = 11
 
@@ -54,6 +61,7 @@ OLD_NAMES = {
 }
 GROUPS = {
     "slips": variables.SLIPS,
+    "stages": variables.STAGES,
     "slip_traces": variables.SLIP_TRACES,
     "avalanches": variables.AVALANCHES,
     "snapshots": variables.SNAPSHOTS,
@@ -65,6 +73,7 @@ GROUPS = {
 # it may have.
 ROOT_NEEDS = tuple(variables.TRACE)[:6]
 NEEDS = {
+    "stages": (("stage",), tuple(variables.STAGES)),
     "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
     "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
     "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:8]),
@@ -136,6 +145,9 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
     if is_full:
         return WriteError(f"{path}: cannot be written: no space left on the disk")
     if "HDF" in str(error):
+        refused = _has_no_locks(target.parent)
+        if refused:
+            return FileError(f"{path}: cannot be written: {NO_LOCKS.format(refused)}")
         return WriteError(f"{path}: cannot be written: {reason}; is the disk full?")
     return FileError(f"{path}: cannot be written: {reason}")
 
@@ -288,7 +300,7 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
         _check_layout(tree, path)
     except DAMAGES as error:
         _close(groups)
-        raise FileError(f"{path}: a damaged netCDF-4 file") from error
+        raise FileError(f"{path}: {_locked(path) or 'a damaged netCDF-4 file'}") from error
     except FileError:
         _close(groups)
         raise
@@ -301,6 +313,31 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
         raise
     finally:
         _close(groups)
+
+
+def _locked(path: Path) -> str:
+    """Why the library may have been refused the lock that it wants of a file; empty if it was not.
+
+    It tells this as it tells a damage.
+    """
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return "is locked by a program that writes to it; try again when that is done"
+    except OSError as error:
+        return NO_LOCKS.format(error.strerror)
+    return ""
+
+
+def _has_no_locks(folder: Path) -> str:
+    """What the file system of a folder says when it is asked for a lock; empty if it gives it."""
+    with suppress(OSError), tempfile.TemporaryFile(dir=folder) as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            return error.strerror or str(error)
+    return ""
 
 
 def _close(groups: dict[str, xr.Dataset]) -> None:
@@ -378,8 +415,20 @@ def _check_layout(tree: xr.DataTree, path: Path) -> None:
             ]
         if not {"realization", "time"} <= tree.coords.keys():
             wrong.append("coordinates realization and time")
+    newer = _newer_version(tree.attrs.get("program_version"))
+    if wrong and newer:
+        raise FileError(f"{path}: is of {newer}, and cannot be read: {wrong[0]} is not as it was")
     if wrong:
         raise FileError(f"{path}: a damaged netCDF-4 file: {wrong[0]} is missing or wrong")
+
+
+def _newer_version(written: object) -> str:
+    """The program that has written a file, if it is newer than this one; otherwise empty."""
+    ours = version("mesoslip")
+    theirs, here = ([int(one) for one in re.findall(r"\d+", str(text))] for text in (written, ours))
+    if written is None or theirs <= here:
+        return ""
+    return f"mesoslip {written}, which is newer than this one ({ours})"
 
 
 def _renamed(name: str, data: xr.Dataset) -> xr.Dataset:
@@ -411,13 +460,25 @@ def read(path: str | Path) -> xr.DataTree:
 def read_run(path: str | Path) -> xr.DataTree:
     """Read an output of ``mesoslip run`` into memory; see `read`."""
     tree = read(path)
+    _check_run(tree, path)
+    return tree
+
+
+@contextmanager
+def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
+    """An output of ``mesoslip run``, of which only what is used is read; see `opened`."""
+    with opened(path) as tree:
+        _check_run(tree, path)
+        yield tree
+
+
+def _check_run(tree: xr.DataTree, path: str | Path) -> None:
     if "spring_force" not in tree.data_vars:
         raise FileError(f"{path}: not an output of mesoslip run")
-    return tree
 
 
 def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:
     """The configuration of an output, to run it again, with changes laid over it."""
     with opened(path) as tree:
-        text = tree.attrs["configuration"]
-    return Config.from_toml(text, str(path), overrides)
+        text, base = (tree.attrs.get(name) for name in ("configuration", "base_configuration"))
+    return Config.from_toml(str(text), str(path), overrides, base)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
@@ -50,8 +51,8 @@ class RealizationResults(Protocol):
     """What came out of a realization.
 
     Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
-    of the slip as its last column), "slips", "layers", "avalanches", "snapshot_places", and
-    "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
+    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_places",
+    and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
     """
 
     @property
@@ -171,6 +172,7 @@ def describe(results: RunResults) -> dict[str, GroupLayout]:
     """The layout of the output of a run, by group; the root is ""."""
     config = results.config
     layout = {"": _root(results), "slips": _slips(results), "energy": _energy(results)}
+    layout["stages"] = _stages(results)
     if config.output.slip_interval is not None and config.slider.slip_velocity(config) > 0:
         layout["slip_traces"] = _slip_traces(results)
     if config.has_avalanches:
@@ -236,6 +238,7 @@ def _catalogue(results: RunResults, group: Group, table: str) -> _Form:
 # Dimension of the rows of a table in the group of its catalogue.
 DIMENSIONS = {
     "slips": "slip",
+    "stages": "stage",
     "slip_trace": "sample",
     "avalanches": "avalanche",
     "snapshot_places": "snapshot",
@@ -253,6 +256,13 @@ def _slips(results: RunResults) -> GroupLayout:
         if name in picks:
             writer.add(name, ("slip",), table="slips", pick=picks[name])
     return GroupLayout({"slip": _count(results, "slips")}, writer.entries, {})
+
+
+def _stages(results: RunResults) -> GroupLayout:
+    writer = _catalogue(results, variables.STAGES, "stages")
+    for place, name in enumerate(tables.STAGE_COLUMNS):
+        writer.add(name, ("stage",), table="stages", pick=column(place))
+    return GroupLayout({"stage": _count(results, "stages")}, writer.entries, {})
 
 
 def _slip_traces(results: RunResults) -> GroupLayout:
@@ -493,6 +503,23 @@ def build_tree(results: RunResults) -> xr.DataTree:
         others = {name: made[name] for name in made if name not in coordinates}
         datasets["/" + group] = xr.Dataset(others, coordinates, form.attributes)
     return xr.DataTree.from_dict(datasets)
+
+
+def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
+    """The configuration of an output.
+
+    Raises
+    ------
+    FileError
+        If it has none of a run, as a measured trace of which less is known.
+    """
+    try:
+        return Config.from_toml(tree.attrs["configuration"])
+    except ConfigError:
+        raise FileError(
+            f"{name}: has no configuration of a run; for a measured trace give "
+            "mesoslip trace that of the experiment with --config"
+        ) from None
 
 
 def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:

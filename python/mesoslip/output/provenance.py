@@ -5,7 +5,8 @@ from __future__ import annotations
 import platform
 from contextvars import ContextVar
 from datetime import UTC, datetime
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from typing import Any, Protocol
 
 from mesoslip import _build
@@ -21,6 +22,8 @@ SUMMARIES = {
     "that moves forward slowly, from the master equation of multicontact friction",
     "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
     "contacts that break one after another and for a film that melts at once",
+    "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
+    "over a range of parameters",
     "trace": "A measured trace of the spring force of a slider, with the slips found in it",
     "fit": "Parameters of the earthquake-like model of multicontact friction with their "
     "uncertainty, from a trace of the spring force",
@@ -33,9 +36,20 @@ class Described(Protocol):
     @property
     def title(self) -> str | None: ...
 
+    @property
+    def base(self) -> Described | None:
+        """What it was laid over."""
+        ...
+
     def to_toml(self) -> str:
         """The text of a TOML file."""
         ...
+
+
+@cache
+def version(package: str) -> str:
+    """Version of a package; looked up once, as a sweep asks for it a thousand times."""
+    return metadata.version(package)
 
 
 def program_attributes(config: Described, command: str) -> dict[str, Any]:
@@ -46,6 +60,7 @@ def program_attributes(config: Described, command: str) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"mesoslip {version('mesoslip')}"
     asked = COMMAND_LINE.get() or f"mesoslip.{command} in Python"
+    base = config.base
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": config.title or "Stick-slip of a multicontact interface",
@@ -55,6 +70,8 @@ def program_attributes(config: Described, command: str) -> dict[str, Any]:
         "history": f"{now} {program}: {asked}",
         "date_created": now,
         "configuration": config.to_toml(),
+        # What the configuration was laid over; of no consequence for the results.
+        **({} if base is None else {"base_configuration": base.to_toml()}),
         "program_version": version("mesoslip"),
         "commit": _build.COMMIT,
         "compiler": _build.COMPILER,

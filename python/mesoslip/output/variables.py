@@ -103,6 +103,29 @@ SLIPS = Group(
     contacts_broken=Meaning("1", "breaks of contacts in the slip", np.int64, is_fractional=True),
 )
 
+STAGES = Group(
+    realization_index=REALIZATION_INDEX,
+    stage_number=Meaning("1", "number of the stage of the drive, from 0", np.int64),
+    stage_start_time=Meaning("s", "time at which the stage began"),
+    stage_end_time=Meaning("s", "time at which it ended"),
+    drive_start_velocity=Meaning("m s-1", "velocity of the drive at the start of the stage"),
+    drive_end_velocity=Meaning("m s-1", "velocity of the drive at the end of the stage"),
+    start_force=Meaning("N", "spring force at the start of the stage"),
+    end_force=Meaning("N", "spring force at the end of the stage"),
+    start_displacement=Meaning("m", "displacement of the slider at the start of the stage"),
+    end_displacement=Meaning("m", "displacement of the slider at the end of the stage"),
+    drive_start_displacement=Meaning("m", "displacement of the drive at the start of the stage"),
+    greatest_force=Meaning("N", "greatest spring force in the stage"),
+    greatest_force_time=Meaning("s", "time of the greatest spring force"),
+    greatest_force_displacement=Meaning(
+        "m", "displacement of the slider at the greatest spring force"
+    ),
+    least_force=Meaning("N", "least spring force in the stage"),
+    least_force_time=Meaning("s", "time of the least spring force"),
+    least_force_displacement=Meaning("m", "displacement of the slider at the least spring force"),
+    mean_force=Meaning("N", "mean of the spring force over the time of the stage"),
+)
+
 SLIP_TRACES = Group(
     TRACE,
     realization_index=REALIZATION_INDEX,

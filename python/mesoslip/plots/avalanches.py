@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,24 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.files import written_whole
 from mesoslip.output.layout import group_of
-from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.plots.run import (
+    EVERYTHING,
+    Abscissa,
+    Extent,
+    about,
+    abscissa,
+    curve,
+    draw_curves,
+    times_of,
+)
+from mesoslip.plots.style import (
+    COLORS,
+    Canvas,
+    canvas,
+    shared_legend,
+    styled,
+    titles,
+)
 
 Array = NDArray[np.float64]
 
@@ -37,42 +56,71 @@ MOST_POLYGONS = 20_000
 MOST_FRAMES = 100
 FRAME_SECONDS = 0.08
 
+# Avalanches of which each is a mark of its own in a picture without dots of its own.
+MOST_MARKS = 3000
+
 BLANK = "0.93"
 
 
-def draw_force(axes: Axes, tree: xr.DataTree) -> None:
+def _against_displacement(extent: Extent) -> Extent:
+    """What is drawn, against the displacement unless something else was asked for."""
+    return replace(extent, against=extent.against or "displacement")
+
+
+def draw_force(
+    axes: Axes, tree: xr.DataTree, extent: Extent = EVERYTHING, along: Abscissa | None = None
+) -> None:
     """Draw the contact force against the displacement of the slider."""
-    root = tree.to_dataset().isel(realization=0)
-    at = root["displacement"].values * 1e6
-    axes.plot(at, root["contact_force"].values * 1e6, color="black")
-    axes.set_ylabel("contact force (µN)")
-    axes.set_xlabel("displacement (µm)")
-    axes.set_title(tree.attrs["title"], loc="left")
+    extent = _against_displacement(extent)
+    curves = [curve(tree, "contact_force", extent, color="black")]
+    draw_curves(axes, curves, "contact_force", along or abscissa([tree], extent))
+    titles(axes, tree, about(tree, Extent(extent.first)))
 
 
-def overview(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
+def overview(
+    tree: xr.DataTree, figure: Canvas | None = None, extent: Extent = EVERYTHING
+) -> Canvas:
     """Contact force and sizes of avalanches against the displacement of the slider."""
-    data = catalogue_of_first(tree)
-    config = Config.from_toml(tree.attrs["configuration"])
+    extent = _against_displacement(extent)
+    along, data = abscissa([tree], extent), _catalogue(tree, extent)
+    count = Config.from_toml(tree.attrs["configuration"]).contacts.count
     with styled():
         figure = canvas(figure, (6.5, 5))
         force, sizes = figure.subplots(2, 1, sharex=True)
-        draw_force(force, tree)
+        draw_force(force, tree, extent, along)
         force.set_xlabel("")
-        where = data["displacement"].values * 1e6
-        sizes.semilogy(where, data["size"].values, ".", color="black", markersize=2)
+        name, _ = extent.abscissa
+        if name == "time":
+            where = data["start_time"].values
+        elif name == "displacement":
+            where = data["displacement"].values
+        else:
+            moved = tree.to_dataset()[name].isel(realization=extent.first).values
+            where = np.interp(data["start_time"].values, times_of(tree), moved)
+        sizes.semilogy(
+            where / along.scale.size,
+            data["size"].values,
+            ".",
+            color="black",
+            markersize=2,
+            rasterized=where.size > MOST_MARKS,
+        )
         sizes.set_ylabel("avalanche size")
-        sizes.set_ylim(0.8, 1.25 * max(config.contacts.count, data["size"].values.max(initial=1)))
-        sizes.axhline(config.contacts.count, color="tab:red", linewidth=0.6)
-        sizes.set_title("red: as many as all contacts", loc="left")
-        sizes.set_xlabel("displacement (µm)")
+        sizes.set_ylim(0.8, 1.25 * max(count, data["size"].values.max(initial=1)))
+        sizes.axhline(count, color="tab:red", linewidth=0.6)
+        found = "" if where.size else "no avalanche; "
+        sizes.set_title(f"{found}red: as many as all contacts", loc="left")
+        along.prepare(sizes)
     return figure
 
 
-def catalogue_of_first(tree: xr.DataTree) -> xr.Dataset:
-    """Avalanches of the first realization of an output."""
+def _catalogue(tree: xr.DataTree, extent: Extent) -> xr.Dataset:
+    """Avalanches of a realization in a window of time."""
     data = group_of(tree, "avalanches")
-    return data.isel(avalanche=np.flatnonzero(data["realization_index"].values == 0))
+    starts = data["start_time"].values
+    mine = data["realization_index"].values == extent.first
+    mine &= (starts >= extent.start) & (starts <= extent.end)
+    return data.isel(avalanche=np.flatnonzero(mine))
 
 
 def draw_distribution(
@@ -126,7 +174,33 @@ def distribution(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
         cumulative.loglog(*ccdf(sizes_of_law(tree)), color="black", drawstyle="steps-pre")
         cumulative.set_xlabel("avalanche size $s$")
         cumulative.set_ylabel("$P(S \\geq s)$")
-        cumulative.set_title(tree.attrs["title"], loc="left")
+        titles(cumulative, tree)
+    return figure
+
+
+def draw_densities(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str]) -> None:
+    """Draw the densities of the sizes of avalanches of several outputs over each other."""
+    for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
+        color = COLORS[number % len(COLORS)]
+        draw_distribution(axes, sizes_of_law(tree), color=color, label=label)
+    axes.set_xlabel("avalanche size $s$")
+    axes.set_ylabel("$P(s)$")
+
+
+def distributions(
+    trees: Sequence[xr.DataTree], labels: Sequence[str], figure: Canvas | None = None
+) -> Canvas:
+    """Densities and complementary cumulative distributions of avalanches of several outputs."""
+    with styled():
+        figure = canvas(figure, (6.5, 3 + 0.16 * len(trees)))
+        density, cumulative = figure.subplots(1, 2)
+        draw_densities(density, trees, labels)
+        for number, tree in enumerate(trees):
+            color = COLORS[number % len(COLORS)]
+            cumulative.loglog(*ccdf(sizes_of_law(tree)), color=color, drawstyle="steps-pre")
+        cumulative.set_xlabel("avalanche size $s$")
+        cumulative.set_ylabel("$P(S \\geq s)$")
+        shared_legend(figure, density)
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -385,31 +386,118 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
 
 @dataclass(frozen=True)
 class SourceFigure:
-    """A figure of the source: the runs it needs, and the function that draws it."""
+    """A figure of the source: the runs it needs, the function that draws it, and what it shows."""
 
     runs: tuple[str, ...]
     draw: Callable[[Sequence[xr.DataTree]], Figure]
+    shows: str
+
+
+# What a caption tells of the runs, if it is the same in all of them.
+PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
+    lambda config: f"$N$ = {config.contacts.count}" if config.contact_kind.is_discrete else None,
+    lambda config: f"$F_s$ = {config.contacts.static_force * 1e6:g} µN",
+    lambda config: f"$Nk$ = {config.contacts.stiffness:g} N/m",
+    lambda config: rf"$\Delta{{f_s}}/f_s$ = {config.contacts.threshold.relative_width:.3g}",
+    lambda config: f"$f_b$ = {config.contacts.back_force_ratio:g} $f_s$",
+    lambda config: rf"$\tau_d$ = {config.contacts.delay * 1e3:g} ms",
+    lambda config: rf"$\eta$ = {config.contacts.drag_rate:.0e} 1/s",
+    lambda config: (
+        f"$K$ = {config.spring_stiffness:g} N/m" if 0 < config.spring_stiffness < np.inf else None
+    ),
+    lambda config: (
+        f"$v_d$ = {config.drive_speed * 1e6:g} µm/s"
+        if len(config.drive_parts) == 1 and config.drive_speed > 0
+        else None
+    ),
+    lambda config: f"{config.contacts.threshold.law} thresholds",
+    lambda config: f"{config.contacts.coupling} coupling",
+)
+# Characters of a caption in an inch.
+CAPTION_CHARACTERS = 19
+
+
+def caption(name: str, shows: str, trees: Sequence[xr.DataTree]) -> str:
+    """What a figure shows, and the parameters that all its runs have in common."""
+    configs = [configuration(tree) for tree in trees]
+    told = [{parameter(config) for config in configs} for parameter in PARAMETERS]
+    common = [text for texts in told if len(texts) == 1 for text in texts if text is not None]
+    return f"{name}: {shows}. {', '.join(common)}."
+
+
+def add_caption(figure: Figure, text: str) -> None:
+    """Write a caption under a figure; formulas in it have no spaces, where it may be broken."""
+    # A formula takes less room than its source.
+    width = int(CAPTION_CHARACTERS * figure.get_figwidth() * 1.15)
+    kept_together = text.replace(" = ", "\u00a0=\u00a0")
+    figure.supxlabel(textwrap.fill(kept_together, width), fontsize=7, x=0.01, ha="left")
 
 
 FIGURES = {
-    "S18": SourceFigure(("S18.curve",), force_over_displacement),
+    "S18": SourceFigure(
+        ("S18.curve",),
+        force_over_displacement,
+        "force $F(X)$ of the master equation against displacement, in units of $F_s$ and $f_s/k$",
+    ),
     "S19": SourceFigure(
-        ("S19a.onset", "S19a", "S19a-me", "S19b.onset", "S19b", "S19b-me"), onset_of_slip
+        ("S19a.onset", "S19a", "S19a-me", "S19b.onset", "S19b", "S19b-me"),
+        onset_of_slip,
+        "drop of the spring force after the instability by Eqs. S46 and S47, and in slips",
     ),
-    "S20": SourceFigure(("S20",), stick_slip),
-    "S21": SourceFigure(("S21",), slip_details),
-    "S22": SourceFigure(("S22a", "S22b", "S22c", "S22d"), delays),
-    "S23": SourceFigure(("S23a", "S23b", "S23c"), dispersions),
-    "S24": SourceFigure(("S24a", "S24b"), layers),
-    "S25": SourceFigure(("S25a", "S25b", "S25c", "S25d"), interactions),
-    "S26": SourceFigure(("S25a", "S25b", "S25c", "S25d"), detaching),
-    "S27": SourceFigure(("S25a", "S25b", "S25c", "S25d"), interacting_slips),
-    "S28": SourceFigure(("S28a", "S28b", "S28c"), viscosities),
+    "S20": SourceFigure(("S20",), stick_slip, "spring force in stick-slip; inset: one slip"),
+    "S21": SourceFigure(
+        ("S21",),
+        slip_details,
+        "details of the first slip: (a) velocity, (b) forces, (c) detached contacts",
+    ),
+    "S22": SourceFigure(
+        ("S22a", "S22b", "S22c", "S22d"),
+        delays,
+        "spring force for different delays, at first (left) and after 388 s (right)",
+    ),
+    "S23": SourceFigure(
+        ("S23a", "S23b", "S23c"),
+        dispersions,
+        "spring force for different dispersions of the thresholds",
+    ),
+    "S24": SourceFigure(
+        ("S24a", "S24b"),
+        layers,
+        "slips of elastic sliders of 16 and 64 layers; insets: the whole cycle",
+    ),
+    "S25": SourceFigure(
+        ("S25a", "S25b", "S25c", "S25d"),
+        interactions,
+        "spring force for different strengths of the interaction",
+    ),
+    "S26": SourceFigure(
+        ("S25a", "S25b", "S25c", "S25d"),
+        detaching,
+        "detached contacts in the first slip for different strengths of the interaction",
+    ),
+    "S27": SourceFigure(
+        ("S25a", "S25b", "S25c", "S25d"),
+        interacting_slips,
+        "spring and contact force in the first slip for different strengths of the interaction",
+    ),
+    "S28": SourceFigure(
+        ("S28a", "S28b", "S28c"),
+        viscosities,
+        "spring force for different viscosities of the film, and its first drop",
+    ),
     "limit": SourceFigure(
-        ("limit-me", *(f"limit-{power}" for power in range(2, 7))), limit_of_many_contacts
+        ("limit-me", *(f"limit-{power}" for power in range(2, 7))),
+        limit_of_many_contacts,
+        "force under a block that goes forth and back, and its difference to N to infinity",
     ),
-    "avalanche": SourceFigure(("avalanche",), spreading_avalanche),
-    "sizes": SourceFigure(("sizes-2000", "sizes-200", "sizes-20", "bundle"), avalanche_sizes),
+    "avalanche": SourceFigure(
+        ("avalanche",), spreading_avalanche, "an avalanche through the whole system at four stages"
+    ),
+    "sizes": SourceFigure(
+        ("sizes-2000", "sizes-200", "sizes-20", "bundle"),
+        avalanche_sizes,
+        "sizes of avalanches of sliders without inertia, and of a fibre bundle",
+    ),
 }
 
 
@@ -440,6 +528,7 @@ def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
             ]
             with styled():
                 figure = FIGURES[name].draw(trees)
+                add_caption(figure, caption(name, FIGURES[name].shows, trees))
         path = folder / f"{name}.png"
         save(figure, path)
         paths.append(path)

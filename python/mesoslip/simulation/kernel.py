@@ -115,9 +115,29 @@ class Kernel:
         """Make the slider of a kind from named numbers."""
         self._call(_core.set_slider, kind, *named(parameters))
 
-    def set_drive(self, stage_end: Array, stage_velocity: Array) -> None:
-        """Stages of the drive: when each ends [s], and its velocity [m/s], shape (stages)."""
-        self._call(_core.set_drive, stage_end, stage_velocity)
+    def set_drive(
+        self,
+        part_end: Array,
+        start_velocity: Array,
+        end_velocity: Array,
+        stage: NDArray[np.integer[Any]],
+    ) -> None:
+        """Parts of the drive, shape (parts): when each ends [s], its velocities at the start and at
+        the end [m/s], and the number of the stage that it is of."""
+        self._call(_core.set_drive, part_end, start_velocity, end_velocity, stage)
+
+    def set_stop(
+        self,
+        *,
+        slips: int,
+        displacement: float,
+        block_way: float,
+        blocks: int,
+        tolerance: float,
+    ) -> None:
+        """What ends the run before its drive: slips, a displacement of the slider [m], a steady
+        state, told by blocks of so much way of the drive [m]; 0 for what does not."""
+        self._call(_core.set_stop, slips, displacement, block_way, blocks, tolerance)
 
     def set_recorder(
         self,

@@ -33,6 +33,9 @@ ENDINGS = {
     2: "as many avalanches as wanted",
     3: "no contact is left to break",
     4: "contacts break under the force without end; breaks of this slide are in no avalanche",
+    5: "as many slips as wanted",
+    6: "the slider came to its displacement",
+    7: "the state is steady",
 }
 
 # Work of the drive over the energy of all contacts about to break, below which it does not count.
@@ -144,9 +147,19 @@ class Realization:
             self.number,
         )
         kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
-        stages = config.drive_stages
-        ends = np.minimum(np.cumsum([stage.duration for stage in stages]), NEVER)
-        kernel.set_drive(ends, np.array([stage.velocity for stage in stages]))
+        durations, start_velocities, end_velocities, stages = (
+            np.array(numbers) for numbers in zip(*config.drive_parts, strict=True)
+        )
+        ends = np.minimum(np.cumsum(durations), NEVER)
+        kernel.set_drive(ends, start_velocities, end_velocities, stages)
+        stop = config.run.stops
+        kernel.set_stop(
+            slips=stop.slips or 0,
+            displacement=stop.displacement or 0.0,
+            block_way=config.steady_block,
+            blocks=stop.steady.blocks if stop.steady else 1,
+            tolerance=stop.steady.tolerance * config.contacts.static_force if stop.steady else 0.0,
+        )
         kernel.set_recorder(
             interval=config.output_interval,
             slip_interval=output.slip_interval or 0.0,
@@ -242,7 +255,9 @@ class Realization:
             return 1.0
         wanted = self.config.run.avalanches
         by_avalanches = self.avalanche_count / wanted if wanted else 0.0
-        return min(1.0, max(by_avalanches, self.time / self.config.duration))
+        far = self.config.run.stops.displacement
+        by_way = self.displacement / far if far else 0.0
+        return min(1.0, max(by_avalanches, by_way, self.time / self.config.duration))
 
     @property
     def energy(self) -> Array:

@@ -70,7 +70,7 @@ def run_realizations(
     RunError
         If a realization fails; the checkpoint stays.
     """
-    workers = _checked_workers(workers)
+    workers = checked_workers(workers)
     start = time.perf_counter()
     stop = stop or StopFlag()
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
@@ -120,7 +120,7 @@ def run_realizations(
     return Results(config, realizations, is_complete, before + time.perf_counter() - start)
 
 
-def _checked_workers(workers: int | None) -> int:
+def checked_workers(workers: int | None) -> int:
     """The number of workers, as a number of Python's own.
 
     Raises

@@ -35,6 +35,25 @@ SLIP_COLUMNS = (
     "peak_velocity",
     "contacts_broken",
 )
+STAGE_COLUMNS = (
+    "stage_number",
+    "stage_start_time",
+    "stage_end_time",
+    "drive_start_velocity",
+    "drive_end_velocity",
+    "start_force",
+    "end_force",
+    "start_displacement",
+    "end_displacement",
+    "drive_start_displacement",
+    "greatest_force",
+    "greatest_force_time",
+    "greatest_force_displacement",
+    "least_force",
+    "least_force_time",
+    "least_force_displacement",
+    "mean_force",
+)
 AVALANCHE_COLUMNS = (
     "time",
     "displacement",
@@ -68,6 +87,7 @@ COLUMNS = {
     "trace": len(TRACE_COLUMNS),
     "slip_trace": len(TRACE_COLUMNS) + 1,
     "slips": len(SLIP_COLUMNS),
+    "stages": len(STAGE_COLUMNS),
     "layers": 0,
     "avalanches": len(AVALANCHE_COLUMNS),
     "snapshot_places": len(SNAPSHOT_COLUMNS),

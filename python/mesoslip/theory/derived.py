@@ -9,6 +9,10 @@ from dataclasses import dataclass
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing
 from mesoslip.theory.lives import scales
+from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
+
+# Work that the stability of steady sliding may take, about a tenth of a second.
+MOST_WORK = 10_000
 
 
 @dataclass(frozen=True)
@@ -25,16 +29,56 @@ def derived_quantities(config: Config) -> dict[str, Derived]:
 
     What has no meaning for the configuration is left out: the setup's frequency of a prescribed
     slider, for example, or what refers to the drive's velocity if that is zero. With several stages
-    the first one that moves counts. Equation numbers are those of Braun's "Stick-slip kinetics".
+    the first one that moves counts, a ramp by its greatest speed. Equation numbers are those of
+    Braun's "Stick-slip kinetics".
     """
     return {
         name: Derived(value, unit, meaning)
-        for name, value, unit, meaning in (*_contacts(config), *config.slider.quantities(config))
+        for name, value, unit, meaning in (
+            *_contacts(config),
+            *config.slider.quantities(config),
+            *_stability(steady_sliding(config, MOST_WORK)),
+            *_drive(config),
+        )
         if math.isfinite(value)
     }
 
 
+def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
+    """What a drive that is not one velocity amounts to."""
+    parts = config.drive_parts
+    if not config.drive.parts:
+        return
+    yield "drive_stages", float(parts[-1].stage + 1), "1", "stages of the drive in the run"
+    yield "drive_duration", config.duration, "s", "duration of the run"
+    way = math.fsum(part.way for part in parts)
+    yield "drive_way", way, "m", "way of the drive, there and back both counted"
+    yield "drive_speed", config.drive_speed, "m/s", "speed that stands for the drive elsewhere"
+
+
 def verdict(config: Config) -> str | None:
+    """What is known of the motion before it is run, and what is not; None without a spring."""
+    sliding = steady_sliding(config, MOST_WORK)
+    stability = None if sliding is None else sliding.told
+    told = [one for one in (_verdict_of_stiffness(config), stability) if one is not None]
+    return "\n".join(told) or None
+
+
+def _stability(sliding: SteadySliding | None) -> Iterator[tuple[str, float, str, str]]:
+    """How small perturbations of steady sliding grow or die away, where that is found quickly."""
+    if sliding is None:
+        return
+    yield (
+        "steady_growth_rate",
+        sliding.growth_rate,
+        "1/s",
+        "growth of small perturbations of steady sliding at the drive's velocity, with delay; "
+        "below 0 they die away",
+    )
+    yield "steady_frequency", sliding.frequency, "1/s", "their frequency"
+
+
+def _verdict_of_stiffness(config: Config) -> str | None:
     """What the estimate of K* says of the spring, and what it does not; None without a spring."""
     spring = config.spring_stiffness
     if not 0 < spring < math.inf:
@@ -42,12 +86,13 @@ def verdict(config: Config) -> str | None:
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
     if spring >= estimate:
         return (
-            "K is above the estimate of K*: smooth in slow sliding, unless delay or ageing weaken "
-            "faster contacts"
+            "K is above the estimate of K*: slow sliding from relaxed contacts has no slip, and is "
+            "smooth unless delay or ageing weaken faster contacts"
         )
     return (
-        "K is below the estimate of K*: stick-slip is possible, not certain. Delay and ageing "
-        "decide whether slips go on; mesoslip curve tells K* itself, a run the rest"
+        "K is below the estimate of K*: relaxed contacts lead to a first slip. This is necessary "
+        "for stick-slip, not sufficient: delay and ageing decide whether slips go on or die away; "
+        "mesoslip curve tells K* itself, a run the rest"
     )
 
 

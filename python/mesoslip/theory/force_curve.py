@@ -376,7 +376,7 @@ class ForceCurve:
             sentences.append(
                 "K < K*: the slider becomes unstable at X_c, where the first slip starts. This is "
                 "necessary for stick-slip, not sufficient: whether slips go on or die away into "
-                "smooth sliding is decided by delay and ageing, which only a run tells"
+                "smooth sliding is decided by delay and ageing, which the curve does not know"
             )
         return "; ".join(sentences)
 

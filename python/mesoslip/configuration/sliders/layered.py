@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from mesoslip.configuration.sliders.base import Quantity, Setting
+from mesoslip.configuration.sliders.base import DynamicStiffness, Quantity, Setting
 from mesoslip.configuration.sliders.inertial import InertialSlider
 from mesoslip.configuration.table import (
     Complaint,
@@ -30,6 +30,9 @@ from mesoslip.configuration.table import (
     Whole,
     choice,
 )
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.sliders.base import Complex
 
 # Methods of integration, and their codes in the kernel.
 SOLVERS = {"series": 0, "adams": 1, "bdf": 2}
@@ -159,6 +162,27 @@ class LayeredSlider(InertialSlider):
             * config.contacts.static_force
             / self.stiffness,
         }
+
+    def dynamic_stiffness(self, rate: Complex) -> DynamicStiffness:
+        """The chain from the drive's spring down to layer 1; with a base, moved against it."""
+        mass = self.mass / self.layers
+        spring = self.layers * self.stiffness
+        inertia = mass * rate**2
+        joint = spring + self.layer_damping * mass * rate
+        numerator, denominator = inertia + spring, rate**0
+        for _ in range(self.layers - 1):
+            above = joint * numerator
+            denominator = joint * denominator + numerator
+            numerator = inertia * denominator + above
+            # Products of very many layers would overflow; only the ratio matters.
+            size = abs(denominator)
+            numerator, denominator = numerator / size, denominator / size
+        degree = 2 * self.layers
+        if self.base is not None:
+            ground = self.base.mass * rate * (rate + self.base.damping) + self.base.stiffness
+            numerator, denominator = numerator * ground, numerator + denominator * ground
+            degree += 2
+        return DynamicStiffness(numerator, denominator, degree)
 
     @property
     def layer_count(self) -> int:

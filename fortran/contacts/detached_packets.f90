@@ -1,0 +1,293 @@
+!> Detached contacts of infinitely many: packets of them, in the order in which they broke.
+!>
+!> A packet is what broke within one step, evenly in time. It attaches as evenly, after the delay.
+module mesoslip_contacts_detached_packets
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_interface_law, only: pose_type
+   implicit none
+   private
+
+   public :: detached_packets_type, expected_births_type, new_detached_packets
+
+   !> Numbers kept for detached contacts: they broke evenly from one time to another [s], so many,
+   !> with such a mass
+   integer, parameter :: packet_length = 4
+   integer, parameter :: row_start = 1, row_end = 2, row_number = 3, row_mass = 4
+
+   !> Part of the contacts that is too small to attach again
+   real(wp), parameter :: negligible_part = 1.0e-30_wp
+   !> A step may last so many times as long as expected
+   real(wp), parameter :: patience = 1.5_wp
+   !> Packets for which there is room at first
+   integer, parameter :: first_places = 64
+
+   !> What is expected to attach in a step.
+   type :: expected_births_type
+      !> How many contacts, and their mass
+      real(wp) :: number = 0.0_wp, mass = 0.0_wp
+      !> Sums over them of the time from the start of the step [s], and of its square
+      real(wp) :: moment = 0.0_wp, square = 0.0_wp
+      !> Until when the step may last for it [s]
+      real(wp) :: end_time = huge(1.0_wp)
+   end type expected_births_type
+
+   !> Packets of detached contacts.
+   type :: detached_packets_type
+      !> Number and mass of the detached contacts
+      type(accumulator_type) :: number, mass
+
+      !> Time between breaking and attaching [s], and whether contacts attach again
+      real(wp), private :: delay = 0.0_wp
+      logical, private :: reattach = .true.
+      !> Number of contacts that is too small to attach again
+      real(wp), private :: negligible = 0.0_wp
+      !> First and last packet
+      integer, private :: first = 1, last = 0
+      !> Part of the first one that is attached again
+      real(wp), private :: attached_part = 0.0_wp
+      !> The packets, shape (packet_length, places)
+      real(wp), allocatable, private :: packet(:, :)
+   contains
+      !> Take up contacts that broke
+      procedure, non_overridable :: add
+      !> Whether none waits to attach
+      procedure, non_overridable :: is_empty
+      !> What will attach in a step
+      procedure, non_overridable :: expect
+      !> Take out what is due to attach
+      procedure, non_overridable :: take_due
+      !> Put the state into an archive or take it out
+      procedure, non_overridable :: exchange
+      procedure, non_overridable, private :: due_times, make_room
+   end type detached_packets_type
+
+contains
+
+   !> Set up packets: none.
+   subroutine new_detached_packets(self, parameters)
+      !> The packets
+      type(detached_packets_type), intent(out) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+
+      self%delay = parameters%delay
+      self%reattach = parameters%reattach
+      self%negligible = negligible_part * parameters%count
+      allocate (self%packet(packet_length, first_places), source=0.0_wp)
+   end subroutine new_detached_packets
+
+   !> Take up contacts that broke evenly from one time to another.
+   subroutine add(self, start_time, end_time, number, mass)
+      !> The packets
+      class(detached_packets_type), intent(inout) :: self
+      !> From when and until when they broke [s]
+      real(wp), intent(in) :: start_time, end_time
+      !> How many they are, and their mass
+      real(wp), intent(in) :: number, mass
+
+      call self%number%add(number)
+      call self%mass%add(mass)
+      if (.not. (self%reattach .and. number > self%negligible)) return
+      if (self%last == size(self%packet, 2)) call self%make_room()
+      self%last = self%last + 1
+      self%packet(:, self%last) = [start_time, end_time, number, mass]
+   end subroutine add
+
+   !> Whether none waits to attach.
+   pure function is_empty(self)
+      !> The packets
+      class(detached_packets_type), intent(in) :: self
+      !> Whether that is so
+      logical :: is_empty
+
+      is_empty = self%first > self%last
+   end function is_empty
+
+   !> Make room for one more packet: where some have attached, or in a larger array.
+   subroutine make_room(self)
+      class(detached_packets_type), intent(inout) :: self
+
+      real(wp), allocatable :: larger(:, :)
+      integer :: waiting
+
+      waiting = self%last - self%first + 1
+      if (2 * waiting > size(self%packet, 2)) then
+         allocate (larger(packet_length, 2 * size(self%packet, 2)), source=0.0_wp)
+         larger(:, :waiting) = self%packet(:, self%first:self%last)
+         call move_alloc(larger, self%packet)
+      else
+         self%packet(:, :waiting) = self%packet(:, self%first:self%last)
+      end if
+      self%first = 1
+      self%last = waiting
+   end subroutine make_room
+
+   !> Times at which a packet attaches, from its first contact that has not yet to its last.
+   pure subroutine due_times(self, place, early, late)
+      class(detached_packets_type), intent(in) :: self
+      integer, intent(in) :: place
+      real(wp), intent(out) :: early, late
+
+      early = self%packet(row_start, place) + self%delay
+      late = self%packet(row_end, place) + self%delay
+      if (place == self%first) early = early + self%attached_part * (late - early)
+   end subroutine due_times
+
+   !> What will attach in a step, and until when it may last for it.
+   subroutine expect(self, time, duration, breaks, mass, part, most, births)
+      !> The packets
+      class(detached_packets_type), intent(in) :: self
+      !> When the step starts, and how long it will last if nothing ends it [s]
+      real(wp), intent(in) :: time, duration
+      !> Contacts that break on a way of the slider, their mass, and the part of them that does so
+      !> in the step
+      real(wp), intent(in) :: breaks, mass, part
+      !> Contacts that may attach in one step
+      real(wp), intent(in) :: most
+      !> What is expected
+      type(expected_births_type), intent(out) :: births
+
+      real(wp) :: early, late, until, left
+      integer :: place
+
+      until = time
+      do place = self%first, self%last
+         call self%due_times(place, early, late)
+         if (early > until) then
+            ! Nothing attaches for a while: the step ends where that changes.
+            births%end_time = early
+            if (births%number > 0.0_wp) births%end_time = until
+            return
+         end if
+         left = self%packet(row_number, place)
+         if (place == self%first) left = left * (1.0_wp - self%attached_part)
+         call add_even(left, self%packet(row_mass, place) / self%packet(row_number, place))
+         if (births%end_time < huge(1.0_wp)) return
+         if (late >= time + duration) then
+            ! What is expected holds for about the time the slider is expected to take.
+            births%end_time = max(time + patience * duration, nearest(time, 1.0_wp))
+            return
+         end if
+         until = late
+      end do
+      if (self%reattach .and. self%delay < duration &
+         & .and. part * breaks > 0.0_wp) then
+         ! What breaks in this step starts to attach in it.
+         early = time + self%delay
+         late = early + duration
+         call add_even(part * breaks, mass / breaks)
+         births%end_time = min(births%end_time, max(time + patience * duration, &
+            & nearest(time, 1.0_wp)))
+      else if (births%number > 0.0_wp) then
+         births%end_time = until
+      end if
+
+   contains
+
+      !> Add contacts that attach evenly from early to late.
+      subroutine add_even(count, mean_mass)
+         !> How many, and their mean mass
+         real(wp), intent(in) :: count, mean_mass
+
+         real(wp) :: more, middle, length
+
+         length = late - early
+         more = count
+         if (late > time + duration) then
+            length = max(0.0_wp, time + duration - early)
+            more = count * length / (late - early)
+         end if
+         if (births%number + more > most) then
+            if (more > 0.0_wp) length = length * (most - births%number) / more
+            more = most - births%number
+            births%end_time = max(early + length, nearest(time, 1.0_wp))
+         end if
+         middle = max(0.0_wp, early + 0.5_wp * length - time)
+         births%number = births%number + more
+         births%mass = births%mass + more * mean_mass
+         births%moment = births%moment + more * middle
+         births%square = births%square + more * (middle**2 + length**2 / 12.0_wp)
+      end subroutine add_even
+
+   end subroutine expect
+
+   !> Take out all contacts that are due to attach.
+   subroutine take_due(self, before, after, births, moment, when)
+      !> The packets
+      class(detached_packets_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+      !> How many they are, and sums over them of the displacement [m] and of the time [s] at which
+      !> they are due
+      real(wp), intent(out) :: births, moment, when
+
+      real(wp) :: early, late, until, part, part_before, more
+
+      births = 0.0_wp
+      moment = 0.0_wp
+      when = 0.0_wp
+      do while (self%first <= self%last)
+         call self%due_times(self%first, early, late)
+         if (early > after%time) exit
+         part_before = self%attached_part
+         part = 1.0_wp
+         until = late
+         if (late > after%time) then
+            until = after%time
+            part = part_before + (1.0_wp - part_before) * (until - early) / (late - early)
+         end if
+         more = self%packet(row_number, self%first) * (part - part_before)
+         births = births + more
+         moment = moment + more * position_at(before, after, 0.5_wp * (early + until))
+         when = when + more * 0.5_wp * (early + until)
+         call self%mass%add(-self%packet(row_mass, self%first) * (part - part_before))
+         self%attached_part = part
+         if (part < 1.0_wp) exit
+         self%attached_part = 0.0_wp
+         self%first = self%first + 1
+      end do
+      if (self%first > self%last) then
+         self%first = 1
+         self%last = 0
+      end if
+      if (births > 0.0_wp) call self%number%add(-births)
+   end subroutine take_due
+
+   !> Where the slider was at a time of its last motion, by Hermite's interpolation [m].
+   pure function position_at(before, after, time) result(displacement)
+      type(pose_type), intent(in) :: before, after
+      real(wp), intent(in) :: time
+      real(wp) :: displacement
+
+      real(wp) :: length, t, s
+
+      length = after%time - before%time
+      displacement = after%displacement
+      if (.not. length > 0.0_wp) return
+      t = min(1.0_wp, max(0.0_wp, (time - before%time) / length))
+      s = 1.0_wp - t
+      displacement = s**2 * ((1.0_wp + 2.0_wp * t) * before%displacement &
+         & + t * length * before%velocity) &
+         & + t**2 * ((1.0_wp + 2.0_wp * s) * after%displacement - s * length * after%velocity)
+   end function position_at
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The packets
+      class(detached_packets_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("detached packets")
+      call archive%exchange("packet", self%packet)
+      call archive%exchange("first", self%first)
+      call archive%exchange("last", self%last)
+      call archive%exchange("attached_part", self%attached_part)
+      call archive%exchange("number", self%number)
+      call archive%exchange("mass", self%mass)
+   end subroutine exchange
+
+end module mesoslip_contacts_detached_packets

@@ -1,0 +1,137 @@
+!> Whether a motion has come to a steady state, from means of the drive's force over blocks.
+!>
+!> Each block is an equal way of the drive at a constant velocity. The state is steady as soon as
+!> the mean of the last blocks and that of as many before agree within the standard error of their
+!> difference, by the scatter of the last ones, or within a tolerance, and those before do not
+!> scatter twice as much. A force that drifts does not pass: where it changes evenly over twice n
+!> blocks, the difference is some sqrt(6 n) standard errors; nor does what dies away fast.
+module mesoslip_recording_steady
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: steady_recorder_type
+
+   !> Means over the latest blocks.
+   type :: steady_recorder_type
+      !> Way of the drive in a block [m], 0 for no steady state to look for
+      real(wp) :: way = 0.0_wp
+      !> Blocks of which the mean is taken, two at least
+      integer :: blocks = 2
+      !> Difference that counts as none [N]
+      real(wp) :: tolerance = 0.0_wp
+      !> Time at which the present block ends [s]; huge if there is none
+      real(wp) :: block_end = huge(1.0_wp)
+
+      !> Time at which the first block began [s], blocks that are over, and time of one [s]
+      real(wp), private :: start_time = 0.0_wp, duration = 0.0_wp
+      integer, private :: number = 0
+      !> Impulse of the drive up to the last of them [N s]
+      real(wp), private :: impulse = 0.0_wp
+      !> Means over the latest blocks, each at its number modulo their number, shape (2 blocks) [N]
+      real(wp), allocatable, private :: mean(:)
+   contains
+      !> Say what to look for
+      procedure :: open
+      !> Begin with the first block
+      procedure :: begin
+      !> A block is over
+      procedure :: see_block
+      !> Put the state into an archive or take it out
+      procedure :: exchange
+   end type steady_recorder_type
+
+contains
+
+   !> Say what to look for.
+   subroutine open(self, way, blocks, tolerance)
+      !> The recorder
+      class(steady_recorder_type), intent(inout) :: self
+      !> Way of the drive in a block [m], 0 for nothing to look for
+      real(wp), intent(in) :: way
+      !> Blocks of which the mean is taken, two at least
+      integer, intent(in) :: blocks
+      !> Difference that counts as none [N]
+      real(wp), intent(in) :: tolerance
+
+      self%way = way
+      self%blocks = max(2, blocks)
+      self%tolerance = tolerance
+      self%mean = [real(wp) ::]
+      if (way > 0.0_wp) then
+         deallocate (self%mean)
+         allocate (self%mean(0:2 * self%blocks - 1), source=0.0_wp)
+      end if
+   end subroutine open
+
+   !> Begin with the first block.
+   subroutine begin(self, time, velocity)
+      !> The recorder
+      class(steady_recorder_type), intent(inout) :: self
+      !> Time now [s], and constant velocity of the drive [m/s]
+      real(wp), intent(in) :: time, velocity
+
+      self%block_end = huge(1.0_wp)
+      self%number = 0
+      self%impulse = 0.0_wp
+      if (.not. (self%way > 0.0_wp .and. abs(velocity) > 0.0_wp)) return
+      self%start_time = time
+      self%duration = self%way / abs(velocity)
+      self%block_end = self%start_time + self%duration
+   end subroutine begin
+
+   !> A block is over: is the state steady?
+   subroutine see_block(self, impulse, is_steady)
+      !> The recorder
+      class(steady_recorder_type), intent(inout) :: self
+      !> Impulse of the drive since the first block began [N s]
+      real(wp), intent(in) :: impulse
+      !> Whether it is
+      logical, intent(out) :: is_steady
+
+      real(wp) :: late, early, scatter, scatter_before
+      logical :: is_late(0:2 * self%blocks - 1)
+      integer :: age, blocks
+
+      blocks = self%blocks
+      self%mean(modulo(self%number, 2 * blocks)) = (impulse - self%impulse) / self%duration
+      self%impulse = impulse
+      self%number = self%number + 1
+      self%block_end = self%start_time + (self%number + 1) * self%duration
+      is_steady = .false.
+      if (self%number < 2 * blocks) return
+
+      is_late = .false.
+      do age = 1, blocks
+         is_late(modulo(self%number - age, 2 * blocks)) = .true.
+      end do
+      late = sum(self%mean, is_late) / blocks
+      early = sum(self%mean, .not. is_late) / blocks
+      scatter = sqrt(sum((self%mean - late)**2, is_late) / (blocks - 1))
+      scatter_before = sqrt(sum((self%mean - early)**2, .not. is_late) / (blocks - 1))
+      is_steady = abs(late - early) <= max(sqrt(2.0_wp / blocks) * scatter, self%tolerance) &
+         & .and. scatter_before <= max(2.0_wp * scatter, self%tolerance)
+   end subroutine see_block
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The recorder
+      class(steady_recorder_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      real(wp), allocatable :: mean(:)
+
+      call archive%section("steady state")
+      call archive%exchange("block_end", self%block_end)
+      call archive%exchange("start_time", self%start_time)
+      call archive%exchange("duration", self%duration)
+      call archive%exchange("number", self%number)
+      call archive%exchange("impulse", self%impulse)
+      mean = self%mean
+      call archive%exchange("mean", mean)
+      if (size(mean) == size(self%mean)) self%mean(:) = mean
+   end subroutine exchange
+
+end module mesoslip_recording_steady

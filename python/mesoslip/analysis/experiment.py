@@ -1,0 +1,337 @@
+"""An output as an experiment on friction: its trace, stage by stage of the drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from mesoslip.analysis.steady_force import SteadyMean, steady_mean
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.drive import DrivePart
+from mesoslip.errors import ConfigError, FileError
+from mesoslip.output.layout import group_of
+
+Array = NDArray[np.float64]
+
+# Slider displacement after a change of the drive within which a peak belongs to it, in mean
+# breaking stretches: that within which all contacts have broken once or twice.
+PEAK_STRETCHES = 3.0
+# Part of the slider's motion that happens in slips, from which on it sticks and slips.
+STICK_SLIP_SHARE = 0.1
+# Times of samples and of stages are sums of numbers, and agree to rounding.
+SAME_TIME = 1e-9
+# What a stage knows of its extremes: the value, and when and where it was.
+EXTREME = ("force", "force_time", "force_displacement")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the drive.
+
+    Attributes
+    ----------
+    number
+        From 0.
+    start, end
+        Times [s].
+    start_velocity, end_velocity
+        Velocities of the drive [m/s].
+    is_uniform
+        Whether the velocity is constant or changes linearly; that of a measured history does not.
+    exact
+        What the output's group ``stages`` tells of it, from the motion itself, each of shape
+        (realizations,); empty if the output has no such group.
+    """
+
+    number: int
+    start: float
+    end: float
+    start_velocity: float
+    end_velocity: float
+    is_uniform: bool
+    exact: Mapping[str, Array]
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return self.end - self.start
+
+    @property
+    def is_hold(self) -> bool:
+        """Whether the drive stands."""
+        return self.is_uniform and self.start_velocity == 0 and self.end_velocity == 0
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the drive moves at one velocity."""
+        return self.is_uniform and self.start_velocity == self.end_velocity != 0
+
+    @property
+    def velocity(self) -> float:
+        """Mean velocity [m/s]."""
+        return 0.5 * (self.start_velocity + self.end_velocity)
+
+    @property
+    def direction(self) -> float:
+        """Sign of the velocity, 0 for a hold."""
+        return float(np.sign(self.velocity))
+
+
+@dataclass(frozen=True)
+class Peak:
+    """An extreme of the force, each of shape (realizations,): force [N], time [s], displacement
+    [m]."""
+
+    force: Array
+    time: Array
+    displacement: Array
+    is_exact: bool
+
+
+def _are_one(parts: Sequence[DrivePart]) -> bool:
+    """Whether parts of a stage go on at one velocity, or are one."""
+    return len(parts) < 2 or len({one[1:3] for one in parts} | {parts[0][1:2] * 2}) == 1
+
+
+class Experiment:
+    """An output of a run, read as an experimenter reads a record.
+
+    Attributes
+    ----------
+    config
+        Configuration of the run.
+    name
+        What to call it in messages and pictures.
+    time
+        Times of the samples that all realizations have [s], shape (samples,).
+    force, displacement
+        Force of the spring [N], and displacement of the slider [m], shape (realizations, samples).
+    drive
+        Displacement of the load point [m], shape (samples,).
+    stages
+        Stages of the drive that all realizations came to.
+
+    Raises
+    ------
+    FileError
+        If the output is of no run, or driven by a force.
+    """
+
+    def __init__(self, tree: xr.DataTree, name: str = "the output") -> None:
+        if "spring_force" not in tree.data_vars:
+            raise FileError(f"{name}: not an output of mesoslip run")
+        try:
+            self.config = Config.from_toml(tree.attrs["configuration"])
+        except ConfigError:
+            raise FileError(
+                f"{name}: has no configuration of a run, so the velocities of its drive, its holds "
+                "and its spring are not known"
+            ) from None
+        if self.config.drive.force_rate is not None:
+            raise FileError(
+                f"{name}: is driven by a force (drive.force_rate); steady forces, velocity steps "
+                "and holds need a drive with velocities"
+            )
+        self.name = name
+        self.tree = tree
+        root = tree.to_dataset()
+        force = root["spring_force"].values
+        whole = np.isfinite(force).all(axis=0)
+        count = int(np.argmin(whole)) if not whole.all() else whole.size
+        if count == 0:
+            raise FileError(f"{name}: has no sample that all realizations have")
+        self.time: Array = root["time"].values[:count]
+        self.force: Array = force[:, :count]
+        self.displacement: Array = root["displacement"].values[:, :count]
+        self.drive: Array = root["drive_displacement"].values[0, :count]
+        self.stages = self._stages()
+
+    @property
+    def static_force(self) -> float:
+        """F_s [N]."""
+        return self.config.contacts.static_force
+
+    @property
+    def stiffness(self) -> float:
+        """K [N/m]; infinite for a prescribed slider."""
+        return self.config.spring_stiffness
+
+    @property
+    def peak_window(self) -> float:
+        """Slider displacement after a change of the drive within which its peak is looked for
+        [m]."""
+        return PEAK_STRETCHES * self.config.contacts.break_stretch
+
+    def _stages(self) -> tuple[Stage, ...]:
+        last = float(self.time[-1])
+        found = (
+            self._recorded_stages()
+            if "stages" in self.tree.children
+            else self._configured_stages(last)
+        )
+        return tuple(one for one in found if one.start < last and one.duration > 0)
+
+    def _configured_stages(self, last: float) -> list[Stage]:
+        """Stages as they were asked for, without what is known of them exactly."""
+        found, start = [], 0.0
+        for number, parts in self._parts().items():
+            end = start + math.fsum(one.duration for one in parts)
+            speeds = (parts[0].start_velocity, parts[-1].end_velocity)
+            found.append(Stage(number, start, min(end, last), *speeds, _are_one(parts), {}))
+            start = end
+        return found
+
+    def _parts(self) -> dict[int, list[DrivePart]]:
+        """Parts of the drive by the number of their stage."""
+        parts: dict[int, list[DrivePart]] = {}
+        for one in self.config.drive_parts:
+            parts.setdefault(one.stage, []).append(one)
+        return parts
+
+    def _recorded_stages(self) -> list[Stage]:
+        """Stages as they were run, of those that all realizations came to."""
+        data = group_of(self.tree, "stages")
+        rows = {name: data[name].values for name in map(str, data.data_vars)}
+        owner, numbers = rows["realization_index"], rows["stage_number"]
+        realizations = self.force.shape[0]
+        parts = self._parts()
+        found = []
+        for number in np.unique(numbers):
+            mine = np.flatnonzero(numbers == number)
+            mine = mine[np.argsort(owner[mine], kind="stable")]
+            if not np.array_equal(owner[mine], np.arange(realizations)):
+                continue
+            # Without slips that end a run they are the same in all realizations.
+            start = float(rows["stage_start_time"][mine].max())
+            end = float(rows["stage_end_time"][mine].min())
+            first, last = (
+                float(rows[f"drive_{which}_velocity"][mine[0]]) for which in ("start", "end")
+            )
+            exact = {name: values[mine] for name, values in rows.items()}
+            is_uniform = _are_one(parts.get(int(number), []))
+            found.append(Stage(int(number), start, end, first, last, is_uniform, exact))
+        return found
+
+    def samples(self, stage: Stage) -> slice:
+        """Samples of a stage: after its start, up to its end."""
+        slack = SAME_TIME * max(abs(stage.end), 1e-300)
+        first = int(np.searchsorted(self.time, stage.start + slack, "right"))
+        if stage.number == 0:
+            first = int(np.searchsorted(self.time, stage.start - slack, "left"))
+        return slice(first, int(np.searchsorted(self.time, stage.end + slack, "right")))
+
+    def at_start(self, stage: Stage) -> int:
+        """The sample at or before the start of a stage."""
+        slack = SAME_TIME * max(abs(stage.end), 1e-300)
+        return max(0, int(np.searchsorted(self.time, stage.start + slack, "right")) - 1)
+
+    @cached_property
+    def steady_means(self) -> dict[int, SteadyMean | None]:
+        """Steady means of the spring force in the direction of the drive, by the number of the
+        stage.
+
+        Of stages at one velocity; None where there are too few samples.
+        """
+        return {
+            one.number: steady_mean(one.direction * self.force[:, self.samples(one)])
+            for one in self.stages
+            if one.is_steady
+        }
+
+    def mean_of(self, stage: Stage) -> SteadyMean | None:
+        """The steady mean of a stage; None if it has none."""
+        return self.steady_means.get(stage.number)
+
+    def slip_share(self, stage: Stage) -> float:
+        """Part of the slider's motion in the steady part of a stage that happens in slips.
+
+        In perfect stick-slip the spring force falls in slips by what the drive loads it between
+        them, K v t.
+        """
+        stiffness = self.stiffness
+        if not stage.is_steady or math.isinf(stiffness) or "slips" not in self.tree.children:
+            return 0.0
+        mean = self.mean_of(stage)
+        first = self.samples(stage).start + (0 if mean is None else mean.start)
+        if first >= self.time.size:
+            return 0.0
+        start = float(self.time[first])
+        slips = group_of(self.tree, "slips")
+        times = slips["start_time"].values
+        inside = (times >= start) & (times < stage.end)
+        drops = float(np.abs(slips["force_drop"].values[inside]).sum())
+        loaded = stiffness * abs(stage.velocity) * (stage.end - start) * self.force.shape[0]
+        return drops / loaded if loaded > 0 else 0.0
+
+    def sticks_and_slips(self, stage: Stage) -> bool:
+        """Whether a stage is one of stick-slip."""
+        return self.slip_share(stage) > STICK_SLIP_SHARE
+
+    def force_at(self, stage: Stage, which: str) -> Array:
+        """Spring force at the start or end of a stage [N], shape (realizations,)."""
+        if f"{which}_force" in stage.exact:
+            return stage.exact[f"{which}_force"]
+        place = self.at_start(stage) if which == "start" else self.samples(stage).stop - 1
+        return self.force[:, place]
+
+    def displacement_at_start(self, stage: Stage) -> Array:
+        """Displacement of the slider at the start of a stage [m], shape (realizations,)."""
+        if "start_displacement" in stage.exact:
+            return stage.exact["start_displacement"]
+        return self.displacement[:, self.at_start(stage)]
+
+    def peak(self, stage: Stage, upward: bool = True) -> Peak | None:
+        """The greatest force (or the least one) along the direction of a stage, soon after its
+        start.
+
+        Where the stage sticks and slips: that from which the first slip starts. Elsewhere: of the
+        time in which the slider moves by three mean breaking stretches; from the motion if the
+        output has it, else from the samples.
+
+        Returns
+        -------
+        Peak or None
+            With the sign of the direction: greater is more against the drive. None without samples.
+        """
+        sign = stage.direction
+        if upward and self.sticks_and_slips(stage):
+            found = self._before_first_slip(stage)
+            if found is not None:
+                return found
+        start = self.displacement_at_start(stage)
+        # Against the axis, the greatest force against the drive is the least one.
+        which = "greatest" if (sign > 0) == upward else "least"
+        if all(f"{which}_{name}" in stage.exact for name in EXTREME):
+            force, time, displacement = (stage.exact[f"{which}_{name}"] for name in EXTREME)
+            if np.all(np.abs(displacement - start) <= self.peak_window):
+                return Peak(sign * force, time, displacement, True)
+        inside = self.samples(stage)
+        force, displacement = sign * self.force[:, inside], self.displacement[:, inside]
+        if force.shape[1] == 0:
+            return None
+        is_near = np.abs(displacement - start[:, None]) <= self.peak_window
+        side = 1.0 if upward else -1.0
+        place = np.argmax(np.where(is_near, side * force, -np.inf), axis=1)
+        rows = np.arange(force.shape[0])
+        return Peak(force[rows, place], self.time[inside][place], displacement[rows, place], False)
+
+    def _before_first_slip(self, stage: Stage) -> Peak | None:
+        """Where the first slips of a stage start; None if a realization has none."""
+        slips = group_of(self.tree, "slips")
+        times, owner = slips["start_time"].values, slips["realization_index"].values
+        force, time, displacement = [], [], []
+        for realization in range(self.force.shape[0]):
+            inside = (owner == realization) & (times >= stage.start) & (times < stage.end)
+            if not inside.any():
+                return None
+            first = np.flatnonzero(inside)[np.argmin(times[inside])]
+            force.append(stage.direction * slips["force_before"].values[first])
+            time.append(times[first])
+            displacement.append(np.interp(times[first], self.time, self.displacement[realization]))
+        return Peak(np.array(force), np.array(time), np.array(displacement), True)

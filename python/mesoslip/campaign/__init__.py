@@ -1,0 +1,1 @@
+"""Campaigns: many runs at once, and what they say together."""

@@ -1,0 +1,117 @@
+"""The dataset of a sweep: swept keys as coordinates, measures as variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.campaign.point import program
+from mesoslip.configuration.keys import key_kind
+from mesoslip.output.provenance import program_attributes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mesoslip.campaign.plan import Combination, Plan
+
+STATUS = ("ok", "failed", "missing")
+OK, FAILED, MISSING = range(3)
+# Failures of which each is told in the dataset.
+MOST_TOLD = 100
+
+
+class Assembly:
+    """The dataset of a sweep while points come in, each at its own place."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        shape = (*plan.shape, plan.realizations)
+        self._status: NDArray[np.int8] = np.full(shape, MISSING, dtype=np.int8)
+        self._values = {one.name: np.full(shape, np.nan) for one in plan.measures}
+
+    def put(
+        self, combination: Combination, realization: int, measures: Mapping[str, float]
+    ) -> None:
+        """A point that is done."""
+        where = (*combination.place, realization)
+        self._status[where] = OK
+        for name, values in self._values.items():
+            values[where] = measures[name]
+
+    def fail(self, combination: Combination, realization: int) -> None:
+        """A point that has failed."""
+        self._status[(*combination.place, realization)] = FAILED
+
+    def dataset(self, ending: str, failures: Mapping[str, str]) -> xr.Dataset:
+        """The dataset as it is now.
+
+        Returns
+        -------
+        xarray.Dataset
+            A dimension for each swept key, named like it, with its values in SI; one for keys that
+            go together, named like the first of them; ``sample`` for a Latin hypercube; and
+            ``realization``. Variables: ``status`` and the measures, NaN where there are none.
+        """
+        import xarray as xr
+
+        plan = self._plan
+        dimensions = (*(axis.dimension for axis in plan.axes), "realization")
+        coordinates: dict[str, Any] = {}
+        for axis in plan.axes:
+            if axis.dimension not in axis.keys:
+                numbers = np.arange(len(axis.rows))
+                attributes = {"units": "1", "long_name": "number of the sample"}
+                coordinates[axis.dimension] = (axis.dimension, numbers, attributes)
+            for key, column in zip(axis.keys, zip(*axis.rows, strict=True), strict=True):
+                coordinates[key] = (axis.dimension, np.array(column), _attributes(key))
+        numbers = np.arange(plan.realizations)
+        attributes = {"units": "1", "long_name": "number of the realization"}
+        coordinates["realization"] = ("realization", numbers, attributes)
+        flags = {
+            "long_name": "what has become of the point",
+            "flag_values": np.arange(len(STATUS), dtype=np.int8),
+            "flag_meanings": " ".join(STATUS),
+        }
+        variables: dict[str, Any] = {"status": xr.Variable(dimensions, self._status, flags)}
+        for one in plan.measures:
+            # Choices are numbers with none missing in memory, and small ones in a file.
+            encoding = {"dtype": "int8", "_FillValue": -1} if one.flags else {"_FillValue": np.nan}
+            variables[one.name] = xr.Variable(
+                dimensions, self._values[one.name], one.attributes, encoding
+            )
+        return xr.Dataset(variables, coordinates, self._attributes(ending, failures))
+
+    def _attributes(self, ending: str, failures: Mapping[str, str]) -> dict[str, Any]:
+        import tomli_w
+
+        plan = self._plan
+        told = [f"{point}: {reason}" for point, reason in list(failures.items())[:MOST_TOLD]]
+        return program_attributes(plan.combinations[0].config, "sweep") | {
+            "configuration": tomli_w.dumps(plan.tables),
+            "sweep": tomli_w.dumps(plan.sweep.model_dump(exclude_none=True)),
+            "complete": "false" if np.any(self._status == MISSING) else "true",
+            "comment": ending,
+            "failures": "\n".join(told),
+        }
+
+    def manifest(self, places: Iterable[Any]) -> dict[str, Any]:
+        """What belongs to the sweep: for people, and for who clears away what does not."""
+        plan = self._plan
+        return {
+            "program": program(),
+            "axes": {axis.dimension: [list(row) for row in axis.rows] for axis in plan.axes},
+            "realizations": plan.realizations,
+            "measures": [one.name for one in plan.measures],
+            "points": [place.name for place in places],
+        }
+
+
+def _attributes(key: str) -> dict[str, str]:
+    """Attributes of the coordinate of a key."""
+    kind = key_kind(key)
+    units = None if kind is None else kind.cf_units
+    long_name = key.replace(".", " ").replace("_", " ")
+    return {"long_name": long_name} | ({} if units is None else {"units": units})

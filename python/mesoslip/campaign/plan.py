@@ -1,0 +1,463 @@
+"""The file of a sweep, and the points that it asks for.
+
+A sweep varies keys of a configuration along axes. The keys of ``[sweep.grid]`` are an axis each,
+those of a ``[[sweep.together]]`` table one axis together, those of ``[sweep.latin_hypercube]`` too.
+Axes multiply, and each combination is run for so many realizations. A *point* is one realization of
+one combination.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, StrictBool, StrictStr, ValidationError, model_validator
+
+from mesoslip.campaign.measures import Measure, find_measures
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.files import Change, on_base, override, read_toml
+from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
+from mesoslip.configuration.messages import problems
+from mesoslip.configuration.table import Number, Table, Whole, problem
+from mesoslip.configuration.units import to_si
+from mesoslip.errors import ConfigError, Problem
+
+Value = float | int | str | bool
+
+# Combinations that cannot be run, of which each is told.
+MOST_TOLD = 5
+# More points than anybody waits for.
+MOST_POINTS = 10_000_000
+
+
+class Range(Table):
+    """Values from one to another."""
+
+    from_: Annotated[Any, Field(alias="from")]
+    to: Any
+    points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
+    spacing: Literal["linear", "logarithmic"] = "linear"
+
+
+class Extent(Table):
+    """Where a Latin hypercube takes the values of a key from."""
+
+    from_: Annotated[Any, Field(alias="from")]
+    to: Any
+    spacing: Literal["linear", "logarithmic"] = "linear"
+
+
+class SweepTable(Table):
+    """The table ``[sweep]``.
+
+    Attributes
+    ----------
+    realizations
+        Of each combination; those of the run by default.
+    measures
+        Names, and functions of one's own as "file.py:function".
+    discard
+        Part of each run, from its start, that measures leave out.
+    traces
+        Whether the output of each point is kept.
+    grid, together, latin_hypercube
+        What is varied, see the module.
+    """
+
+    realizations: Annotated[Whole, Field(ge=1, lt=2**31)] | None = None
+    measures: tuple[StrictStr, ...]
+    discard: Annotated[Number, Field(ge=0, lt=1)] = 0.5
+    traces: StrictBool = False
+    grid: dict[str, Any] = Field(default_factory=dict)
+    together: tuple[dict[str, Any], ...] = ()
+    latin_hypercube: dict[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _something_to_do(self) -> Self:
+        if not self.measures:
+            raise problem("measures", "must name at least one measure")
+        if not (self.grid or self.together or self.latin_hypercube):
+            raise problem(
+                "grid",
+                "nothing is varied; name keys in [sweep.grid], [[sweep.together]] or "
+                "[sweep.latin_hypercube]",
+            )
+        return self
+
+
+class SweepFile(Table):
+    """What a sweep's file has beside the configuration."""
+
+    sweep: SweepTable
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Keys that vary together.
+
+    Attributes
+    ----------
+    dimension
+        Name of the dimension in the dataset.
+    keys
+        Dotted names.
+    rows
+        The values of the keys at each place of the axis, in SI.
+    """
+
+    dimension: str
+    keys: tuple[str, ...]
+    rows: tuple[tuple[Value, ...], ...]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """One combination of values.
+
+    Attributes
+    ----------
+    place
+        Its place along each axis.
+    values
+        The value of each swept key, in SI.
+    config
+        What is run.
+    """
+
+    place: tuple[int, ...]
+    values: Mapping[str, Value]
+    config: Config
+
+    def __str__(self) -> str:
+        return described(self.values)
+
+
+def described(values: Mapping[str, Value]) -> str:
+    """Values of keys, as messages tell them."""
+    parts = []
+    for key, value in values.items():
+        kind = key_kind(key)
+        unit = "" if kind is None or kind.unit in {None, "1"} else f" {kind.unit}"
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        parts.append(f"{key} = {text}{unit}")
+    return ", ".join(parts)
+
+
+class Plan:
+    """A sweep, checked: its axes, and a configuration for each combination.
+
+    Attributes
+    ----------
+    tables
+        The configuration that is varied.
+    sweep
+        The table ``[sweep]``.
+    axes
+        In the order of the dimensions of the dataset.
+    realizations
+        Of each combination.
+    measures
+        What is measured of each point.
+    """
+
+    def __init__(self, tables: Mapping[str, Any], source: str, folder: Path) -> None:
+        tables = dict(tables)
+        if "sweep" not in tables:
+            message = "missing; this table says what is varied, and what is measured"
+            raise ConfigError([Problem(source, "sweep", message)])
+        try:
+            self.sweep = SweepFile.model_validate({"sweep": tables.pop("sweep")}).sweep
+        except ValidationError as error:
+            raise ConfigError(problems(error, source, SweepFile)) from None
+        self.tables: dict[str, Any] = tables
+        self._source = source
+        found: list[Problem] = []
+        self.axes = tuple(_axes(self.sweep, source, found))
+        found += _repeated(self.axes, source)
+        if found:
+            raise ConfigError(found)
+        self.measures: tuple[Measure, ...] = find_measures(self.sweep.measures, source, folder)
+        run = tables.get("run")
+        of_run = run.get("realizations", 1) if isinstance(run, Mapping) else 1
+        self.realizations: int = self.sweep.realizations or of_run
+        count = math.prod(self.shape)
+        if not isinstance(self.realizations, int) or count * self.realizations > MOST_POINTS:
+            message = f"asks for more than {MOST_POINTS} points"
+            raise ConfigError([Problem(source, "sweep", message)])
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Plan:
+        """Read the file of a sweep and what it is based on, lay changes over it, and check it.
+
+        Raises
+        ------
+        FileError
+            If a file cannot be read.
+        ConfigError
+            If anything in it is wrong.
+        """
+        path = Path(path)
+        return cls(override(read_toml(path), overrides), str(path), path.parent)
+
+    @classmethod
+    def from_dict(cls, tables: Mapping[str, Any], source: str = "sweep") -> Plan:
+        """Check a sweep given as nested tables; ``base`` and measures are files under them."""
+        return cls(on_base(tables, source, Path()), source, Path())
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of places along each axis."""
+        return tuple(len(axis.rows) for axis in self.axes)
+
+    @cached_property
+    def combinations(self) -> tuple[Combination, ...]:
+        """All combinations, in the order of the dataset.
+
+        Raises
+        ------
+        ConfigError
+            If some of them cannot be run; it says which, and why.
+        """
+        combinations, found, wrong = [], list[Problem](), 0
+        for place in itertools.product(*map(range, self.shape)):
+            values = {
+                key: value
+                for axis, number in zip(self.axes, place, strict=True)
+                for key, value in zip(axis.keys, axis.rows[number], strict=True)
+            }
+            changes = {**values, "run.realizations": 1}
+            try:
+                config = Config.from_dict(override(self.tables, [changes]), self._source)
+            except ConfigError as error:
+                wrong += 1
+                if wrong <= MOST_TOLD:
+                    source = f"{self._source}: point {described(values)}"
+                    found += [
+                        Problem(source, one.key, one.message, one.value) for one in error.problems
+                    ]
+                continue
+            combinations.append(Combination(place, values, config))
+        if wrong > MOST_TOLD:
+            message = f"{wrong} of {math.prod(self.shape)} combinations cannot be run"
+            found.append(Problem(self._source, "sweep", message))
+        if found:
+            raise ConfigError(found)
+        return tuple(combinations)
+
+    @property
+    def count(self) -> int:
+        """Number of points: realizations of all combinations."""
+        return math.prod(self.shape) * self.realizations
+
+
+def _axes(sweep: SweepTable, source: str, found: list[Problem]) -> Iterator[Axis]:
+    """The axes of a sweep; what is wrong with them is added to a list."""
+    for key, given in sweep.grid.items():
+        place = f'sweep.grid."{key}"'
+        values = _values(key, given, place, source, found)
+        if values:
+            yield Axis(key, (key,), tuple((value,) for value in values))
+    for number, group in enumerate(sweep.together):
+        name = f"sweep.together[{number}]"
+        columns = {
+            key: _values(key, given, f'{name}."{key}"', source, found)
+            for key, given in group.items()
+        }
+        lengths = {key: len(values) for key, values in columns.items() if values}
+        if not columns:
+            found.append(Problem(source, name, "names no keys"))
+        elif len(set(lengths.values())) > 1:
+            told = ", ".join(f"{key} has {length}" for key, length in lengths.items())
+            found.append(Problem(source, name, f"keys that go together need equally many: {told}"))
+        elif len(lengths) == len(columns):
+            yield Axis(
+                next(iter(columns)), tuple(columns), tuple(zip(*columns.values(), strict=True))
+            )
+    if sweep.latin_hypercube is not None:
+        yield from _latin_hypercube(sweep.latin_hypercube, source, found)
+
+
+def _kind(key: str, place: str, source: str, found: list[Problem]) -> KeyKind | None:
+    """What a swept key takes; None, and a problem, if it cannot be swept."""
+    kind = key_kind(key)
+    if kind is None:
+        near = nearest_keys(key)
+        meant = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+        found.append(Problem(source, place, f"unknown key{meant}"))
+        return None
+    if key == "run.realizations":
+        found.append(Problem(source, place, "cannot be varied; set sweep.realizations"))
+        return None
+    if not kind.is_single:
+        message = "takes a list or a table; only keys with one value can be varied"
+        found.append(Problem(source, place, message))
+        return None
+    return kind
+
+
+def _values(
+    key: str, given: object, place: str, source: str, found: list[Problem]
+) -> tuple[Value, ...]:
+    """Values of a key in SI; none, and a problem, if they are wrong."""
+    kind = _kind(key, place, source, found)
+    if kind is None:
+        return ()
+    if isinstance(given, Mapping):
+        return _range(kind, given, place, source, found)
+    if not isinstance(given, list | tuple) or not given:
+        message = (
+            "must be a list of values, or a range such as "
+            '{ from = "50 N/m", to = "400 N/m", points = 8, spacing = "logarithmic" }'
+        )
+        found.append(Problem(source, place, message, given))
+        return ()
+    before = len(found)
+    values = [
+        _value(kind, one, f"{place}[{number}]", source, found) for number, one in enumerate(given)
+    ]
+    return () if len(found) > before else tuple(values)
+
+
+def _value(kind: KeyKind, given: Any, place: str, source: str, found: list[Problem]) -> Value:
+    """A value of a key in SI."""
+    if kind.unit is not None:
+        try:
+            return to_si(given, kind.unit, kind.example)
+        except ValueError as error:
+            found.append(Problem(source, place, str(error), given))
+            return math.nan
+    if not isinstance(given, str | int | float) or (
+        kind.is_whole and (isinstance(given, bool) or not isinstance(given, int))
+    ):
+        wanted = "a whole number" if kind.is_whole else "one value"
+        found.append(Problem(source, place, f"must be {wanted}", given))
+        return math.nan
+    return given
+
+
+def _range(
+    kind: KeyKind, given: Mapping[str, Any], place: str, source: str, found: list[Problem]
+) -> tuple[Value, ...]:
+    """The values of a range."""
+    try:
+        wanted = Range.model_validate(given)
+    except ValidationError as error:
+        found += _inner_problems(error, source, place, Range)
+        return ()
+    ends = _ends(kind, wanted, place, source, found)
+    if ends is None:
+        return ()
+    return _spread(kind, ends, wanted.spacing, np.linspace(0, 1, wanted.points))
+
+
+def _inner_problems(
+    error: ValidationError, source: str, place: str, table: type[Table]
+) -> Iterator[Problem]:
+    for one in problems(error, source, table):
+        key = one.key.replace("from_", "from")
+        yield Problem(source, f"{place}.{key}", one.message.replace("from_", "from"), one.value)
+
+
+def _ends(
+    kind: KeyKind, wanted: Range | Extent, place: str, source: str, found: list[Problem]
+) -> tuple[float, float] | None:
+    """Both ends of a range, in SI; None, and a problem, if they are wrong."""
+    if kind.unit is None and not kind.is_whole:
+        found.append(Problem(source, place, "takes names, which have no range; give a list"))
+        return None
+    before = len(found)
+    first, last = (
+        float(_value(kind, end, f"{place}.{name}", source, found))
+        for name, end in (("from", wanted.from_), ("to", wanted.to))
+    )
+    if len(found) > before:
+        return None
+    if wanted.spacing == "logarithmic" and first * last <= 0:
+        message = "a logarithmic range needs both ends greater than 0, or both less"
+        found.append(Problem(source, place, message))
+        return None
+    if first == last and getattr(wanted, "points", 2) > 1:
+        found.append(Problem(source, place, "both ends are the same"))
+        return None
+    return first, last
+
+
+def _spread(
+    kind: KeyKind, ends: tuple[float, float], spacing: str, parts: Iterable[float]
+) -> tuple[Value, ...]:
+    """Values at parts of the way from one end to the other; the ends themselves are kept exact."""
+    first, last = ends
+    values: list[Value] = []
+    for part in parts:
+        if part in {0.0, 1.0}:
+            value = last if part else first
+        elif spacing == "logarithmic":
+            value = first * (last / first) ** float(part)
+        else:
+            value = first + (last - first) * float(part)
+        values.append(round(value) if kind.is_whole else value)
+    return tuple(values)
+
+
+def _latin_hypercube(given: Mapping[str, Any], source: str, found: list[Problem]) -> Iterator[Axis]:
+    """The axis of a Latin hypercube."""
+    name = "sweep.latin_hypercube"
+    numbers: dict[str, int] = {}
+    for key, default, least in (("points", 0, 1), ("seed", 1, 0)):
+        number = given.get(key, default)
+        if isinstance(number, bool) or not isinstance(number, int) or number < least:
+            message = f"must be a whole number of at least {least}"
+            found.append(Problem(source, f"{name}.{key}", message, given.get(key)))
+        else:
+            numbers[key] = number
+    before = len(found)
+    extents: dict[str, tuple[KeyKind, tuple[float, float], str]] = {}
+    for key, extent in given.items():
+        if key in {"points", "seed"}:
+            continue
+        place = f'{name}."{key}"'
+        kind = _kind(key, place, source, found)
+        if kind is None:
+            continue
+        try:
+            wanted = Extent.model_validate(extent)
+        except ValidationError as error:
+            found += _inner_problems(error, source, place, Extent)
+            continue
+        ends = _ends(kind, wanted, place, source, found)
+        if ends is not None:
+            extents[key] = kind, ends, wanted.spacing
+    if not extents and len(found) == before:
+        found.append(Problem(source, name, "names no keys to vary"))
+    if len(found) > before or len(numbers) < 2:
+        return
+    from scipy.stats import qmc
+
+    parts = qmc.LatinHypercube(len(extents), rng=np.random.default_rng(numbers["seed"])).random(
+        numbers["points"]
+    )
+    columns = [
+        _spread(kind, ends, spacing, part)
+        for (kind, ends, spacing), part in zip(extents.values(), parts.T, strict=True)
+    ]
+    yield Axis("sample", tuple(extents), tuple(zip(*columns, strict=True)))
+
+
+def _repeated(axes: Sequence[Axis], source: str) -> Iterator[Problem]:
+    """Keys that are varied twice, and values that are given twice."""
+    for key, count in Counter(key for axis in axes for key in axis.keys).items():
+        if count > 1:
+            yield Problem(source, "sweep", f"{key} is varied in two places")
+    for axis in axes:
+        for row, count in Counter(axis.rows).items():
+            if count > 1:
+                values = described(dict(zip(axis.keys, row, strict=True)))
+                yield Problem(source, "sweep", f"{values} is given {count} times")

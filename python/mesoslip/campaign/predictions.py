@@ -1,0 +1,75 @@
+"""Measures of what theory says of a configuration, to be drawn beside what its runs did."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mesoslip.configuration.config import Config
+from mesoslip.theory.force_curve import ForceCurve
+from mesoslip.theory.steady_sliding import steady_sliding
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Length of the force curve in mean breaking stretches: its steepest fall is the first one.
+CURVE_LENGTH = 3.0
+# Work that the stability of steady sliding may take, some tenths of a second.
+MOST_WORK = 10**6
+
+
+def _configuration(tree: xr.DataTree) -> Config:
+    """The configuration of a run, the same for all realizations."""
+    return Config.from_toml(tree.attrs["configuration"]).replace("run.seed=1")
+
+
+def growth_rate(tree: xr.DataTree) -> float:
+    """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
+    return _growth_rate(_configuration(tree))
+
+
+def stable_out_of_step(tree: xr.DataTree) -> float:
+    """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
+    return _stable_out_of_step(_configuration(tree))
+
+
+def critical_stiffness_ratio(tree: xr.DataTree) -> float:
+    """K* of the master equation over the stiffness of the spring."""
+    return _critical_stiffness_ratio(_configuration(tree))
+
+
+def waiting_over_damping(tree: xr.DataTree) -> float:
+    """Mean time between slips times the rate at which the setup's ringing is damped."""
+    from mesoslip.analysis.slips import slips
+
+    oscillator = _configuration(tree).slider.oscillator
+    waiting = slips(tree)["waiting_time"].values
+    waiting = waiting[np.isfinite(waiting)]
+    if oscillator is None or not waiting.size:
+        return math.nan
+    return float(waiting.mean() * oscillator.damping)
+
+
+# Realizations of a configuration come one after another.
+@lru_cache(maxsize=16)
+def _growth_rate(config: Config) -> float:
+    sliding = steady_sliding(config, MOST_WORK)
+    return math.nan if sliding is None else sliding.growth_rate
+
+
+@lru_cache(maxsize=16)
+def _stable_out_of_step(config: Config) -> float:
+    sliding = steady_sliding(config, MOST_WORK)
+    return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
+
+
+@lru_cache(maxsize=16)
+def _critical_stiffness_ratio(config: Config) -> float:
+    spring = config.spring_stiffness
+    if not 0 < spring < math.inf or config.contacts.ageing is not None:
+        return math.nan
+    length = CURVE_LENGTH * config.contacts.break_stretch
+    return ForceCurve(config.replace({"curve.length": length})).K_star[0] / spring

@@ -1,0 +1,28 @@
+"""``mesoslip example``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def example(
+    name: Annotated[
+        str | None, typer.Argument(help="Such as klein; a list by default", metavar="[NAME]")
+    ] = None,
+    file: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="File; NAME.toml here by default", metavar="FILE"),
+    ] = None,
+) -> None:
+    """List the runs that come with the program, or write one to start from."""
+    from mesoslip import api, examples
+
+    if name is None:
+        for known, title in examples.examples().items():
+            typer.echo(f"{known:14} {title}")
+        return
+    for written in api.example(name, file):
+        typer.echo(str(written), err=True)

@@ -1,0 +1,32 @@
+"""``mesoslip report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mesoslip.command_line.options import OutputsArgument
+
+
+def report(
+    outputs: OutputsArgument,
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Page; beside the first output by default", metavar="FILE.html"
+        ),
+    ] = None,
+) -> None:
+    """Write a page about an output, or about several of one command side by side."""
+    from mesoslip import api
+    from mesoslip.output import files
+
+    first = outputs[0]
+    path = page or first.parent / f"{first.stem or 'output'}.html"
+    there = [one for one in outputs if one.is_file()]
+    if there:
+        files.check_writable(path, there)
+    api.report(outputs, path)
+    typer.echo(str(path), err=True)

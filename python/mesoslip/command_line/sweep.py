@@ -1,0 +1,144 @@
+"""``mesoslip sweep``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mesoslip.command_line.options import SchedulerOption, SetOption
+from mesoslip.command_line.progress import progress_shown, say
+from mesoslip.command_line.signals import Stop, stopped_by_signals
+from mesoslip.errors import WriteError
+
+if TYPE_CHECKING:
+    from mesoslip.campaign.plan import Plan
+    from mesoslip.campaign.runner import Sweep
+
+# Failures of which each is told on the terminal.
+MOST_TOLD = 20
+# Exit status of a sweep that is not whole.
+FAILED = 1
+
+
+def sweep(
+    file: Annotated[Path, typer.Argument(help="TOML file of a sweep", metavar="SWEEP.toml")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"
+        ),
+    ] = None,
+    changes: SetOption = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Points at the same time; as many as processors by default"),
+    ] = None,
+    scheduler: SchedulerOption = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Tell what it will take, and run nothing")
+    ] = False,
+    pool: Annotated[
+        str,
+        typer.Option(
+            help="What points are computed on: threads, processes, or both: threads first, "
+            "processes in a sweep that takes long",
+            metavar="POOL",
+        ),
+    ] = "both",
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+) -> None:
+    """Run a configuration over a range of parameters, and write the measures of all runs.
+
+    Each point is kept in a folder beside the output, NAME.points, as soon as it is done. Called
+    again, the command does what is missing. The exit status is 1 if points failed.
+    """
+    from mesoslip import api
+    from mesoslip.campaign.store import Store, store_folder
+    from mesoslip.output import files
+
+    plan = api.as_plan(file, changes or ())
+    path = output or Path("out") / f"{file.stem}.nc"
+    folder = store_folder(path)
+    if dry_run:
+        _tell_estimate(plan, folder, workers)
+        return
+    # All of them are checked before anything is made.
+    _ = plan.combinations
+    files.check_writable(path, [file])
+    with Store(folder) as store, stopped_by_signals() as stop:
+        try:
+            with progress_shown(quiet) as progress:
+                done = api.run_plan(
+                    plan,
+                    store=store,
+                    workers=workers,
+                    scheduler=scheduler,
+                    pool=pool,
+                    progress=progress,
+                    stop=stop,
+                )
+        except WriteError as error:
+            kept = len(store.names())
+            raise WriteError(
+                f"{error}; {kept} points are kept: the same command goes on"
+            ) from error
+        status = _write(done, path, stop)
+    _tell(done, path, quiet)
+    if status:
+        raise typer.Exit(status)
+
+
+def _write(done: Sweep, path: Path, stop: Stop) -> int:
+    """Write the dataset, under another name if points are missing; the exit status."""
+    import xarray as xr
+
+    from mesoslip.output import files
+
+    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
+    files.write(xr.DataTree(done.dataset), path if done.complete else partial)
+    if done.complete:
+        partial.unlink(missing_ok=True)
+        return FAILED if done.failures else 0
+    say(
+        f"{path}: {done.ending}; {done.missing} of {done.dataset['status'].size} points are "
+        f"missing: the same command does them; what there is, is in {partial}"
+    )
+    return stop.exit_status if stop.is_set() else FAILED
+
+
+def _tell(done: Sweep, path: Path, quiet: bool) -> None:
+    for point, reason in list(done.failures.items())[:MOST_TOLD]:
+        say(f"{path}: failed: {point}: {reason}")
+    if len(done.failures) > MOST_TOLD:
+        say(f"{path}: {len(done.failures) - MOST_TOLD} more failed; see the attribute failures")
+    if not quiet and done.complete:
+        failed = f", {len(done.failures)} failed" if done.failures else ""
+        say(f"{path}: {done.computed} points computed, {done.taken} were there{failed}")
+
+
+def _tell_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
+    from mesoslip.campaign.estimate import estimate
+    from mesoslip.campaign.store import Points
+    from mesoslip.simulation.runner import checked_workers
+
+    count = checked_workers(workers)
+    told = estimate(plan, Points(folder), count)
+    axes = " x ".join(
+        [f"{len(axis.rows)} {' + '.join(axis.keys)}" for axis in plan.axes]
+        + [f"{plan.realizations} realization{'s' * (plan.realizations > 1)}"]
+    )
+    typer.echo(f"points   {told.points} ({axes}), {told.stored} of them done")
+    typer.echo(f"time     about {_duration(told.seconds)} with {count} workers")
+    typer.echo(f"memory   about {told.memory_bytes / 1e6:.0f} MB")
+    typer.echo(f"disk     about {told.disk_bytes / 1e6:.1f} MB")
+
+
+def _duration(seconds: float) -> str:
+    """A time as people tell it."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    if seconds < 6000:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.0f} h"

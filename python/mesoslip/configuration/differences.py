@@ -1,0 +1,118 @@
+"""What differs between configurations, key by key, with values as people write them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.keys import key_kind
+from mesoslip.configuration.units import with_unit
+
+# Characters of the longest value that is shown.
+LONGEST = 60
+MISSING = "not given"
+BOOKKEEPING = ("run.", "output.", "curve.")
+
+
+def is_bookkeeping(key: str) -> bool:
+    """Whether a key says how much is computed and kept, not what moves how."""
+    return key.startswith(BOOKKEEPING) and key != "run.engine"
+
+
+class Difference(NamedTuple):
+    """A key, and its value in each of the configurations that are compared, as text."""
+
+    key: str
+    values: tuple[str, ...]
+
+
+def differences(configs: Sequence[Config]) -> list[Difference]:
+    """The keys that configurations do not share, in the order of the file; titles do not count.
+
+    Keys of tables that some of them lack are compared with what is missing.
+    """
+    tables = [flat(config) for config in configs]
+    keys = dict.fromkeys(key for table in tables for key in table if key != "title")
+    found = []
+    for key in keys:
+        values = [table.get(key) for table in tables]
+        if any(value != values[0] for value in values):
+            found.append(Difference(key, tuple(text_of(key, value) for value in values)))
+    return found
+
+
+def flat(config: Config) -> dict[str, Any]:
+    """Values of a configuration by dotted key, those of defaults too; lists stay whole."""
+    return dict(_flat(config.to_dict(), ""))
+
+
+def _flat(table: Mapping[str, Any], outer: str) -> list[tuple[str, Any]]:
+    rows: list[tuple[str, Any]] = []
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            rows += _flat(value, f"{outer}{name}.")
+        else:
+            rows.append((outer + name, value))
+    return rows
+
+
+def text_of(key: str, value: Any) -> str:
+    """A value of a key in SI as a text with the unit that suits it, such as "0.5 ms"."""
+    if value is None:
+        return MISSING
+    if isinstance(value, list | tuple):
+        inner = ", ".join(_text_in_list(key, one) for one in value)
+        text = f"[{inner}]"
+        return text if len(text) <= LONGEST else f"{text[: LONGEST - 10]} … ({len(value)} in all)"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and math.isfinite(value):
+        kind = key_kind(key)
+        return with_unit(value, kind.unit if kind is not None and kind.unit else "1", 6)
+    return str(value)
+
+
+def _text_in_list(key: str, value: Any) -> str:
+    if isinstance(value, Mapping):
+        inner = ", ".join(text_of(f"{key}.{name}", one) for name, one in value.items())
+        return f"({inner})"
+    return text_of(key, value)
+
+
+def told(config: Config, base: Config) -> list[str]:
+    """What a configuration changes of another one, a text for each key.
+
+    What is computed and kept comes last. Keys that are gone, as with another kind of slider, and
+    defaults of new ones are not named.
+    """
+    own = dict(_flat(config.model_dump(exclude_none=True, exclude_defaults=True), ""))
+    texts: list[str] = []
+    last: list[str] = []
+    for key, (value, before) in differences([config, base]):
+        if value == MISSING or (before == MISSING and key not in own):
+            continue
+        text = f"{key} = {value}" + (f" (was {before})" if before != MISSING else "")
+        (last if is_bookkeeping(key) else texts).append(text)
+    return texts + last
+
+
+def labels(configs: Sequence[Config], names: Sequence[str]) -> list[str]:
+    """A label for each configuration that says how it differs from the others.
+
+    What is computed and kept counts only where nothing else differs. Names stand for
+    configurations that are all alike, and beside values that several of them share.
+    """
+    all_found = differences(configs)
+    found = [one for one in all_found if not is_bookkeeping(one.key)] or all_found
+    texts = []
+    for place, name in enumerate(names):
+        given = [one for one in found if one.values[place] != MISSING] or found
+        parts = [f"{one.key} = {one.values[place]}" for one in given[:3]]
+        parts += [f"and {len(given) - 3} more"] if len(given) > 3 else []
+        texts.append(", ".join(parts) if parts else name)
+    return [
+        text if texts.count(text) == 1 or not found else f"{name}: {text}"
+        for text, name in zip(texts, names, strict=True)
+    ]

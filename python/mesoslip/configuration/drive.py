@@ -1,0 +1,408 @@
+"""How the drive moves: the tables of the file, and the parts of it that the kernel is told.
+
+However a drive is given, it is run as parts one after another, in each of which the velocity
+changes linearly with time. Parts of one stage have its number.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import re
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+from pydantic import Field, StrictBool, model_validator
+
+from mesoslip.configuration.reading import text_of
+from mesoslip.configuration.table import (
+    ForceRate,
+    Length,
+    MeasuredLength,
+    MeasuredTime,
+    Rate,
+    Table,
+    Text,
+    Time,
+    Velocity,
+    Whole,
+    problem,
+)
+from mesoslip.configuration.units import to_si
+from mesoslip.errors import FileError
+
+# Parts of the longest drive.
+MOST_PARTS = 1_000_000
+
+# A column of a measured history: "displacement [um]".
+COLUMN = re.compile(r"\s*(?P<name>[a-z_ ]*[a-z_])\s*\[(?P<unit>[^\]]*)\]\s*")
+# The columns that are read, with the SI unit of each.
+COLUMNS = {"time": "s", "displacement": "m"}
+
+
+class DrivePart(NamedTuple):
+    """A part of the drive: its duration [s], the velocities at its start and end [m/s], between
+    which it changes linearly, or, for a drive by force, the rate of the force [N/s], and the number
+    of the stage that it is of, from 0."""
+
+    duration: float
+    start_velocity: float
+    end_velocity: float
+    stage: int
+
+    @property
+    def greatest_speed(self) -> float:
+        """Greatest speed in it [m/s]."""
+        return max(abs(self.start_velocity), abs(self.end_velocity))
+
+    @property
+    def way(self) -> float:
+        """Way of the drive in it, there and back both counted [m]."""
+        return self.way_in(self.duration)
+
+    @property
+    def directions(self) -> set[float]:
+        """Signs of the velocities in it that are not 0."""
+        velocities = (self.start_velocity, self.end_velocity)
+        return {math.copysign(1, one) for one in velocities if one}
+
+    def way_in(self, time: float) -> float:
+        """Way of the drive in its first so many seconds, there and back both counted [m]."""
+        if self.start_velocity == self.end_velocity:
+            return abs(self.start_velocity) * time
+        start, end = self.start_velocity, self._velocity_at(time)
+        if start * end >= 0:
+            return 0.5 * abs(start + end) * time
+        return 0.5 * time * (start**2 + end**2) / (abs(start) + abs(end))
+
+    def time_for(self, way: float) -> float:
+        """Time in which the drive goes a way, not longer than that of the part [s]."""
+        if self.start_velocity == self.end_velocity:
+            return way / abs(self.start_velocity)
+        acceleration = (self.end_velocity - self.start_velocity) / self.duration
+        turn = -self.start_velocity / acceleration
+        before = self.way_in(min(max(turn, 0.0), self.duration))
+        if turn > 0 and way > before:
+            return min(turn + math.sqrt(2 * (way - before) / abs(acceleration)), self.duration)
+        start = abs(self.start_velocity)
+        change = -abs(acceleration) if turn > 0 else abs(acceleration)
+        root = start + math.sqrt(max(0.0, start**2 + 2 * change * way))
+        return min(2 * way / root, self.duration) if root > 0 else 0.0
+
+    def cut(self, duration: float) -> DrivePart:
+        """The first so many seconds of it."""
+        if duration >= self.duration:
+            return self
+        return self._replace(duration=duration, end_velocity=self._velocity_at(duration))
+
+    def _velocity_at(self, time: float) -> float:
+        if time >= self.duration or self.start_velocity == self.end_velocity:
+            return self.end_velocity
+        change = self.end_velocity - self.start_velocity
+        return self.start_velocity + change * (time / self.duration)
+
+
+class Stage(Table):
+    """A stage of the drive, for a time or until the drive has gone a way: a constant velocity, of
+    either sign or zero; a ramp from one velocity to another; or a hold."""
+
+    duration: Annotated[Time, Field(gt=0)] | None = None
+    displacement: Annotated[Length, Field(gt=0)] | None = None
+    velocity: Velocity | None = None
+    start_velocity: Velocity | None = None
+    end_velocity: Velocity | None = None
+    hold: StrictBool | None = None
+
+    @model_validator(mode="after")
+    def _is_one_motion(self) -> Self:
+        ramp = (self.start_velocity, self.end_velocity)
+        given = [self.velocity is not None, ramp != (None, None), bool(self.hold)]
+        if sum(given) != 1:
+            raise problem(
+                "velocity",
+                "give "
+                + ("only one of " if any(given) else "")
+                + "a velocity, start_velocity with end_velocity, or hold = true",
+            )
+        if ramp.count(None) == 1:
+            missing = "start_velocity" if self.start_velocity is None else "end_velocity"
+            raise problem(missing, "missing; a ramp has start_velocity and end_velocity")
+        if (self.duration is None) == (self.displacement is None):
+            raise problem("duration", "give either a duration or a displacement")
+        if self.displacement is not None:
+            start, end = self._velocities
+            if start * end < 0:
+                raise problem(
+                    "displacement", "needs velocities of one sign; give a duration instead"
+                )
+            if start + end == 0:
+                raise problem("displacement", "is never reached at velocity 0; give a duration")
+        return self
+
+    @property
+    def _velocities(self) -> tuple[float, float]:
+        if self.hold:
+            return 0.0, 0.0
+        if self.velocity is not None:
+            return self.velocity, self.velocity
+        return self.start_velocity or 0.0, self.end_velocity or 0.0
+
+    def part(self, number: int) -> DrivePart:
+        """It as a part of the drive."""
+        start, end = self._velocities
+        duration = self.duration
+        if duration is None:
+            assert self.displacement is not None
+            speed = abs(start) if start == end else 0.5 * abs(start + end)
+            duration = self.displacement / speed
+        return DrivePart(duration, start, end, number)
+
+
+class Cycle(Table):
+    """A drive that goes forth and back: from the start to the amplitude, to minus the amplitude and
+    back, so many times. Each stroke is a stage."""
+
+    shape: Literal["triangle"] = "triangle"
+    amplitude: Annotated[Length, Field(gt=0)]
+    velocity: Annotated[Velocity, Field(gt=0)] | None = None
+    frequency: Annotated[Rate, Field(gt=0)] | None = None
+    cycles: Annotated[Whole, Field(ge=1, lt=MOST_PARTS // 2)]
+
+    @model_validator(mode="after")
+    def _has_a_speed(self) -> Self:
+        if (self.velocity is None) == (self.frequency is None):
+            raise problem("velocity", "give either a velocity or a frequency")
+        return self
+
+    @property
+    def speed(self) -> float:
+        """Speed of the drive; a cycle is four amplitudes long [m/s]."""
+        if self.velocity is not None:
+            return self.velocity
+        assert self.frequency is not None
+        return 4 * self.amplitude * self.frequency
+
+    def parts(self) -> Iterator[DrivePart]:
+        """The strokes."""
+        last = 2 * self.cycles
+        for number in range(last + 1):
+            way = self.amplitude if number in {0, last} else 2 * self.amplitude
+            velocity = self.speed if number % 2 == 0 else -self.speed
+            yield DrivePart(way / self.speed, velocity, velocity, number)
+
+
+class History(Table):
+    """A measured history: displacements of the drive at times, from the first on, and straight
+    lines between them. A file is read once; what is kept are its points."""
+
+    file: Text | None = None
+    time: tuple[MeasuredTime, ...] | None = None
+    displacement: tuple[MeasuredLength, ...] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping) or not isinstance(values.get("file"), str):
+            return values
+        if values.keys() & COLUMNS.keys():
+            raise problem("file", "give either a file, or time and displacement")
+        try:
+            points = read_history(Path(values["file"]))
+        except (FileError, ValueError) as error:
+            raise problem("file", str(error)) from None
+        return {**{key: one for key, one in values.items() if key != "file"}, **points}
+
+    @model_validator(mode="after")
+    def _is_a_motion(self) -> Self:
+        if self.time is None or self.displacement is None:
+            raise problem("file", "missing; give a file, or time and displacement")
+        if len(self.time) != len(self.displacement):
+            raise problem("displacement", "must have as many values as time")
+        if len(self.time) < 2:
+            raise problem("time", "must have two values at least")
+        if len(self.time) > MOST_PARTS:
+            raise problem("time", f"has more than {MOST_PARTS} values")
+        for before, after in itertools.pairwise(self.time):
+            if not after > before:
+                raise problem("time", f"must grow; {after:g} s comes after {before:g} s")
+        for part in self.parts():
+            if part.greatest_speed > 3e8:
+                raise problem("displacement", f"moves at {part.greatest_speed:g} m/s")
+        return self
+
+    def parts(self) -> Iterator[DrivePart]:
+        """The lines between the points, all of one stage."""
+        points = zip(self.time or (), self.displacement or (), strict=True)
+        for (time, place), (next_time, next_place) in itertools.pairwise(points):
+            velocity = (next_place - place) / (next_time - time)
+            yield DrivePart(next_time - time, velocity, velocity, 0)
+
+
+def read_history(path: Path) -> dict[str, list[float]]:
+    """Points of a measured history of the drive [s, m].
+
+    Parameters
+    ----------
+    path
+        A CSV file. Its header names the columns with their units, ``time [s]`` first and
+        ``displacement [um]`` anywhere; others are not read.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    ValueError
+        If it is no such table: which line, and what would be right.
+    """
+    rows = list(csv.reader(text_of(path, "a history of the drive").splitlines()))
+    while rows and not any(cell.strip() for cell in rows[-1]):
+        rows.pop()
+    if not rows:
+        raise ValueError(f"{path}: is empty")
+    try:
+        places = _columns(rows[0])
+    except ValueError as error:
+        raise ValueError(f"{path}, line 1: {error}") from None
+    if len(rows) < 3:
+        raise ValueError(f"{path}: must have two rows of numbers at least")
+    points: dict[str, list[float]] = {name: [] for name in COLUMNS}
+    for line, row in enumerate(rows[1:], 2):
+        for name, (place, factor) in places.items():
+            cell = row[place].strip() if place < len(row) else ""
+            if not cell:
+                raise ValueError(f"{path}, line {line}: the {name} is missing")
+            try:
+                number = factor * float(cell)
+            except ValueError:
+                number = math.nan
+            if not math.isfinite(number):
+                raise ValueError(f"{path}, line {line}: the {name}, {cell!r}, is no finite number")
+            points[name].append(number)
+        times = points["time"]
+        if len(times) > 1 and not times[-1] > times[-2]:
+            raise ValueError(f"{path}, line {line}: the time must grow from row to row")
+    return points
+
+
+def _columns(header: list[str]) -> dict[str, tuple[int, float]]:
+    """Place of each column that is read, and its unit in SI."""
+    wanted = "the header must name the columns with units, such as time [s],displacement [um]"
+    places: dict[str, tuple[int, float]] = {}
+    for place, cell in enumerate(header):
+        match = COLUMN.fullmatch(cell.strip().removeprefix("\ufeff"))
+        name = match["name"] if match else cell.strip().removeprefix("\ufeff")
+        if name not in COLUMNS:
+            continue
+        if match is None:
+            raise ValueError(f"the {name} has no unit; {wanted}")
+        if name in places:
+            raise ValueError(f"there are two columns {name}")
+        unit = match["unit"].strip()
+        try:
+            places[name] = place, to_si(f"1 {unit}", COLUMNS[name], f"1 {COLUMNS[name]}")
+        except ValueError:
+            raise ValueError(
+                f"the {name} is in {unit!r}, which is no unit of {name}; {wanted}"
+            ) from None
+    for name in COLUMNS:
+        if name not in places:
+            raise ValueError(f"there is no column {name}; {wanted}")
+    if places["time"][0] != 0:
+        raise ValueError("the first column must be the time")
+    return places
+
+
+class Drive(Table):
+    """How the drive moves: at one velocity; in stages, which may be repeated; forth and back; along
+    a measured history; or as a force that grows."""
+
+    velocity: Velocity | None = None
+    stage: tuple[Stage, ...] | None = None
+    repeat: Annotated[Whole, Field(ge=1, le=MOST_PARTS)] | None = None
+    cycle: Cycle | None = None
+    history: History | None = None
+    force_rate: ForceRate | None = None
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> Self:
+        ways = [self.velocity, self.stage, self.cycle, self.history, self.force_rate]
+        if ways.count(None) != len(ways) - 1:
+            raise problem(
+                "velocity",
+                "give either a velocity, [[drive.stage]] tables, [drive.cycle], [drive.history], "
+                "or a force_rate to a quasistatic slider",
+            )
+        if self.force_rate == 0:
+            raise problem("force_rate", "must not be 0")
+        if self.stage is not None and not self.stage:
+            raise problem("stage", "must have at least one stage")
+        if self.repeat is not None:
+            if self.stage is None:
+                raise problem("repeat", "needs [[drive.stage]] tables, which it repeats")
+            if self.repeat * len(self.stage) > MOST_PARTS:
+                raise problem("repeat", f"makes more than {MOST_PARTS} stages")
+        return self
+
+    @cached_property
+    def parts(self) -> tuple[DrivePart, ...]:
+        """What is given of it; none if it has one velocity or rate without end."""
+        if self.stage is not None:
+            once = [one.part(0) for one in self.stage]
+            times = range(self.repeat or 1)
+            return tuple(
+                part._replace(stage=turn * len(once) + number)
+                for turn in times
+                for number, part in enumerate(once)
+            )
+        given = self.cycle or self.history
+        return () if given is None else tuple(given.parts())
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether it may go on, at its last velocity, when what is given of it is over."""
+        return self.cycle is None and self.history is None
+
+    @cached_property
+    def length(self) -> float:
+        """How long it lasts [s]; infinite if it has one velocity or rate without end."""
+        return math.fsum(part.duration for part in self.parts) if self.parts else math.inf
+
+    @property
+    def last_velocity(self) -> float:
+        """Velocity at which it goes on [m/s], or the rate of the force [N/s]."""
+        if self.parts:
+            return self.parts[-1].end_velocity
+        return (self.velocity if self.force_rate is None else self.force_rate) or 0.0
+
+    def time_for(self, way: float) -> float:
+        """Time in which it goes a way, there and back both counted [s]; infinite if it does not."""
+        time = 0.0
+        for part in self.parts:
+            if part.way >= way:
+                return time + part.time_for(way)
+            time += part.duration
+            way -= part.way
+        speed = abs(self.last_velocity) if self.goes_on else 0.0
+        return time + way / speed if speed > 0 else math.inf
+
+    def until(self, duration: float) -> tuple[DrivePart, ...]:
+        """Its parts until a time [s]: the last of several goes on at its last velocity."""
+        parts: list[DrivePart] = []
+        left = duration
+        for part in self.parts:
+            parts.append(part.cut(left))
+            left -= parts[-1].duration
+            if left <= 0:
+                break
+        if left > 0 or not parts:
+            velocity = self.last_velocity
+            last = parts[-1] if parts else DrivePart(0.0, velocity, velocity, 0)
+            if last.start_velocity == velocity and last.end_velocity == velocity:
+                parts[-1:] = [last._replace(duration=last.duration + left)]
+            elif left > 1e-12 * duration:
+                # A ramp that is over.
+                parts.append(DrivePart(left, velocity, velocity, last.stage + 1))
+        return tuple(parts)

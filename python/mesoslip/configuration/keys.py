@@ -1,0 +1,101 @@
+"""What the dotted keys of a configuration take: quantities and their unit, or whole numbers, ..."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, get_args, get_origin
+
+from pydantic import BeforeValidator
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.messages import all_keys, tables_in
+from mesoslip.configuration.table import Table
+
+
+@dataclass(frozen=True)
+class KeyKind:
+    """What a key takes.
+
+    Attributes
+    ----------
+    unit
+        Unit of a quantity, such as "N/m", "1" for a plain number; None for whole numbers and names.
+    example
+        What a good quantity looks like.
+    is_whole
+        Whether it takes a whole number.
+    is_single
+        Whether it takes one value, not a list or a table.
+    """
+
+    unit: str | None
+    example: str
+    is_whole: bool
+    is_single: bool
+
+    @property
+    def cf_units(self) -> str | None:
+        """The unit as CF writes it, such as "N m-1"; None for names."""
+        if self.unit is None:
+            return "1" if self.is_whole else None
+        above, _, below = self.unit.replace("^", "").partition("/")
+        parts = [part for part in (above,) if part != "1"]
+        if below:
+            name = below.rstrip("0123456789")
+            parts.append(f"{name}-{below[len(name) :] or '1'}")
+        return " ".join(parts) or "1"
+
+
+@cache
+def key_kind(key: str) -> KeyKind | None:
+    """What a dotted key takes, such as "contacts.delay"; None if there is no such key."""
+    *outer, last = key.split(".")
+    tables: list[type[Table]] = [Config]
+    for name in outer:
+        tables = [
+            inner
+            for table in tables
+            if name in table.model_fields
+            for inner in tables_in(table.model_fields[name].annotation)
+        ]
+    fields = [table.model_fields[last] for table in tables if last in table.model_fields]
+    if not fields:
+        return None
+    parts = [
+        part for field in fields for part in (*field.metadata, *_parts(field.annotation), field)
+    ]
+    quantities = [
+        part.func.keywords
+        for part in parts
+        if isinstance(part, BeforeValidator)
+        and isinstance(part.func, partial)
+        and "unit" in part.func.keywords
+    ]
+    several = any(
+        get_origin(part) is tuple or (isinstance(part, type) and issubclass(part, Table))
+        for part in parts
+    )
+    return KeyKind(
+        unit=quantities[0]["unit"] if quantities else None,
+        example=quantities[0]["example"] if quantities else "",
+        is_whole=int in parts,
+        is_single=not several,
+    )
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """Everything that an annotation is made of."""
+    yield annotation
+    for part in get_args(annotation):
+        yield from _parts(part)
+
+
+def nearest_keys(key: str) -> list[str]:
+    """Known keys that a wrong one may stand for."""
+    known = list(dict.fromkeys(all_keys(Config)))
+    name = key.rpartition(".")[2]
+    elsewhere = [one for one in known if one.rpartition(".")[2] == name]
+    return elsewhere or difflib.get_close_matches(key, known, 1)

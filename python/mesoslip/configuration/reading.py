@@ -1,0 +1,48 @@
+"""Text files that a user names."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from mesoslip.errors import FileError
+
+# Size of the longest file that is read [bytes]; a million stages take less.
+LONGEST_FILE = 2**26
+
+
+def text_of(path: Path, kind: str) -> str:
+    """Text of a file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        What it is to be, such as "a configuration file".
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, is no regular file, which may have no end, or is too long.
+    """
+    try:
+        state = path.stat()
+        if stat.S_ISDIR(state.st_mode):
+            raise FileError(f"{path}: is a directory, not {kind}")
+        if not stat.S_ISREG(state.st_mode):
+            raise FileError(f"{path}: is not a regular file")
+        if state.st_size > LONGEST_FILE:
+            raise FileError(
+                f"{path}: {state.st_size / 2**20:.0f} MiB are too much for {kind}, "
+                f"which may have {LONGEST_FILE / 2**20:.0f} MiB"
+            )
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such file") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not a text in UTF-8: {error.reason}") from None
+    except ValueError as error:
+        raise FileError(f"{path!r}: is not the name of a file: {error}") from None

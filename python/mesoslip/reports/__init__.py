@@ -1,0 +1,1 @@
+"""Reports: a page that tells all that an output holds."""

@@ -1,0 +1,121 @@
+"""The source's claims: that each is judged, by what was measured and not otherwise."""
+
+from __future__ import annotations
+
+import json
+
+import mesoslip
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import ROOT
+from mesoslip.campaign.claims import CLAIMS, Verdict, judge
+from mesoslip.campaign.claims.base import configuration
+from mesoslip.campaign.claims.page import as_markdown, as_table
+from mesoslip.output import files
+
+# Outputs of other commands that claims use.
+COMMANDS = {".curve": "curve", ".onset": "onset"}
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory):
+    """A folder with cheap outputs of Klein's case."""
+    folder = tmp_path_factory.mktemp("outputs")
+    (folder / "claims").mkdir()
+    short = ["run.duration=8s", "run.realizations=3", "contacts.count=500"]
+    files.write(
+        mesoslip.run(mesoslip.Config.load(ROOT / "runs" / "klein.toml", short)),
+        folder / "claims" / "klein.nc",
+    )
+    files.write(mesoslip.curve(ROOT / "runs" / "S18.toml"), folder / "S18.curve.nc")
+    for name in ("S19a", "S19b"):
+        tree = mesoslip.onset(ROOT / "runs" / f"{name}.toml")
+        files.write(tree, folder / f"{name}.onset.nc")
+    return folder
+
+
+def test_there_are_sixteen_and_their_runs_exist():
+    assert list(CLAIMS) == [f"C{number}" for number in range(1, 17)]
+    for claim in CLAIMS.values():
+        assert claim.criterion
+        for run in claim.runs:
+            for ending in COMMANDS:
+                run = run.removesuffix(ending)
+            assert (ROOT / "runs" / f"{run}.toml").exists()
+
+
+def test_every_run_of_claims_is_used():
+    used = {run for claim in CLAIMS.values() for run in claim.runs}
+    for path in (ROOT / "runs" / "claims").glob("*.toml"):
+        assert f"claims/{path.stem}" in used
+        mesoslip.Config.load(path)
+
+
+def verdicts(outputs, *names):
+    return {one.claim.name: one.finding.verdict for one in judge(names, outputs)}
+
+
+def test_claims_of_numbers_and_curves(outputs):
+    assert verdicts(outputs, "C1", "C2", "C14", "C16") == {
+        "C1": Verdict.QUALIFIED,
+        "C2": Verdict.QUALIFIED,
+        "C14": Verdict.QUALIFIED,
+        "C16": Verdict.FAILS,
+    }
+
+
+def test_claims_of_slips(outputs):
+    assert verdicts(outputs, "C3", "C4") == {"C3": Verdict.HOLDS, "C4": Verdict.QUALIFIED}
+
+
+def changed(tree, group, name, change):
+    """An output with other values of a variable."""
+    datasets = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    variable = datasets[group][name]
+    datasets[group] = datasets[group].assign({name: (variable.dims, change(variable.values))})
+    return xr.DataTree.from_dict(datasets)
+
+
+def judged(name, *trees):
+    return CLAIMS[name].judge(trees).verdict
+
+
+def test_what_is_otherwise_fails(outputs):
+    """Claims are judged by the outputs: other ones give another verdict."""
+    klein = files.read(outputs / "claims" / "klein.nc")
+    flat = changed(klein, "/slips", "force_before", lambda values: np.full_like(values, 1e-5))
+    assert judged("C3", flat) is Verdict.FAILS
+    slow = changed(klein, "/slips", "peak_velocity", lambda values: 0.1 * values)
+    assert judged("C4", slow) is Verdict.FAILS
+    curve = files.read(outputs / "S18.curve.nc")
+    rising = changed(curve, "/", "contact_force", lambda values: np.sort(values))
+    assert judged("C2", rising) is Verdict.FAILS
+    bent = changed(curve, "/", "contact_force", lambda values: np.abs(values) ** 1.1)
+    assert judged("C2", bent) is Verdict.FAILS
+    onsets = [files.read(outputs / f"S19{one}.onset.nc") for one in "ab"]
+    quadratic = changed(
+        onsets[0],
+        "/sequential",
+        "relative_force_drop",
+        lambda _: -(onsets[0]["sequential"]["onset_time"].values ** 2),
+    )
+    assert judged("C14", quadratic, onsets[1]) is Verdict.FAILS
+
+
+def test_what_is_told(outputs):
+    judgements = judge(["C4", "C14"], outputs)
+    page = as_markdown(judgements)
+    assert "2 holds with a qualification" in page
+    assert "| [C4](#c4) |" in page
+    told = as_table(judgements)
+    assert json.loads(json.dumps(told))[0]["measured"][0]["standard_deviation"] < 0.1
+    assert len(told[0]["measured"][0]["values"]) == 3
+    assert configuration(files.read(outputs / "claims" / "klein.nc")).contacts.count == 500
+
+
+def test_mistakes(outputs):
+    with pytest.raises(mesoslip.ConfigError, match="no such claim; choose of C1"):
+        judge(["C17"], outputs)
+    with pytest.raises(mesoslip.FileError, match=r"make them first: make .*delay-0\.nc"):
+        judge(["C6"], outputs)

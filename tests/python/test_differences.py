@@ -1,0 +1,114 @@
+"""Units in which numbers are read, and what configurations change of each other."""
+
+from __future__ import annotations
+
+import mesoslip
+import pytest
+import tomli_w
+from conftest import ROOT, klein_tables
+from mesoslip.configuration import differences
+from mesoslip.configuration.units import scale_for, to_si, with_unit
+
+KLEIN = ROOT / "runs" / "klein.toml"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (18e-6, "N", "18 µN"),
+        (-5e3, "N", "-5 kN"),
+        (1e-7, "m/s", "100 nm/s"),
+        (1.47e-3, "kg", "1.47 g"),
+        (2e6, "kg", "2e+06 kg"),
+        (97, "N/m", "97 N/m"),
+        (2e11, "1/s", "2e+11 1/s"),
+        (1e-10, "m^2", "1e-10 m^2"),
+        (0.0, "m", "0 m"),
+        (5e-4, "s", "500 µs"),
+        (4000.0, "s", "4000 s"),
+        (7200.0, "s", "120 min"),
+        (86400.0 * 30, "s", "30 d"),
+        (0.25, "1", "0.25"),
+        (1e-30, "m", "1e-12 am"),
+    ],
+)
+def test_a_number_is_told_in_the_unit_that_suits_it(value, unit, text):
+    assert with_unit(value, unit) == text
+    if unit != "1":
+        assert to_si(text, unit, "") == pytest.approx(value)
+
+
+@pytest.mark.parametrize("exponent", range(-18, 10))
+def test_what_is_shown_has_at_most_three_digits_before_the_point(exponent):
+    for factor in (1.0, 3.3, 9.99):
+        size = factor * 10.0**exponent
+        assert 1 - 1e-6 <= size / scale_for(size, "N").size < 1000
+
+
+def test_a_configuration_knows_what_it_was_laid_over(tmp_path):
+    plain = mesoslip.Config.load(KLEIN)
+    assert plain.base is None
+    changed = mesoslip.Config.load(KLEIN, ["contacts.delay=2 ms"])
+    assert changed.base == plain
+    assert differences.told(changed, plain) == ["contacts.delay = 2 ms (was 500 µs)"]
+    (tmp_path / "mine.toml").write_text(f'base = "{KLEIN}"\n[slider]\nmass = "2 g"\n')
+    mine = mesoslip.Config.load(tmp_path / "mine.toml", ["run.seed=7"])
+    assert mine.base == plain
+    assert differences.told(mine, plain) == [
+        "slider.mass = 2 g (was 1.47 g)",
+        "run.seed = 7 (was 1)",
+    ]
+    assert plain.replace("run.seed=3").base == plain
+    # What it was laid over is of no consequence.
+    assert plain.replace("run.seed=3") == mesoslip.Config.load(KLEIN, ["run.seed=3"])
+    assert plain.replace("run.seed=3").replace("run.seed=1") == plain
+    assert len({plain, plain.replace("run.seed=1"), mine}) == 2
+
+
+def test_a_base_that_cannot_be_run_by_itself_is_none(tmp_path):
+    (tmp_path / "part.toml").write_text("[run]\nduration = 1\n")
+    tables = klein_tables()
+    del tables["run"]
+    (tmp_path / "whole.toml").write_text('base = "part.toml"\n' + tomli_w.dumps(tables))
+    assert mesoslip.Config.load(tmp_path / "whole.toml").base is None
+
+
+def test_an_output_tells_what_its_run_changes(tmp_path, command):
+    config = mesoslip.Config.load(KLEIN, ["run.duration=1 ms", "output.interval=1 ms"])
+    tree = mesoslip.run(config)
+    assert mesoslip.Config.from_toml(tree.attrs["base_configuration"]) == config.base
+    # Also when it is run again, unless something is changed then.
+    first, again, other = (tmp_path / f"{name}.nc" for name in ("first", "again", "other"))
+    changes = ("--set", "run.duration=1 ms", "--set", "output.interval=1 ms")
+    assert command("run", KLEIN, "-o", first, "--quiet", *changes)[0] == 0
+    assert command("run", first, "-o", again, "--quiet")[0] == 0
+    assert command("run", first, "-o", other, "--quiet", "--set", "run.seed=2")[0] == 0
+    bases = [mesoslip.read(path).attrs["base_configuration"] for path in (first, again, other)]
+    assert bases[0] == bases[1] == tree.attrs["base_configuration"]
+    assert bases[2] == tree.attrs["configuration"]
+
+
+def test_labels_name_what_differs(klein):
+    slow, fast = klein(contacts__delay=1e-3), klein(contacts__delay=1e-4, run__seed=2)
+    assert differences.labels([slow, fast], ["a", "b"]) == [
+        "contacts.delay = 1 ms",
+        "contacts.delay = 100 µs",
+    ]
+    # What is computed counts where nothing else differs, names where nothing does.
+    assert differences.labels([klein(), klein(run__seed=2)], ["a", "b"]) == [
+        "run.seed = 1",
+        "run.seed = 2",
+    ]
+    assert differences.labels([klein(), klein()], ["a", "b"]) == ["a", "b"]
+    labels = differences.labels([slow, fast, fast], ["a", "b", "c"])
+    assert labels == [
+        "contacts.delay = 1 ms",
+        "b: contacts.delay = 100 µs",
+        "c: contacts.delay = 100 µs",
+    ]
+
+
+def test_stages_are_told(klein):
+    stages = [{"duration": 4, "velocity": 1e-7}, {"duration": 1, "velocity": 0}]
+    turned = klein(drive={"stage": stages})
+    assert differences.told(turned, klein()) == ["drive.stage = [(4 s, 100 nm/s), (1 s, 0 m/s)]"]

@@ -1,0 +1,99 @@
+"""What comes with the program: its runs in the wheel, and what is told if a library is missing."""
+
+from __future__ import annotations
+
+import subprocess
+from importlib.metadata import files
+
+import mesoslip
+import pytest
+from conftest import ROOT
+from mesoslip import examples
+
+
+def tracked(folder):
+    """Files of the repository in a folder."""
+    listed = subprocess.run(
+        ["git", "ls-files", folder], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return [line for line in listed.stdout.splitlines() if (ROOT / line).exists()]
+
+
+def test_the_wheel_has_all_that_is_needed():
+    """Its record: every file of the package, the kernels, and every run."""
+    there = {str(one) for one in files("mesoslip")}
+    for path in tracked("python/mesoslip"):
+        if path.endswith((".py", ".pyi", ".html", "py.typed")):
+            assert path.removeprefix("python/") in there, path
+    for path in tracked("runs"):
+        assert f"mesoslip/{path}" in there, path
+    assert any(one.startswith("mesoslip/_core.") and one.endswith(".so") for one in there)
+    assert any(one.endswith("licenses/LICENSE") for one in there)
+    # Nothing of others.
+    assert all(one.startswith(("mesoslip", "../../../bin/")) for one in there)
+
+
+def test_the_source_archive_leaves_no_run_out():
+    attributes = ROOT / ".gitattributes"
+    assert not attributes.exists() or "export-ignore" not in attributes.read_text()
+    assert "runs/klein.toml" in tracked("runs")
+
+
+@pytest.mark.parametrize("name", ["klein", "S22c", "limit-2"])
+def test_an_example_is_the_run_of_the_repository(name, tmp_path):
+    written = mesoslip.example(name, tmp_path / "new" / "mine.toml")
+    assert written[0] == tmp_path / "new" / "mine.toml"
+    own = mesoslip.Config.load(written[0])
+    assert own == mesoslip.Config.load(ROOT / "runs" / f"{name}.toml")
+    assert written[0].read_text() == (ROOT / "runs" / f"{name}.toml").read_text()
+    assert {one.name for one in written[1:]} == {
+        "klein": set(),
+        "S22c": {"klein.toml"},
+        "limit-2": {"limit-me.toml", "klein.toml"},
+    }[name]
+
+
+def test_every_example_is_listed_with_its_title(command):
+    status, shown, _ = command("example")
+    assert status == 0
+    assert "klein" in shown
+    assert "Klein 2007: OMCTS between mica" in shown
+    assert all(title for title in examples.examples().values())
+
+
+def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "klein.toml").write_text("mine")
+    status, _, errors = command("example", "klein")
+    assert status == 2
+    assert "klein.toml: is there already" in errors
+    # What it is based on is there, and stays.
+    assert command("example", "S20")[0] == 0
+    assert (tmp_path / "klein.toml").read_text() == "mine"
+    assert (tmp_path / "S20.toml").exists()
+    status, _, errors = command("example", "kleim")
+    assert status == 2
+    assert "choose of klein" in errors
+    assert command("example", "klein", "-o", "/dev/null/x.toml")[0] == 2
+
+
+def test_a_base_elsewhere_comes_to_stand_beside_the_example(tmp_path, monkeypatch):
+    (tmp_path / "runs" / "fit").mkdir(parents=True)
+    (tmp_path / "runs" / "klein.toml").write_text('title = "first"\n')
+    (tmp_path / "runs" / "fit" / "one.toml").write_text('# One.\nbase = "../klein.toml"\n')
+    monkeypatch.setattr(examples, "_folder", lambda: tmp_path / "runs")
+    assert examples.examples() == {"fit/one": "One.", "klein": "first"}
+    written = examples.example("fit/one", tmp_path / "here" / "one.toml")
+    assert [one.name for one in written] == ["one.toml", "klein.toml"]
+    assert 'base = "klein.toml"' in written[0].read_text()
+
+
+def test_a_missing_library_is_told_in_a_line(monkeypatch, command):
+    def broken():
+        raise ImportError("libsundials_cvode.so.6: cannot open shared object file")
+
+    monkeypatch.setattr(examples, "examples", broken)
+    status, _, errors = command("example")
+    assert status == 1
+    assert "libsundials-fortran-dev" in errors
+    assert errors.count("\n") == 1

@@ -1,0 +1,229 @@
+"""Which motion it is: the rules, and what they say of runs of every kind."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import ROOT
+from mesoslip.analysis.regime import (
+    IRREGULAR,
+    REGIME,
+    SMOOTH,
+    STICK_SLIP,
+    TRANSIENT,
+    judge,
+)
+
+TIME = np.linspace(0.0, 1.0, 20001)
+
+
+def study():
+    """The study with the independent judge."""
+    path = ROOT / "tests" / "studies" / "regimes.py"
+    spec = importlib.util.spec_from_file_location("regimes_study", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def sawtooth(periods, falls):
+    """A force that rises in periods [s], and then falls at once."""
+    ends = np.cumsum(periods)
+    force = np.interp(
+        TIME,
+        np.ravel([np.concatenate([[0], ends[:-1]]), ends - 1e-4], order="F"),
+        np.ravel([1 - np.concatenate([falls[:1], falls[:-1]]), np.ones(len(falls))], order="F"),
+    )
+    return 1e-5 * force
+
+
+def judged(config, force, velocity=None):
+    velocity = np.full(len(TIME), 1e-7) if velocity is None else velocity
+    return judge(config, TIME, force, velocity, np.empty(0), np.empty(0))
+
+
+def test_noise_of_steady_contacts_is_smooth(klein):
+    """0.6 N^(-1/2) of the static force, which with few contacts is much."""
+    rng = np.random.default_rng(1)
+    config = klein(contacts__count=100)
+    noise = np.convolve(rng.normal(size=len(TIME)), np.ones(20) / np.sqrt(20), "same")
+    force = 1e-5 + 0.035 * 18e-6 * noise
+    found = judged(config, force)
+    assert found.regime == SMOOTH
+    assert found.relative_amplitude < found.smooth_amplitude
+    # The same of ten thousand contacts is more than noise.
+    assert judged(klein(contacts__count=10_000), force).regime != SMOOTH
+
+
+def test_a_sawtooth_is_stick_slip(klein):
+    found = judged(klein(), sawtooth(np.full(60, 1 / 50), np.full(60, 0.8)))
+    assert found.regime == STICK_SLIP
+    assert found.period == pytest.approx(1 / 50, rel=1e-3)
+    assert found.period_variation < 0.02
+    assert found.relative_amplitude == pytest.approx(0.45 * 0.8 / 0.6, rel=0.02)
+    assert found.cycles == 49
+
+
+def test_what_alternates_is_regular(klein):
+    """Large and small slips in turn: the periods vary, pairs of them do not."""
+    periods, falls = np.tile([0.024, 0.012], 40), np.tile([0.8, 0.4], 40)
+    found = judged(klein(), sawtooth(periods, falls))
+    assert found.regime == STICK_SLIP
+    assert found.period_variation > 0.3
+    assert found.period_irregularity < 0.02
+    assert found.fall_irregularity < 0.02
+
+
+def test_random_slips_are_irregular(klein):
+    rng = np.random.default_rng(2)
+    random = judged(klein(), sawtooth(rng.exponential(0.015, 400) + 2e-3, np.full(400, 0.8)))
+    assert random.regime == IRREGULAR
+    falls = np.where(rng.random(100) < 0.5, 0.8, 0.42)
+    assert judged(klein(), sawtooth(np.full(100, 0.012), falls)).fall_irregularity > 0.25
+
+
+def test_what_dies_away_is_not_settled(klein):
+    config = klein(contacts__count=1_000_000)
+    for rate, regime in [(0.0, STICK_SLIP), (0.2, STICK_SLIP), (2.0, TRANSIENT), (15.0, TRANSIENT)]:
+        force = 1e-5 * (1 + 0.5 * np.exp(-rate * TIME) * np.sin(300 * TIME))
+        assert judged(config, force).regime == regime
+    # Died away, before and within what is judged.
+    assert judged(config, 1e-5 * (1 + np.exp(-60 * TIME - 4))).regime == SMOOTH
+
+
+def test_a_run_that_ends_too_soon_is_transient(klein):
+    assert judged(klein(), 1e-5 * TIME).regime == TRANSIENT
+    assert judged(klein(), sawtooth([0.6, 0.6], [0.8, 0.8])).regime == TRANSIENT
+    # The drive has not moved by a breaking stretch.
+    slow = klein(drive__velocity=1e-9)
+    assert judged(slow, np.full(len(TIME), 1e-5)).regime == TRANSIENT
+    assert judge(slow, *np.empty((3, 0)), np.empty(0), np.empty(0)).regime == TRANSIENT
+
+
+def test_the_rebound_of_a_slip_is_no_cycle(klein):
+    """A slip overshoots and swings back at once: how far is not seen by all samples."""
+    rng = np.random.default_rng(3)
+    force = sawtooth(np.full(60, 1 / 40), np.full(60, 0.6))
+    ends = np.flatnonzero(np.diff(force) < -1e-6)
+    for end in ends:
+        force[end + 1 : end + 3] -= rng.exponential(3e-5)
+    found = judged(klein(), force)
+    assert found.regime == STICK_SLIP
+    assert found.period == pytest.approx(1 / 40, rel=1e-3)
+    assert found.fall_irregularity < 0.01
+
+
+def test_spectra_say_the_same():
+    """At 10 of the 360 points of the study, with other random numbers."""
+    module = study()
+    compared = list(module.compare(module.points()[151::21], first_seed=9000))
+    disagreeing = [one.point for one in compared if one.regime not in one.spectral]
+    assert not disagreeing
+    assert {SMOOTH, STICK_SLIP} <= {one.regime for one in compared}
+
+
+def regime_of(config):
+    return mesoslip.regime(mesoslip.run(config))["regime"].values.tolist()
+
+
+def test_kinds_of_runs(klein):
+    few = {"contacts__count": 500, "output__interval": 1e-3}
+    assert regime_of(klein(**few, run__duration=1.0)) == [TRANSIENT]
+    assert regime_of(klein(**few, slider={"kind": "prescribed"}, run__duration=3.0)) == [SMOOTH]
+    smooth = klein(**few, slider__stiffness=200.0, contacts__delay=3e-4, run__realizations=3)
+    assert regime_of(smooth) == [SMOOTH] * 3
+    layers = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 4}
+    long = klein(**few, slider=layers, contacts__delay=3e-3, drive__velocity=1e-6)
+    assert set(regime_of(long.replace({"run.duration": 4.0}))) <= {STICK_SLIP, IRREGULAR}
+
+
+def test_a_slider_without_inertia(klein):
+    """Soft: all contacts break in step, once in a mean life; stiff and broad: it creeps."""
+    soft = klein(
+        slider={"kind": "quasistatic", "stiffness": 97.0},
+        run__duration=1.0,
+        drive__velocity=1e-6,
+        contacts__count=500,
+    )
+    found = mesoslip.regime(mesoslip.run(soft))
+    assert found["regime"] == [STICK_SLIP]
+    life = mesoslip.info(soft)["mean_life"].value
+    assert float(found["period"][0]) * 1e-6 == pytest.approx(life, rel=0.01)
+    stiff = klein(
+        slider={"kind": "quasistatic", "stiffness": 1e5},
+        run__duration=4.0,
+        contacts__threshold__relative_width=0.3,
+        contacts__count=500,
+    )
+    assert regime_of(stiff) == [SMOOTH]
+
+
+def test_a_drive_that_turns_back_is_judged_by_its_last_stage(klein):
+    forth = {"duration": 4.0, "velocity": 1e-6}
+    back = {"duration": 4.0, "velocity": -1e-6}
+    rest = {"duration": 1.0, "velocity": 0.0}
+    few = {"contacts__count": 500, "contacts__delay": 3e-3, "run__duration": 9.0}
+    found = mesoslip.regime(mesoslip.run(klein(**few, drive={"stage": [forth, back, rest]}))).isel(
+        realization=0
+    )
+    assert found["regime"] == STICK_SLIP
+    assert found["judged_start"] == pytest.approx(6.0)
+    assert found["judged_end"] == pytest.approx(8.0)
+    alone = mesoslip.regime(
+        mesoslip.run(klein(**few | {"run__duration": 4.0}, drive={"stage": [back]}))
+    ).isel(realization=0)
+    assert float(found["period"]) == pytest.approx(float(alone["period"]), rel=0.1)
+    assert float(found["stick_share"]) == pytest.approx(float(alone["stick_share"]), abs=0.1)
+
+
+def test_the_dataset_is_cf(klein, tmp_path):
+    tree = mesoslip.run(klein(contacts__count=300, run__realizations=2))
+    found = mesoslip.regime(tree)
+    assert set(found.data_vars) == set(REGIME)
+    assert found["regime"].dtype == np.int8
+    assert found["regime"].attrs["flag_values"].tolist() == [0, 1, 2, 3]
+    assert found["regime"].attrs["flag_values"].dtype == np.int8
+    assert found["regime"].attrs["flag_meanings"] == "smooth stick_slip irregular transient"
+    assert all(one.dims == ("realization",) for one in found.data_vars.values())
+    assert all("units" in one.attrs for one in found.data_vars.values())
+    found.to_netcdf(tmp_path / "regime.nc")
+
+
+def test_command_and_run_say_the_same(klein, tmp_path, command):
+    config, output = tmp_path / "few.toml", tmp_path / "few.nc"
+    config.write_text(klein(contacts__count=300).to_toml())
+    status, _, said = command("run", str(config), "-o", str(output))
+    assert status == 0
+    status, told, _ = command("regime", str(output))
+    assert status == 0
+    assert f"{output}: {told.splitlines()[-1]}" in said
+    status, told, _ = command("regime", str(output), "--json")
+    rows = json.loads(told)
+    assert [one["realization"] for one in rows] == [0]
+    data = mesoslip.regime(output)
+    assert rows[0]["cycles"] == int(data["cycles"][0])
+    status, _, said = command("run", str(config), "-o", str(output), "--set", "run.realizations=3")
+    assert status == 0
+    assert (
+        sum(int(part.split()[0]) for part in said.splitlines()[1].split(": ")[1].split(", ")) == 3
+    )
+    curve = tmp_path / "curve.nc"
+    assert command("curve", str(config), "-o", str(curve))[0] == 0
+    status, _, said = command("regime", str(curve))
+    assert status == 2
+    assert "not an output of mesoslip run" in said
+
+
+def test_long_traces_are_thinned_out(klein, monkeypatch):
+    tree = mesoslip.run(klein(contacts__count=300, contacts__delay=3e-3, run__duration=20.0))
+    whole = mesoslip.regime(tree)
+    monkeypatch.setattr("mesoslip.analysis.regime.MOST_SAMPLES", 1500)
+    thin = mesoslip.regime(tree)
+    assert whole["regime"].values == thin["regime"].values
+    assert float(thin["period"][0]) == pytest.approx(float(whole["period"][0]), rel=0.02)

@@ -1,0 +1,177 @@
+"""Reports: all that an output holds on a page that needs nothing else."""
+
+from __future__ import annotations
+
+import html
+import re
+from html.parser import HTMLParser
+
+import mesoslip
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import ROOT, klein_tables
+from kinds import KINDS, configuration
+from mesoslip.configuration.units import with_unit
+
+MOST_BYTES = 3_000_000
+# Elements of HTML that have no end.
+VOID = {"meta", "br", "link", "img", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """The elements of a page: whether they are nested well, and what they ask for."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.asked, self.words = [], [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        for name, value in attributes:
+            if name in {"src", "href", "xlink:href", "action", "data", "srcset"}:
+                self.asked.append(value)
+            assert not name.startswith("on"), name
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words += [data.strip()] if data.strip() else []
+
+
+def written(outputs, path):
+    """A report as text, and its elements."""
+    mesoslip.report(outputs, path)
+    text = path.read_text(encoding="utf-8")
+    page = Page(text)
+    assert len(text.encode()) < MOST_BYTES
+    assert "script" not in page.tags
+    # Whatever it asks for is in it.
+    assert all(one.startswith(("#", "data:")) for one in page.asked)
+    assert not re.search(r"url\((?!#)", text)
+    assert "@import" not in text
+    # Pictures do not share the names of their parts.
+    parts = re.findall(r'<clipPath id="([^"]+)"', text)
+    assert len(parts) == len(set(parts))
+    assert set(re.findall(r'clip-path="url\(#([^)]+)\)"', text)) <= set(parts)
+    return text, page
+
+
+@pytest.fixture(scope="module")
+def klein_run():
+    config = mesoslip.Config.load(ROOT / "runs" / "klein.toml", ["contacts.delay=1 ms"])
+    return mesoslip.run(config)
+
+
+def test_a_report_of_kleins_run(klein_run, tmp_path):
+    text, page = written(klein_run, tmp_path / "klein.html")
+    assert page.tags.count("svg") == 2
+    count = klein_run["slips"].sizes["slip"]
+    assert f"{count} slips" in page.words
+    for row in ("contacts.delay", "1 ms", "500 µs", "Energy", "work done by the drive", "100 %"):
+        assert row in page.words
+    assert klein_run.attrs["commit"] in page.words
+    assert any(word.startswith("Stick-slip: force amplitude") for word in page.words)
+    drop = np.mean(klein_run["slips/force_drop"].values) * 1e6
+    assert f"{drop:.4g} µN" in page.words
+    # The whole configuration, to copy.
+    assert klein_run.attrs["configuration"] in html.unescape(text)
+    # Made again it is the same.
+    again, _ = written(klein_run, tmp_path / "again.html")
+    assert again == text
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_there_is_a_report_of_every_kind(kind, tmp_path):
+    config = configuration(kind)
+    _, page = written(mesoslip.run(config), tmp_path / "report.html")
+    assert ("Avalanches" in page.words) == config.has_avalanches
+    assert "Provenance" in page.words
+    assert "svg" in page.tags
+
+
+def test_reports_of_the_theory(klein, tmp_path):
+    curve = mesoslip.curve(klein())
+    _, page = written([curve, mesoslip.curve(klein(slider__stiffness=1e6))], tmp_path / "a.html")
+    assert "K_star" in page.words
+    assert page.tags.count("svg") == 3
+    _, page = written(mesoslip.onset(klein()), tmp_path / "b.html")
+    assert "slip_time_melting" in page.words
+    _, page = written(mesoslip.onset(klein(slider__stiffness=1e6)), tmp_path / "c.html")
+    assert any("there is no onset" in word for word in page.words)
+
+
+def test_a_report_of_a_sweep(tmp_path):
+    plan = {
+        **klein_tables(run__duration=0.2),
+        "sweep": {
+            "realizations": 2,
+            "measures": ["regime", "mean_force"],
+            "grid": {"contacts.delay": [1e-4, 1e-3], "slider.stiffness": [50.0, 100.0, 200.0]},
+        },
+    }
+    tree = xr.DataTree(mesoslip.sweep(plan, workers=1))
+    _, page = written(tree, tmp_path / "sweep.html")
+    assert "12 runs: 12 ok." in page.words
+    assert page.tags.count("svg") == 2
+    assert "50 N/m, 100 N/m, 200 N/m" in page.words
+    mean = float(tree["mean_force"].mean())
+    assert with_unit(mean, "N") in page.words
+    # Fewer than there should be stand out.
+    tree["status"].values[0, 0, 0] = 2
+    text, page = written(tree, tmp_path / "missing.html")
+    assert "12 runs: 11 ok, 1 missing." in page.words
+    assert text.count('class="warns"') == 1
+    with pytest.raises(mesoslip.FileError, match="one at a time"):
+        mesoslip.plot([tree, tree])
+
+
+def test_outputs_side_by_side(klein_run, tmp_path, klein):
+    other = mesoslip.run(klein(contacts__delay=2e-3, run__duration=4.0))
+    _, page = written([klein_run, other], tmp_path / "both.html")
+    assert "What differs" in page.words
+    place = page.words.index("contacts.delay")
+    assert page.words[place + 1 : place + 3] == ["1 ms", "2 ms"]
+    with pytest.raises(mesoslip.FileError, match=r"is a run.* is a force curve"):
+        mesoslip.report([klein_run, mesoslip.curve(klein())], tmp_path / "no.html")
+    assert not (tmp_path / "no.html").exists()
+
+
+def test_what_a_file_says_is_no_markup(klein, tmp_path):
+    title = "<script>alert(1)</script> & $x^$ \\frac"
+    tree = mesoslip.run(klein(title=title, run__duration=0.01))
+    text, page = written(tree, tmp_path / "report.html")
+    assert "<script>" not in text
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x^$ \\frac" in text
+    assert "There is no slip." in page.words
+
+
+def test_what_a_run_did_not_keep_stands_out(klein_run, tmp_path):
+    tree = klein_run.copy()
+    tree.attrs |= {"audit": "the balance does not close", "complete": "false"}
+    tree.attrs["comment"] = "interrupted; it came to 3 s"
+    text, page = written(tree, tmp_path / "report.html")
+    assert text.count('class="warns"') == 2
+    assert "interrupted; it came to 3 s" in page.words
+
+
+def test_the_command_writes_a_page(tmp_path, command):
+    output = tmp_path / "run.nc"
+    quick = ("--set", "run.duration=0.1 s", "--set", "contacts.count=100")
+    assert command("run", ROOT / "runs" / "klein.toml", "-o", output, "--quiet", *quick)[0] == 0
+    assert command("report", output)[0] == 0
+    assert (tmp_path / "run.html").exists()
+    status, _, errors = command("report", output, "-o", output)
+    assert status == 2
+    assert "is what the command reads" in errors
+    assert command("report", tmp_path / "none.nc")[0] == 2

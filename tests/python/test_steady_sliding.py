@@ -1,0 +1,224 @@
+"""Linear stability of steady sliding with delay, against independent formulas and runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import ROOT
+from mesoslip import ConfigError, SteadySliding
+from mesoslip.theory.steady_sliding import stability_boundary
+from scipy import special
+
+
+def study():
+    """The study with runs of the engine."""
+    path = ROOT / "tests" / "studies" / "steady_sliding.py"
+    spec = importlib.util.spec_from_file_location("steady_sliding_study", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def linearized(config, rate):
+    """Λ(λ) as the linearized equations give it, term by term, for a gaussian law.
+
+    X = v t + ε e^(λt), births B0 t + c e^(λt). The integrals over the births are done by a rule of
+    their own, and those over thresholds by Gauss and Hermite's.
+    """
+    contacts, velocity = config.contacts, config.drive_speed
+    point, weight = special.roots_hermitenorm(60)
+    weight = weight / np.sum(weight)
+    u = 1 + contacts.threshold.relative_width * point
+    keep = u > contacts.back_force_ratio
+    u, weight = u[keep], weight[keep] / np.sum(weight[keep])
+    scaled = contacts.coupling == "scaled"
+    unit = contacts.break_stretch
+    stiffness = contacts.contact_stiffness * (np.sqrt(u) if scaled else np.ones_like(u))
+    mass_drag = contacts.contact_drag * (u if scaled else np.ones_like(u))
+    broken = unit * (np.sqrt(u) if scaled else u)
+    born = contacts.back_force_ratio * contacts.contact_static_force / stiffness
+    life = broken - born
+    births = velocity / (weight @ life + velocity * contacts.delay)
+    age = life / velocity
+    end = np.exp(-rate * age)
+    late = np.exp(-rate * contacts.delay)
+    psi = weight @ end
+    # Detachments are births a life ago, and births are detachments a delay ago.
+    born_change = births / velocity * late * (1 - psi) / (1 - psi * late)
+    node, share = np.polynomial.legendre.leggauss(40)
+    passed = age[:, None] * (1 + node) / 2
+    share = age[:, None] * share / 2
+    moved = births * np.sum(share * (1 - np.exp(-rate * passed)), axis=1)
+    fresh = (
+        born_change
+        * rate
+        * np.sum(share * np.exp(-rate * passed) * (born[:, None] + velocity * passed), axis=1)
+    )
+    gone = births / velocity * (1 - end) * broken
+    pinned = weight @ (stiffness * (moved + fresh - gone))
+    let_go = weight @ (mass_drag * (births / velocity * (1 - end) + born_change * end))
+    steady = weight @ mass_drag * births * contacts.delay
+    return contacts.count * (pinned + rate * steady + velocity * let_go * (1 - late))
+
+
+CASES = [
+    {},
+    {"contacts__coupling": "equal", "contacts__drag_rate": 2e15},
+    {"contacts__back_force_ratio": 0.0, "contacts__threshold__relative_width": 0.1},
+    {"contacts__delay": 3e-3, "drive__velocity": 1e-5, "contacts__drag_rate": 2e14},
+]
+
+
+@pytest.mark.parametrize("changes", CASES)
+def test_response_is_that_of_the_linearized_equations(klein, changes):
+    config = klein(**{"drive__velocity": 2e-6, **changes})
+    sliding = SteadySliding(config)
+    for rate in (30.0, 400j, 2000j, 50 + 900j, -20 + 300j):
+        expected = linearized(config, rate)
+        assert complex(sliding.response_at(rate)) == pytest.approx(expected, rel=1e-9)
+    assert complex(sliding.response(400.0)) == complex(sliding.response_at(400j))
+
+
+@pytest.mark.parametrize("law", ["uniform", "lognormal", "weibull", "exponential"])
+def test_force_and_slope_are_closed_forms(klein, law):
+    config = klein(contacts__threshold={"law": law, "relative_width": 0.4}, drive__velocity=1e-5)
+    sliding = SteadySliding(config)
+    quantities = mesoslip.info(config)
+    assert sliding.force == pytest.approx(quantities["F_steady_drive"].value, rel=1e-7)
+    life = sliding.lives.mean_life * config.contacts.break_stretch
+    assert life == pytest.approx(quantities["mean_life"].value, rel=1e-7)
+    # Slow shaking is sliding at other velocities.
+    faster, slower = (SteadySliding(config, (1 + one) * 1e-5).force for one in (1e-4, -1e-4))
+    assert sliding.slope == pytest.approx((faster - slower) / 2e-9, rel=1e-6)
+    assert complex(sliding.response_at(0.1) / 0.1).real == pytest.approx(sliding.slope, rel=0.01)
+
+
+def test_without_delay_steady_contacts_do_not_answer(klein):
+    config = klein(contacts__delay=0.0, slider__stiffness=20.0, slider__damping_ratio=0.3)
+    sliding = SteadySliding(config, 1e-6)
+    assert np.max(np.abs(sliding.response(np.geomspace(1, 1e4, 30)))) == 0
+    assert sliding.is_stable
+    # Damping relative to the mean velocity: (M λ² + K)(λ + η) + M η λ² = 0.
+    mass, eta = config.slider.mass, config.slider.damping_rate
+    slider = np.roots([mass, 2 * mass * eta, 20.0, 20.0 * eta])
+    roots = sliding._roots(1e-3)
+    assert np.min(np.abs(roots - slider[slider.imag > 0][0])) < 1e-6
+
+
+@pytest.mark.parametrize("velocity", [3e-7, 3e-6])
+def test_roots_are_as_many_as_the_argument_tells(klein, velocity):
+    """All unstable roots by Newton's method from a fine grid of starts, one by one."""
+    config = klein(contacts__threshold__relative_width=0.05, drive__velocity=velocity)
+    sliding = SteadySliding(config)
+
+    def function(rate):
+        slider = config.slider.dynamic_stiffness(rate)
+        return slider.numerator / slider.denominator + sliding.response_at(rate)
+
+    real, imaginary = np.meshgrid(np.linspace(0.5, 120, 7), np.linspace(0, 2500, 200))
+    root = (real + 1j * imaginary).ravel()
+    with np.errstate(all="ignore"):
+        for _ in range(40):
+            here = function(root)
+            step = here * 1e-5 / (function(root + 1e-5) - here)
+            root = root - step * np.minimum(1, 20 / np.abs(step))
+        good = (np.abs(function(root)) < 1e-4) & (root.real > 1e-4) & (np.abs(root) < 1e4)
+    found = np.unique(np.round(np.where(root.imag < 0, root.conj(), root)[good], 3))
+    count = 2 * np.sum(found.imag > 0.01) + np.sum(found.imag <= 0.01)
+    assert sliding.unstable_count == count
+    leading = found[np.argmax(found.real)]
+    assert sliding.leading_root == pytest.approx(leading, abs=2e-3)
+    assert sliding.growth_rate == sliding.leading_root.real
+
+
+def test_one_layer_is_a_rigid_slider_without_damping(klein):
+    rigid = klein(slider__damping_ratio=0.0, drive__velocity=3e-6)
+    layers = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 1}
+    one = klein(slider=layers, drive__velocity=3e-6)
+    assert SteadySliding(one).leading_root == pytest.approx(SteadySliding(rigid).leading_root)
+    # A base so heavy that it rests, or so stiff.
+    for base in ({"mass": 100.0, "stiffness": 1e4}, {"mass": 1e-2, "stiffness": 1e7}):
+        resting = klein(slider={**layers, "base": base}, drive__velocity=3e-6)
+        root = SteadySliding(resting).leading_root
+        assert root == pytest.approx(SteadySliding(rigid).leading_root, rel=1e-3)
+
+
+def test_frequencies_of_a_chain_are_those_of_its_formula(klein):
+    layers = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 5}
+    slider = klein(slider=layers).slider
+    for frequency in slider.frequencies:
+        around = slider.dynamic_stiffness(1j * frequency * np.array([0.999, 1.0, 1.001]))
+        values = np.abs(around.numerator)
+        assert values[1] < 1e-6 * values[0]
+
+
+def test_engine_answers_as_told():
+    module = study()
+    config = module.tables(contacts={"threshold": {"law": "gaussian", "relative_width": 0.3}})
+    sliding = SteadySliding(
+        mesoslip.Config.from_dict(
+            {**config, "run": {"engine": "me", "duration": 1.0}, "drive": {"velocity": 1e-6}}
+        )
+    )
+    contacts = {"threshold": {"law": "gaussian", "relative_width": 0.3}}
+    found = module.shaken_response(1e-6, 600.0, 1e-10, 0.1, periods=8, contacts=contacts)
+    assert found == pytest.approx(complex(sliding.response(600.0)), rel=0.02)
+
+
+def test_boundary_is_where_growth_begins(klein):
+    config = klein(contacts__threshold__relative_width=0.2, drive__velocity=3e-6)
+    delay = stability_boundary(config, "contacts.delay", 1e-5, 1e-3)
+    sliding = SteadySliding(config.replace({"contacts.delay": delay}))
+    assert abs(sliding.growth_rate) < 0.2
+    assert stability_boundary(config, "contacts.delay", 5e-4, 1e-3) is None
+    # A stiffer spring, with its damping, takes more delay.
+    stiff = config.replace({"slider.stiffness": 400.0})
+    assert stability_boundary(stiff, "contacts.delay", 1e-5, 1e-3) > delay
+
+
+def test_what_has_no_steady_sliding_is_refused(klein):
+    with pytest.raises(ConfigError, match="without it there is no steady sliding"):
+        SteadySliding(klein(contacts__reattach=False))
+    ageing = {"law": "relax", "time": 1e-3, "young_force_ratio": 0.5, "young_relative_width": 0.1}
+    with pytest.raises(ConfigError, match="runs tell"):
+        SteadySliding(klein(contacts__coupling="equal", contacts__ageing=ageing))
+    with pytest.raises(ConfigError, match="needs a velocity"):
+        SteadySliding(klein(), 0.0)
+    chain = klein(slider={"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 17})
+    with pytest.raises(ConfigError, match="at most 16"):
+        SteadySliding(chain)
+    assert SteadySliding(klein(slider={"kind": "prescribed"})).leading_root is None
+    assert math.isnan(SteadySliding(klein(slider={"kind": "prescribed"})).growth_rate)
+
+
+def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
+    file = tmp_path / "klein.toml"
+    file.write_text(klein().to_toml())
+    soft = ("--set", "slider.stiffness=200", "--set", "contacts.delay=3e-4")
+    for name in ("info", "curve"):
+        status, told, _ = command(name, file, *soft)
+        assert status == 0
+        assert "necessary" in told
+        assert "not sufficient" in told
+        assert "is unstable, with delay" in told
+        assert "only while contacts break in step" in told
+    for velocity in ("1e-7", "3e-6"):
+        told = command("info", file, "--set", f"drive.velocity={velocity}")[1]
+        assert "also of contacts that break out of step" in told
+    status, told, _ = command("info", file, "--set", "contacts.delay=0")
+    assert "is stable, as there is no delay" in told
+    quantities = mesoslip.info(klein())
+    assert quantities["steady_growth_rate"].value == SteadySliding(klein()).growth_rate
+    assert quantities["steady_frequency"].unit == "1/s"
+    neighbours = {"strength": 0.1, "columns": 60, "rows": 68}
+    assert "steady_growth_rate" not in mesoslip.info(klein(interaction=neighbours))
+    # What takes long is left out.
+    assert "steady_growth_rate" not in mesoslip.info(klein(contacts__delay=1e4))
+    for slider in ({"kind": "prescribed"}, {"kind": "quasistatic", "stiffness": 97.0}):
+        assert "steady_growth_rate" not in mesoslip.info(klein(slider=slider))

@@ -1,0 +1,634 @@
+"""Sweeps: their points, measures, store, and that nothing but the file decides the numbers."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import mesoslip
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import ROOT, klein_tables
+from mesoslip import Config, ConfigError, FileError
+from mesoslip.analysis.regime import REGIME, regimes
+from mesoslip.campaign import execution, runner
+from mesoslip.campaign.measures import MEASURES
+from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.point import Outcome, compute, point_name
+from mesoslip.campaign.store import Store
+from mesoslip.configuration.keys import key_kind
+from mesoslip.configuration.messages import all_keys
+from mesoslip.simulation.stop import StopFlag
+
+# A run of a millisecond, in which contacts break.
+TINY = klein_tables(
+    contacts__count=20, run__duration=0.4, drive__velocity=1e-6, contacts__threshold__law="uniform"
+)
+GRID = {
+    "contacts.delay": ["0.1 ms", "0.5 ms"],
+    "slider.stiffness": {"from": "50 N/m", "to": "200 N/m", "points": 3, "spacing": "logarithmic"},
+}
+
+
+def tables(**sweep):
+    """The tables of a sweep of short runs."""
+    return {**TINY, "sweep": {"measures": ["mean_force", "breaks"], "grid": GRID} | sweep}
+
+
+@pytest.fixture
+def sweep_file(tmp_path):
+    """Write the file of a sweep over a base of short runs."""
+    (tmp_path / "base.toml").write_text(Config.from_dict(TINY).to_toml())
+
+    def write(text: str, name: str = "sweep.toml") -> Path:
+        path = tmp_path / name
+        path.write_text('base = "base.toml"\n' + textwrap.dedent(text))
+        return path
+
+    return write
+
+
+SIMPLE = """
+    [sweep]
+    realizations = 2
+    measures = ["mean_force"]
+    [sweep.grid]
+    "contacts.delay" = ["0.1 ms", "0.5 ms"]
+"""
+
+
+def test_a_dataset_of_named_axes_in_si():
+    data = mesoslip.sweep(tables(realizations=2), pool="threads")
+    assert data["mean_force"].dims == ("contacts.delay", "slider.stiffness", "realization")
+    np.testing.assert_array_equal(data["contacts.delay"], [1e-4, 5e-4])
+    np.testing.assert_allclose(data["slider.stiffness"], [50, 100, 200])
+    assert data["contacts.delay"].units == "s"
+    assert data["slider.stiffness"].units == "N m-1"
+    assert data["mean_force"].units == "N"
+    assert data["status"].flag_meanings == "ok failed missing"
+    assert not data["status"].any()
+    assert data.attrs["complete"] == "true"
+
+
+def test_measures_are_those_of_the_run_itself():
+    """Each point against a run of its own, measured here."""
+    data = mesoslip.sweep(tables(realizations=2, discard=0.25), pool="threads")
+    tree = mesoslip.run(
+        Config.from_dict(TINY).replace(
+            {"contacts.delay": 5e-4, "slider.stiffness": 200.0, "run.realizations": 2}
+        )
+    )
+    force = tree["spring_force"].sel(time=slice(0.25 * 0.4, None))
+    point = data.isel({"contacts.delay": 1, "slider.stiffness": 2})
+    np.testing.assert_allclose(point["mean_force"], force.mean("time"), rtol=1e-13)
+    np.testing.assert_array_equal(point["breaks"], tree["breaks"])
+
+
+def test_every_measure_of_a_run_with_known_slips():
+    """A force made by hand: two slips of one micronewton, a second apart, after half a second."""
+    times = np.linspace(0, 4, 401)
+    force = np.where(times < 2, 0, 3e-6 - 1e-6 * (times % 1))
+    way = np.where((times * 10).astype(int) % 2 == 0, 0.0, 1.0).cumsum() * 1e-8
+    root = xr.Dataset(
+        {
+            "spring_force": (("realization", "time"), force[np.newaxis]),
+            "displacement": (("realization", "time"), way[np.newaxis]),
+            "drive_displacement": (("realization", "time"), 1e-8 * np.arange(401.0)[np.newaxis]),
+            "breaks": ("realization", [7]),
+            "energy_residual": ("realization", [1e-14]),
+        },
+        {"time": times, "realization": [0]},
+    )
+    slips = xr.Dataset(
+        {
+            "start_time": ("slip", [1.0, 2.5, 3.5]),
+            "end_time": ("slip", [1.1, 2.6, 3.6]),
+            "force_before": ("slip", [9e-6, 3e-6, 5e-6]),
+            "force_drop": ("slip", [9e-6, 1e-6, 2e-6]),
+            "peak_velocity": ("slip", [9.0, 1.0, 2.0]),
+        }
+    )
+    avalanches = xr.Dataset(
+        {"start_time": ("avalanche", [1.0, 3.0, 3.1]), "size": ("avalanche", [100, 2, 4])}
+    )
+    from mesoslip.campaign.measures import RunView
+
+    run = RunView(
+        xr.DataTree.from_dict({"/": root, "/slips": slips, "/avalanches": avalanches}), 2.0
+    )
+    expected = {
+        "mean_force": force[200:].mean(),
+        "largest_force": 3e-6,
+        "force_amplitude": 0.495e-6,
+        "mean_peak_force": 4e-6,
+        "mean_force_drop": 1.5e-6,
+        "mean_waiting_time": 1.0,
+        "mean_slip_time": 0.1,
+        "slip_count": 2,
+        "peak_velocity": 2.0,
+        "smooth_time_share": 0.5,
+        "breaks": 7,
+        "energy_residual": 1e-14,
+        "avalanche_count": 2,
+        "mean_avalanche_size": 3,
+        "largest_avalanche": 4,
+    }
+    # What theory says, and what a regime is judged by, have tests of their own.
+    others = {*REGIME, "growth_rate", "critical_stiffness_ratio", "waiting_over_damping"}
+    own = {name: measure for name, measure in MEASURES.items() if name not in others}
+    found = {name: measure.function(run) for name, measure in own.items()}
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=0.02), name
+
+
+def test_regimes_are_those_of_the_run_itself(tmp_path):
+    """Stick-slip with delay, smooth sliding without; choices are small numbers in a file."""
+    base = klein_tables(
+        contacts__count=400,
+        contacts__threshold__relative_width=0.05,
+        run__duration=30.0,
+        output__interval=5e-3,
+    )
+    sweep = {"measures": ["regime", "period"], "grid": {"contacts.delay": ["0.5 ms", 0]}}
+    data = mesoslip.sweep({**base, "sweep": sweep}, pool="threads")
+    for number, delay in enumerate((5e-4, 0.0)):
+        tree = mesoslip.run(Config.from_dict(base).replace({"contacts.delay": delay}))
+        expected = regimes(tree)
+        assert data["regime"].values[number, 0] == expected["regime"].values[0]
+        np.testing.assert_array_equal(data["period"][number], expected["period"])
+    np.testing.assert_array_equal(data["regime"][:, 0], [1, 0])
+    assert data["regime"].flag_meanings == "smooth stick_slip irregular transient"
+    data.to_netcdf(tmp_path / "regimes.nc")
+    with netCDF4.Dataset(tmp_path / "regimes.nc") as file:
+        assert file["regime"].dtype == np.int8
+        assert file["regime"].flag_values.dtype == np.int8
+    back = xr.load_dataset(tmp_path / "regimes.nc")
+    np.testing.assert_array_equal(back["regime"], data["regime"])
+
+
+def test_a_map_shows_each_value_where_it_belongs(tmp_path):
+    """Also of values in any order, and of choices the most frequent one."""
+    delays, stiffnesses = [2e-3, 1e-4, 5e-4], [200.0, 50.0]
+    force = np.arange(12.0).reshape(3, 2, 2)
+    regime = np.array([[[0, 0], [1, 1]], [[2, 2], [3, np.nan]], [[np.nan, np.nan], [1, 1]]])
+    dimensions = ("contacts.delay", "slider.stiffness", "realization")
+    flags = {"flag_meanings": "smooth stick_slip irregular transient"}
+    data = xr.Dataset(
+        {
+            "status": (dimensions, np.zeros((3, 2, 2))),
+            "mean_force": (dimensions, force, {"units": "N"}),
+            "regime": (dimensions, regime, flags),
+        },
+        {"contacts.delay": delays, "slider.stiffness": stiffnesses, "realization": [0, 1]},
+        {"configuration": ""},
+    )
+    figure = mesoslip.plot(xr.DataTree(data), tmp_path / "map.png")
+    maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    for axes, expected in zip(maps, (force.mean(-1), regime[..., 0]), strict=True):
+        mesh = axes.collections[0]
+        corners = mesh.get_coordinates()
+        shown = mesh.get_array().reshape(2, 3).filled(np.nan)
+        for row, column in np.ndindex(2, 3):
+            (left, low), (right, high) = corners[row, column], corners[row + 1, column + 1]
+            (i,) = np.flatnonzero((left < np.array(delays)) & (np.array(delays) < right))
+            (j,) = np.flatnonzero((low < np.array(stiffnesses)) & (np.array(stiffnesses) < high))
+            np.testing.assert_equal(shown[row, column], expected[i, j])
+    line = mesoslip.plot(xr.DataTree(data.isel({"slider.stiffness": 1})))
+    np.testing.assert_array_equal(line.axes[0].lines[-1].get_xdata(), sorted(delays))
+    np.testing.assert_array_equal(line.axes[0].lines[-1].get_ydata(), [6.5, 10.5, 2.5])
+
+
+def test_names_can_be_drawn():
+    """A line and a map over a key that takes names."""
+    law = {"contacts.threshold.law": ["uniform", "gaussian", "weibull"]}
+    for grid in (law, law | {"contacts.delay": [1e-4, 5e-4]}):
+        data = mesoslip.sweep(tables(grid=grid), pool="threads")
+        figure = mesoslip.plot(xr.DataTree(data))
+        figure.canvas.draw()
+        texts = [
+            text.get_text()
+            for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis)
+            for text in axis.get_ticklabels()
+        ]
+        assert {"uniform", "gaussian", "weibull"} <= set(texts)
+
+
+def test_keys_together_and_a_latin_hypercube():
+    sweep = {
+        "measures": ["mean_force"],
+        "together": [
+            {"slider.stiffness": ["97 N/m", "194 N/m"], "slider.mass": ["1.47 g", "2.94 g"]}
+        ],
+        "latin_hypercube": {
+            "points": 5,
+            "contacts.delay": {"from": "0.1 ms", "to": "10 ms", "spacing": "logarithmic"},
+            "contacts.count": {"from": 10, "to": 30},
+        },
+    }
+    plan = Plan.from_dict({**TINY, "sweep": sweep})
+    assert plan.shape == (2, 5)
+    for one in plan.combinations:
+        config = one.config
+        assert config.slider.mass / config.slider.stiffness == pytest.approx(1.47e-3 / 97)
+        assert config.contacts.count == one.values["contacts.count"]
+    delays = sorted({one.config.contacts.delay for one in plan.combinations})
+    # One in each fifth of the two decades.
+    fifths = np.floor(5 * np.log10(np.array(delays) / 1e-4) / 2)
+    np.testing.assert_array_equal(fifths, np.arange(5))
+    data = mesoslip.sweep(plan, pool="threads")
+    assert data["mean_force"].dims == ("slider.stiffness", "sample", "realization")
+    assert data["slider.mass"].dims == ("slider.stiffness",)
+    assert data["contacts.delay"].dims == ("sample",)
+    assert data["contacts.count"].dtype.kind == "i"
+
+
+def test_names_and_kinds_can_be_varied():
+    grid = {"contacts.threshold.law": ["gaussian", "uniform"], "contacts.reattach": [True, False]}
+    data = mesoslip.sweep(tables(grid=grid), pool="threads")
+    assert list(data["contacts.threshold.law"].values) == ["gaussian", "uniform"]
+    assert data["mean_force"].sizes["contacts.reattach"] == 2
+    assert not data["status"].any()
+
+
+def test_single_keys_of_the_configuration_are_known():
+    """Every key has a kind, and the units are those that the keys tell themselves."""
+    for key in all_keys(Config):
+        assert key_kind(key) is not None, key
+    units = {"contacts.delay": "s", "contacts.drag_rate": "s-1", "contacts.film_density": "kg m-3"}
+    units |= {"contacts.area": "m2", "contacts.count": "1", "slider.damping_ratio": "1"}
+    units |= {"drive.force_rate": "N s-1", "slider.mass": "kg"}
+    for key, unit in units.items():
+        assert key_kind(key).cf_units == unit, key
+    assert key_kind("contacts.threshold.law").cf_units is None
+    assert not key_kind("drive.stage").is_single
+    assert key_kind("contacts.dely") is None
+
+
+def test_points_that_are_the_same_are_computed_once(tmp_path):
+    """Titles make no difference to the numbers."""
+    plan = Plan.from_dict(tables(grid={"title": ["one", "other"]}, realizations=2))
+    done = done_by(plan, tmp_path)
+    assert done.computed == 4
+    assert len(done_by(plan, tmp_path).failures) == 0
+    with Store(tmp_path) as store:
+        assert len(store.names()) == 2
+    np.testing.assert_array_equal(done.dataset["mean_force"][0], done.dataset["mean_force"][1])
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return mesoslip.sweep(tables(realizations=3), workers=1, pool="threads")
+
+
+def assert_same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
+    """The same to the bit, NaN and all."""
+    assert one.sizes == other.sizes
+    for name in one.variables:
+        assert one[name].values.tobytes() == other[name].values.tobytes(), name
+
+
+@pytest.mark.parametrize(("pool", "workers"), [("threads", 2), ("processes", 1), ("processes", 2)])
+def test_who_computes_does_not_matter(pool, workers, whole):
+    data = mesoslip.sweep(tables(realizations=3), workers=workers, pool=pool)
+    assert_same_numbers(whole, data)
+
+
+def test_the_order_does_not_matter(whole):
+    plan = Plan.from_dict(tables(realizations=3))
+
+    def backwards(tasks, _stop):
+        for task in reversed(list(tasks)):
+            yield task, compute(task)
+
+    assert_same_numbers(whole, runner.run_sweep(plan, executor=backwards).dataset)
+
+
+def test_threads_hand_over_to_processes(whole, monkeypatch):
+    """In the middle of a sweep, and the numbers stay."""
+    monkeypatch.setattr(execution, "THREAD_SECONDS", 0.02)
+    started = []
+
+    class Counted(execution.ProcessWorker):
+        def __init__(self):
+            started.append(self)
+            super().__init__()
+
+    monkeypatch.setattr(execution, "ProcessWorker", Counted)
+    data = mesoslip.sweep(tables(realizations=3), workers=1, pool="both")
+    assert len(started) == 1
+    assert_same_numbers(whole, data)
+
+
+def done_by(plan, store, executor=None):
+    with Store(store) as opened:
+        return runner.run_sweep(
+            plan, store=opened, executor=executor or execution.on_this_machine(2, "threads")
+        )
+
+
+def test_only_what_is_missing_is_computed(tmp_path, whole):
+    store = tmp_path / "points"
+    first = done_by(Plan.from_dict(tables(realizations=2)), store)
+    assert (first.taken, first.computed) == (0, 12)
+    # Realizations that are added leave the earlier ones as they were.
+    second = done_by(Plan.from_dict(tables(realizations=3)), store)
+    assert (second.taken, second.computed) == (12, 6)
+    assert_same_numbers(whole, second.dataset)
+    again = done_by(Plan.from_dict(tables(realizations=3)), store)
+    assert (again.taken, again.computed) == (18, 0)
+    # A longer list keeps what is there, and so does a shorter one.
+    grid = GRID | {"contacts.delay": ["0.5 ms", "1 ms", "0.1 ms"]}
+    longer = done_by(Plan.from_dict(tables(realizations=3, grid=grid)), store)
+    assert (longer.taken, longer.computed) == (18, 9)
+    delays = whole["contacts.delay"].values
+    assert_same_numbers(whole, longer.dataset.sel({"contacts.delay": delays}))
+
+
+def test_points_of_another_base_measure_or_program_do_not_mix(tmp_path, monkeypatch):
+    store = tmp_path / "points"
+    done_by(Plan.from_dict(tables()), store)
+    for change in (
+        {"slider": TINY["slider"] | {"damping_ratio": 0.3}},
+        {"run": {"duration": 0.4, "seed": 2}},
+        {"sweep": tables(discard=0.4)["sweep"]},
+        {"sweep": tables(measures=["mean_force"])["sweep"]},
+    ):
+        assert done_by(Plan.from_dict(tables() | change), store).taken == 0, change
+    monkeypatch.setattr("mesoslip._build.COMMIT", "another")
+    assert done_by(Plan.from_dict(tables()), store).taken == 0
+    monkeypatch.undo()
+    assert done_by(Plan.from_dict(tables() | {"title": "another"}), store).computed == 0
+
+
+def test_names_of_points_do_not_depend_on_realizations_or_order():
+    config = Config.from_dict(TINY)
+    measures = [MEASURES["mean_force"], MEASURES["breaks"]]
+    name = point_name(config, 3, measures, 0.5)
+    assert name == point_name(config.replace("run.realizations=7"), 3, measures[::-1], 0.5)
+    assert name != point_name(config, 4, measures, 0.5)
+
+
+@pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "renamed"])
+def test_damaged_points_count_as_missing(damage, tmp_path):
+    plan = Plan.from_dict(tables())
+    first = done_by(plan, tmp_path)
+    paths = sorted(path for path in tmp_path.glob("*.json") if path.name != "sweep.json")
+    path = paths[0]
+    content = path.read_text()
+    number = json.loads(content)["measures"]["breaks"]
+    path.write_text(
+        {
+            "cut": content[: len(content) // 2],
+            "flipped": content.replace(f'"{number}"', '"1e9"'),
+            "empty": "",
+            "renamed": paths[1].read_text(),
+        }[damage]
+    )
+    again = done_by(plan, tmp_path)
+    assert (again.taken, again.computed) == (5, 1)
+    assert_same_numbers(first.dataset, again.dataset)
+
+
+def test_numbers_come_back_from_the_store_to_the_bit(tmp_path):
+    values = {"tenth": 0.1, "least": 5e-324, "none": float("nan"), "much": float("inf")}
+    task = runner.task_of(plan := Plan.from_dict(tables()), next(iter(runner.places(plan))))
+    with Store(tmp_path) as store:
+        store.write(task, Outcome(values), {})
+        back = store.read(task.name).measures
+    assert {name: np.float64(one).tobytes() for name, one in back.items()} == {
+        name: np.float64(one).tobytes() for name, one in values.items()
+    }
+
+
+def test_outputs_of_points_on_request(tmp_path):
+    """Asked for later, they have their points computed again; each is an output like any other."""
+    done_by(Plan.from_dict(tables()), tmp_path)
+    plan = Plan.from_dict(tables(traces=True))
+    traced = done_by(plan, tmp_path)
+    assert (traced.taken, traced.computed) == (0, 6)
+    assert done_by(plan, tmp_path).taken == 6
+    assert done_by(Plan.from_dict(tables()), tmp_path).taken == 6
+    place = next(iter(runner.places(plan)))
+    tree = mesoslip.read(tmp_path / f"{place.name}.nc")
+    expected = mesoslip.run(place.combination.config)
+    np.testing.assert_array_equal(tree["spring_force"], expected["spring_force"])
+
+
+def test_one_store_one_sweep(tmp_path):
+    with Store(tmp_path), pytest.raises(FileError, match="another sweep is at work"):
+        Store(tmp_path)
+    with Store(tmp_path):
+        pass
+
+
+def test_what_a_killed_sweep_left_behind_is_removed(tmp_path):
+    (tmp_path / ".host-1-2.abc.json").write_text("half")
+    with Store(tmp_path):
+        assert [path.name for path in tmp_path.iterdir()] == ["lock"]
+
+
+USER = '''
+"""Measures of a user."""
+import numpy as np
+
+def last_force(tree):
+    """the force at the end"""
+    return tree["spring_force"][0, -1]
+
+last_force.units = "N"
+
+def sometimes(tree):
+    if tree["realization"].values[0] == {number}:
+        raise ValueError("too much")
+    return 1
+
+def text(tree):
+    return "much"
+'''
+
+
+def test_measures_of_ones_own(tmp_path, sweep_file, command):
+    (tmp_path / "own.py").write_text(USER.format(number=1))
+    path = sweep_file(SIMPLE.replace('"mean_force"', '"own.py:last_force", "mean_force"'))
+    output = tmp_path / "sweep.nc"
+    status, _, told = command("sweep", path, "-o", output, "--workers", "1", "--pool", "processes")
+    assert (status, "4 points computed" in told) == (0, True)
+    data = xr.open_dataset(output)
+    assert data["last_force"].units == "N"
+    assert data["last_force"].long_name == "the force at the end"
+    tree = mesoslip.run(
+        Config.from_dict(TINY).replace({"contacts.delay": 5e-4, "run.realizations": 2})
+    )
+    expected = tree["spring_force"].isel(time=-1)
+    np.testing.assert_array_equal(data["last_force"][1], expected)
+    # Another function of the same name gives other points.
+    (tmp_path / "own.py").write_text(USER.format(number=2))
+    assert "4 points computed" in command("sweep", path, "-o", output)[2]
+
+
+def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
+    """Points fail one by one; the rest is computed, and called again only they are tried."""
+    own = tmp_path / "own.py"
+    own.write_text(USER.format(number=1))
+    path = sweep_file(SIMPLE.replace('"mean_force"', '"own.py:sometimes", "mean_force"'))
+    output = tmp_path / "sweep.nc"
+    status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
+    assert status == 1
+    data = xr.load_dataset(output)
+    failed = data["status"].values == 1
+    np.testing.assert_array_equal(failed, [[False, True], [False, True]])
+    assert told.count("failed: contacts.delay") == 2
+    assert "failed: contacts.delay = 0.0001 s, realization = 1: measure sometimes" in told
+    assert "own.py, line 13): ValueError: too much" in told
+    np.testing.assert_array_equal(np.isnan(data["mean_force"].values), failed)
+    assert data.attrs["failures"].count("too much") == 2
+    status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
+    assert (status, "0 points computed, 2 were there, 2 failed" in told) == (1, True)
+    status, _, told = command("sweep", sweep_file(SIMPLE.replace("mean_force", "own.py:text")))
+    assert status == 1
+    assert "gave 'much', not a number" in told
+
+
+WRONG = {
+    'measures = ["mean_forc"]': "did you mean 'mean_force'",
+    'measures = ["nothing.py:here"]': "nothing.py cannot be read: No such file",
+    'measures = ["bad.py:here"]': "bad.py, line 2: ZeroDivisionError: division by zero",
+    'measures = ["good.py:thera"]': "has no function 'thera'; did you mean 'there'",
+    "measures = []": "must name at least one measure",
+    'measures = ["breaks", "breaks"]': "is named twice",
+    'measure = ["breaks"]': "sweep.measure: unknown key; did you mean 'measures'",
+    '[sweep.grid]\n"contacts.dely" = [1]': "unknown key; did you mean 'contacts.delay'",
+    '[sweep.grid]\n"delay" = [1]': "unknown key; did you mean 'contacts.delay'",
+    '[sweep.grid]\n"contacts.delay" = ["1 ms", "1 mm"]': (
+        "\"contacts.delay\"[1] = '1 mm': has the unit mm; expected a quantity such as '0.5 ms'"
+    ),
+    '[sweep.grid]\n"contacts.delay" = []': "must be a list of values",
+    '[sweep.grid]\n"contacts.delay" = "1 ms"': "must be a list of values",
+    '[sweep.grid]\n"contacts.delay" = [0.001, "1 ms"]': "contacts.delay = 0.001 s is given 2 times",
+    '[sweep.grid]\n"contacts.count" = [1.5]': "must be a whole number",
+    '[sweep.grid]\n"drive.stage" = [[]]': "only keys with one value can be varied",
+    '[sweep.grid]\n"run.realizations" = [1]': "set sweep.realizations",
+    '[sweep.grid]\n"contacts.delay" = { from = 0, to = 1, points = 2, spacing = "logarithmic" }': (
+        "needs both ends greater than 0"
+    ),
+    '[sweep.grid]\n"contacts.delay" = { from = 0, to = 1 }': '"contacts.delay".points: missing',
+    '[sweep.grid]\n"contacts.threshold.law" = { from = "a", to = "b", points = 2 }': "no range",
+    '[[sweep.together]]\n"contacts.delay" = [1, 2]\n"slider.mass" = [1]': (
+        "need equally many: contacts.delay has 2, slider.mass has 1"
+    ),
+    '[[sweep.together]]\n"slider.mass" = [1]\n[sweep.grid]\n"slider.mass" = [2]': "in two places",
+    '[sweep.latin_hypercube]\npoints = 0\n"slider.mass" = { from = 1, to = 2 }': "at least 1",
+    "[sweep.latin_hypercube]\npoints = 3": "names no keys to vary",
+    '[sweep.grid]\n"slider.stiffness" = [97, -97]': (
+        "point slider.stiffness = -97 N/m: slider.stiffness = -97.0: must be greater than 0"
+    ),
+    "realizations = 0": "must be greater than or equal to 1",
+    "discard = 1": "must be less than 1",
+    "": "nothing is varied",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_wrong_is_told_before_anything_is_run(text, tmp_path, sweep_file, command):
+    (tmp_path / "bad.py").write_text("\n1 / 0\n")
+    (tmp_path / "good.py").write_text("def there(tree):\n    return 0\n")
+    head = "[sweep]\n" if "measure" in text else '[sweep]\nmeasures = ["breaks"]\n'
+    tail = "" if "sweep." in text or not text else '\n[sweep.grid]\n"contacts.delay" = [0.001]'
+    output = tmp_path / "out" / "sweep.nc"
+    status, out, told = command("sweep", sweep_file(head + text + tail), "-o", output)
+    assert status == 2, told
+    assert WRONG[text] in told
+    assert "sweep.toml" in told
+    assert out == ""
+    assert not output.parent.exists()
+
+
+def test_many_points_that_cannot_be_run_are_counted(sweep_file, command):
+    path = sweep_file(
+        '[sweep]\nmeasures = ["breaks"]\n[sweep.grid]\n"slider.mass" = [-1,-2,-3,-4,-5,-6,-7,8]'
+    )
+    status, _, told = command("sweep", path)
+    assert status == 2
+    assert told.count("must be greater than 0") == 5
+    assert "7 of 8 combinations cannot be run" in told
+
+
+def test_a_sweep_needs_a_sweep(tmp_path, command):
+    (tmp_path / "base.toml").write_text(Config.from_dict(TINY).to_toml())
+    status, _, told = command("sweep", tmp_path / "base.toml")
+    assert (status, "sweep: missing; this table says" in told) == (2, True)
+    (tmp_path / "sweep.toml").write_text('base = "base.toml"\n[sweep]')
+    status, _, told = command("run", tmp_path / "sweep.toml")
+    assert (status, "the command for it is mesoslip sweep" in told) == (2, True)
+    with pytest.raises(ConfigError, match="pool"):
+        mesoslip.sweep(tables(), pool="swimming")
+
+
+def test_a_dry_run_runs_nothing(tmp_path, sweep_file, command):
+    output = tmp_path / "out" / "sweep.nc"
+    status, told, _ = command("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")
+    assert status == 0
+    assert "points   4 (2 contacts.delay x 2 realizations), 0 of them done" in told
+    assert {line.split()[0] for line in told.splitlines()} == {"points", "time", "memory", "disk"}
+    assert not output.parent.exists()
+    command("sweep", sweep_file(SIMPLE), "-o", output, "--pool", "threads")
+    assert "4 of them done" in command("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")[1]
+
+
+def test_changes_are_laid_over_the_base(tmp_path, sweep_file, command):
+    output = tmp_path / "sweep.nc"
+    arguments = ("-o", output, "--pool", "threads", "--set", "slider.damping_ratio=0.7")
+    assert command("sweep", sweep_file(SIMPLE), *arguments)[0] == 0
+    assert "damping_ratio = 0.7" in xr.load_dataset(output).attrs["configuration"]
+
+
+def test_a_stopped_sweep_keeps_what_it_has(tmp_path):
+    plan = Plan.from_dict(tables(realizations=3))
+    stop = StopFlag()
+
+    def until_five(tasks, flag):
+        for number, task in enumerate(tasks):
+            if number == 5:
+                flag.set()
+                return
+            yield task, compute(task)
+
+    with Store(tmp_path) as store:
+        part = runner.run_sweep(plan, store=store, executor=until_five, stop=stop)
+    assert (part.computed, part.missing, part.complete) == (5, 13, False)
+    assert np.sum(part.dataset["status"].values == 2) == 13
+    assert part.dataset.attrs["complete"] == "false"
+    rest = done_by(plan, tmp_path)
+    assert (rest.taken, rest.computed) == (5, 13)
+
+
+def test_examples_are_sweeps():
+    paths = sorted((ROOT / "runs" / "sweeps").glob("*.toml"))
+    assert paths
+    for path in paths:
+        assert Plan.load(path).combinations
+
+
+def test_a_script_without_a_guard_may_sweep(tmp_path):
+    """Processes do not import the program that starts them."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import json, sys, mesoslip\n"
+        "data = mesoslip.sweep(json.loads(sys.argv[1]), workers=2, pool='processes')\n"
+        "print(int(data['status'].sum()))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, script, json.dumps(tables())],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )
+    assert (result.stdout, result.stderr) == ("0\n", "")

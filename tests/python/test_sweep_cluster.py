@@ -1,0 +1,217 @@
+"""Sweeps and runs on a Dask cluster: a real scheduler and workers, as processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import klein_tables
+from mesoslip import Config, FileError, RunError
+from mesoslip.campaign import ensemble
+from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.store import Store
+from mesoslip.output import layout
+from mesoslip.simulation.checkpoint import Checkpoint
+from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.stop import StopFlag
+from test_sweep import assert_same_numbers, tables
+
+pytest.importorskip("distributed")
+
+PROGRAM = Path(sys.executable).with_name("dask")
+ENVIRONMENT = {
+    **os.environ,
+    "OPENBLAS_NUM_THREADS": "1",
+    # A point may cost two workers.
+    "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
+    "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "10s",
+}
+
+
+class Cluster:
+    """A scheduler and its workers, as processes."""
+
+    def __init__(self, folder: Path, workers: int) -> None:
+        self.folder = folder
+        self.file = folder / "scheduler.json"
+        self.scheduler = self._start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", self.file
+        )
+        self.workers = [self.add_worker() for _ in range(workers)]
+        deadline = time.monotonic() + 60
+        while not self.file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        self.address = json.loads(self.file.read_text())["address"]
+
+    def _start(self, *arguments: object) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [PROGRAM, *map(str, arguments), "--no-dashboard"],
+            env=ENVIRONMENT,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def add_worker(self) -> subprocess.Popen[bytes]:
+        # Two threads of a process, which must not disturb each other.
+        return self._start(
+            *("worker", "--scheduler-file", self.file, "--nthreads", 2, "--no-nanny"),
+            *("--local-directory", self.folder),
+        )
+
+    def close(self) -> None:
+        for process in [*self.workers, self.scheduler]:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    made = []
+
+    def make(workers: int = 2) -> Cluster:
+        made.append(Cluster(tmp_path, workers))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+OWN = """
+import os, signal, time
+
+def slow(tree):
+    time.sleep(0.1)
+    return 1.0
+
+def deadly(tree):
+    if tree["realization"].values[0] == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1.0
+"""
+
+
+def own_tables(folder, function, realizations):
+    (folder / "own.py").write_text(OWN)
+    measures = ["mean_force", f"{folder}/own.py:{function}"]
+    return tables(measures=measures, realizations=realizations)
+
+
+def test_a_cluster_gives_the_same(cluster, tmp_path):
+    """With outputs of points, whose files only one thread of a process may write."""
+    started = cluster()
+    plan = Plan.from_dict(tables(realizations=3, traces=True))
+    expected = mesoslip.sweep(tables(realizations=3), pool="threads")
+    store = tmp_path / "points"
+    data = mesoslip.sweep(plan, store=store, scheduler=started.address)
+    assert_same_numbers(expected, data)
+    assert len(list(store.glob("*.nc"))) == 18
+    # Realizations of a run too; the time that they take is their own.
+    config = Config.from_dict(klein_tables(contacts__count=50, run__realizations=4))
+    here = mesoslip.run(config)
+    there = mesoslip.run(config, scheduler=str(started.file))
+    for group in here.groups:
+        assert_same_numbers(
+            here[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
+            there[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
+        )
+
+
+def test_lost_workers_and_a_lost_scheduler(cluster, tmp_path):
+    """Workers that are killed lose nothing; without a scheduler the sweep ends, and goes on."""
+    started = cluster(2)
+    wanted = own_tables(tmp_path, "slow", 30)
+    store = tmp_path / "points"
+    done = []
+
+    def progress(part):
+        done.append(part)
+        if len(done) == 20:
+            started.workers[0].send_signal(signal.SIGKILL)
+            started.workers.append(started.add_worker())
+        if len(done) == 60:
+            started.scheduler.send_signal(signal.SIGKILL)
+
+    with pytest.raises(RunError, match="the scheduler is gone"):
+        mesoslip.sweep(wanted, store=store, scheduler=started.address, progress=progress)
+    with Store(store) as opened:
+        kept = len(opened.names())
+    assert 55 <= kept < 180
+    plan = Plan.from_dict(own_tables(tmp_path, "slow", 30))
+    counted = []
+    data = mesoslip.sweep(plan, store=store, workers=8, pool="threads", progress=counted.append)
+    assert counted[0] == pytest.approx(kept / 180)
+    assert not data["status"].any()
+
+
+def test_a_point_that_costs_workers_fails_alone(cluster, tmp_path):
+    started = cluster(3)
+    wanted = own_tables(tmp_path, "deadly", 2)
+    wanted["sweep"]["grid"] = {"contacts.delay": ["0.1 ms"]}
+    data = mesoslip.sweep(wanted, scheduler=started.address)
+    np.testing.assert_array_equal(data["status"], [[0, 1]])
+    assert "KilledWorker" in data.attrs["failures"]
+
+
+def test_no_scheduler_and_no_package(monkeypatch):
+    for address in ("nonsense", "tcp://127.0.0.1:1", "there/is/none.json"):
+        monkeypatch.setattr("mesoslip.campaign.cluster.PATIENCE", 0.5)
+        with pytest.raises(FileError, match="there is no scheduler"):
+            mesoslip.sweep(tables(), scheduler=address)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(FileError, match="pip install 'mesoslip\\[distributed\\]'"):
+        mesoslip.sweep(tables(), scheduler="tcp://127.0.0.1:1")
+
+
+def test_a_checkpoint_keeps_realizations_of_a_cluster(tmp_path, monkeypatch):
+    """Those that are done; those that are under way go on here only."""
+    config = Config.from_dict(klein_tables(contacts__count=50, run__realizations=4))
+    expected = mesoslip.run(config)
+    stop = StopFlag()
+
+    def two(_client, function, tasks, _stop):
+        for _, task in zip(range(2), tasks, strict=False):
+            yield task, function(task)
+
+    monkeypatch.setattr(ensemble, "on_cluster", two)
+    with Checkpoint(tmp_path / "done", config) as checkpoint:
+        part = ensemble.run_on_cluster(config, None, checkpoint=checkpoint)
+    assert [one.finished for one in part.realizations] == [True, True, False, False]
+    assert not part.complete
+    with Checkpoint(tmp_path / "done", config, resume=True) as checkpoint:
+        whole = run_realizations(config, checkpoint=checkpoint)
+        assert (
+            sum(
+                one.kernel_seconds == part.realizations[0].kernel_seconds
+                for one in whole.realizations
+            )
+            == 1
+        )
+        tree = layout.build_tree(whole)
+    for group in expected.groups:
+        assert_same_numbers(
+            expected[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
+            tree[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
+        )
+
+    def stop_early(part):
+        if part > 0:
+            stop.set()
+
+    long = config.replace("run.duration=1000")
+    with Checkpoint(tmp_path / "begun", long) as checkpoint:
+        run_realizations(long, checkpoint=checkpoint, stop=stop, progress=stop_early)
+    with (
+        Checkpoint(tmp_path / "begun", long, resume=True) as checkpoint,
+        pytest.raises(FileError, match="under way"),
+    ):
+        ensemble.run_on_cluster(long, None, checkpoint=checkpoint)

@@ -1,0 +1,208 @@
+"""Sweeps that are killed, stopped, or meet a disk that fails: nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import mesoslip
+import numpy as np
+import pytest
+import xarray as xr
+from kill_sweep import Study, is_alive, points_of, workers_of
+from test_sweep import SIMPLE, sweep_file, tables
+
+__all__ = ["sweep_file"]
+
+
+def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
+    """A short version of tests/resume/kill_sweep.py."""
+    study = Study(tmp_path, 4, np.random.default_rng(3))
+    whole = study.expected()
+    study.attack("killed", whole, 6)
+    assert study.wrong == []
+    assert study.sweep_kills + study.worker_kills > 1
+
+
+def test_workers_end_with_their_sweep_in_the_midst_of_a_point(tmp_path, sweep_file):
+    (tmp_path / "own.py").write_text("import time\ndef slow(tree):\n    time.sleep(100)\n")
+    path = sweep_file(SIMPLE.replace("mean_force", "own.py:slow"))
+    process = begin(path, tmp_path / "sweep.nc", "--pool", "processes", "--workers", "2")
+    # So that both are at work, and not still on their way to it.
+    deadline = time.monotonic() + 60
+    while len(children := workers_of(process.pid)) < 2 or not all(map(seems_idle, children)):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 10
+    while any(map(is_alive, children)):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    # Workers have it too, and it would be waited for them.
+    process.communicate()
+
+
+def seems_idle(process: int) -> bool:
+    """Whether a process has imported all that it needs, and sleeps."""
+    used = []
+    for _ in range(2):
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        used.append(int(fields[11]) + int(fields[12]))
+        time.sleep(0.5)
+    return used[0] == used[1] > 20
+
+
+def begin(path: Path, output: Path, *more: str) -> subprocess.Popen[str]:
+    """Start the command as a group of processes of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "mesoslip", "sweep", str(path), "-o", str(output), *more],
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+SLOW = """
+    [sweep]
+    realizations = 20
+    measures = ["mean_force", "own.py:slow"]
+    [sweep.grid]
+    "contacts.delay" = ["0.1 ms", "0.5 ms"]
+"""
+OWN = "import time\ndef slow(tree):\n    time.sleep(0.1)\n    return 1\n"
+
+
+@pytest.mark.parametrize("pool", ["threads", "processes"])
+def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
+    """It ends at once, with all its workers, and what there is can be looked at."""
+    (tmp_path / "own.py").write_text(OWN)
+    output = tmp_path / "out" / "sweep.nc"
+    process = begin(sweep_file(SLOW), output, "--pool", pool, "--workers", "2")
+    deadline = time.monotonic() + 60
+    while len(points_of(output)) < 4:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    children = workers_of(process.pid)
+    # As a terminal does it: to all of them.
+    os.killpg(process.pid, signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in told
+    assert "the same command does them" in told
+    assert not any(map(is_alive, children))
+    kept = len(points_of(output))
+    partial = xr.load_dataset(tmp_path / "out" / "sweep.partial.nc")
+    assert np.sum(partial["status"].values == 0) == kept
+    assert np.sum(partial["status"].values == 2) == 40 - kept
+    assert not output.exists()
+    process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "8")
+    _, told = process.communicate(timeout=60)
+    assert f"{40 - kept} points computed, {kept} were there" in told
+    assert not (tmp_path / "out" / "sweep.partial.nc").exists()
+
+
+def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file):
+    own = (
+        "import os\ndef deadly(tree):\n"
+        "    if tree['realization'].values[0] == 1:\n        os.kill(os.getpid(), 9)\n"
+        "    return 1\n"
+    )
+    (tmp_path / "own.py").write_text(own)
+    output = tmp_path / "sweep.nc"
+    text = SIMPLE.replace("mean_force", "own.py:deadly").replace('"0.1 ms", ', "")
+    path = sweep_file(text)
+    process = begin(path, output, "--pool", "processes", "--workers", "2")
+    _, told = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert told.count("cost 3 workers, of which the last was ended by signal 9") == 1
+    np.testing.assert_array_equal(xr.load_dataset(output)["status"], [[0, 1]])
+
+
+def test_workers_that_cannot_start_end_the_sweep(tmp_path, sweep_file, monkeypatch, command):
+    monkeypatch.setattr("mesoslip.campaign.execution.PROCESS", "raise SystemExit(7)")
+    arguments = ("-o", tmp_path / "sweep.nc", "--pool", "processes", "--workers", "1")
+    status, _, told = command("sweep", sweep_file(SIMPLE), *arguments)
+    assert status == 1
+    assert "ended with status 7" in told
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A folder on a disk that takes some points, and no more."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=160k", "tmpfs", str(folder)]
+    try:
+        mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
+    except OSError:
+        mounted = False
+    if not mounted:
+        pytest.skip("no disk can be mounted here")
+    yield folder
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
+    """One message; with room again, the sweep goes on from what is there."""
+    output = small_disk / "sweep.nc"
+    path = sweep_file(SIMPLE.replace("realizations = 2", "realizations = 50"))
+    status, _, told = command("sweep", path, "-o", output, "--pool", "threads", "--quiet")
+    assert status == 1
+    assert told.count("\n") == 1
+    assert "no space left on the disk" in told
+    kept = points_of(output)
+    assert 5 < len(kept) < 60
+    assert f"{len(kept)} points are kept: the same command goes on" in told
+    assert not output.exists()
+    assert not list(small_disk.rglob(".*"))
+    remount = ["mount", "-o", "remount,size=4m", str(small_disk)]
+    subprocess.run(remount, check=True)
+    status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
+    assert status == 0
+    assert f"{100 - len(kept)} points computed, {len(kept)} were there" in told
+
+
+def test_a_folder_that_vanishes_keeps_no_result_from_the_dataset(tmp_path):
+    store = tmp_path / "points"
+
+    def away(_):
+        shutil.rmtree(store, ignore_errors=True)
+
+    data = mesoslip.sweep(tables(), store=store, pool="threads", progress=away)
+    assert not data["status"].any()
+    assert np.isfinite(data["mean_force"]).all()
+
+
+def test_a_folder_that_is_none_is_told(tmp_path, sweep_file, command):
+    output = tmp_path / "sweep.nc"
+    output.write_bytes(b"earlier")
+    output.with_name("sweep.points").write_text("a file")
+    status, _, told = command("sweep", sweep_file(SIMPLE), "-o", output)
+    assert status == 2
+    assert "sweep.points: cannot be written: File exists" in told
+    assert output.read_bytes() == b"earlier"
+    status, _, told = command("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
+    assert status == 2
+    assert "cannot be written: Not a directory" in told
+
+
+def test_an_earlier_output_outlives_a_sweep_that_is_stopped(tmp_path, sweep_file):
+    (tmp_path / "own.py").write_text(OWN)
+    output = tmp_path / "sweep.nc"
+    output.write_bytes(b"earlier")
+    process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
+    deadline = time.monotonic() + 60
+    while not points_of(output):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert output.read_bytes() == b"earlier"

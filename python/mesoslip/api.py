@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mesoslip.campaign.plan import Plan
     from mesoslip.campaign.runner import Sweep
     from mesoslip.campaign.store import Store
+    from mesoslip.inference import plan as fit_plans
 
 PathLike = str | os.PathLike[str]
 
@@ -267,6 +268,127 @@ def onset(config: PathLike | Mapping[str, Any] | Config) -> xr.DataTree:
     return onset_of_slip(as_config(config))
 
 
+def read_trace(
+    file: PathLike,
+    *,
+    columns: str | None = None,
+    rate: float | None = None,
+    largest_gap: float | None = None,
+    drive_velocity: float | None = None,
+    stiffness: float | None = None,
+    config: PathLike | Mapping[str, Any] | Config | None = None,
+    noise: float | None = None,
+    period: float | None = None,
+) -> xr.DataTree:
+    """Read a measured trace from a table: an output like that of a run, with the slips found in it.
+
+    Parameters
+    ----------
+    file
+        Columns with units in their headers, such as ``time [s]``, ``force [uN]``,
+        ``displacement [nm]``.
+    columns
+        Headers in the place of those of the file, such as "time [s], force [uN], -".
+    rate
+        Samples in a second [1/s], if there are no times.
+    largest_gap
+        Longest time without values [s] that is filled by straight lines; none by default.
+    drive_velocity, stiffness
+        Velocity of the drive [m/s] and spring constant [N/m], if they are known.
+    config
+        Configuration of the experiment, which tells drive and spring, and lets every command work
+        on the output.
+    noise
+        Standard deviation of the noise of the force [N]; estimated by default.
+    period
+        Period of the setup [s]; by default that of the configuration, or estimated.
+
+    Raises
+    ------
+    FileError
+        If the table cannot be read or is wrong; the message tells the line.
+    ConfigError
+        If the configuration is wrong.
+    """
+    from mesoslip.measured import trace
+
+    return trace.read_trace(
+        Path(file),
+        columns=columns,
+        rate=rate,
+        largest_gap=largest_gap,
+        drive_velocity=drive_velocity,
+        stiffness=stiffness,
+        config=None if config is None else as_config(config),
+        noise=noise,
+        period=period,
+    )
+
+
+def fit(
+    output: PathLike | xr.DataTree,
+    config: PathLike | Mapping[str, Any] | fit_plans.Plan,
+    *,
+    store: PathLike | None = None,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    stop: StopFlag | None = None,
+) -> xr.DataTree:
+    """Fit parameters of the model to a trace, with their uncertainty.
+
+    Parameters
+    ----------
+    output
+        Output with the trace, measured (see `read_trace`) or simulated; its first realization.
+    config
+        What is known, and in a table ``[fit.free]`` what is not: a TOML file, nested tables, or a
+        `mesoslip.inference.plan.Plan`.
+    store
+        File in which simulations are kept until the fit is done, and from which it goes on when it
+        is called again; nowhere by default.
+    workers
+        Simulations at the same time; as many as there are processors by default. The result does
+        not depend on it.
+    progress
+        Called now and then with the part of the simulations that is done.
+    stop
+        Set by who wants the fit to stop, which raises
+        `mesoslip.inference.simulations.StoppedError`.
+
+    Returns
+    -------
+    xarray.DataTree
+        The posterior, see `mesoslip.inference.posterior.build_tree`: groups ``posterior``,
+        ``prior``, ``observed_data``, ``posterior_predictive`` as ArviZ has them, and more.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the trace cannot be fitted, or the configuration is wrong or contradicts it.
+    RunError
+        If no simulation is like the trace.
+    """
+    from mesoslip.inference import fit as fits
+    from mesoslip.inference.plan import Plan
+    from mesoslip.inference.posterior import build_tree
+
+    if isinstance(config, Plan):
+        plan = config
+    elif isinstance(config, Mapping):
+        plan = Plan.from_dict(config)
+    else:
+        plan = Plan.load(config)
+    fitted = fits.fit(
+        _as_tree(output),
+        plan,
+        store=None if store is None else Path(store),
+        workers=workers,
+        progress=progress,
+        stop=stop,
+    )
+    return build_tree(fitted)
+
+
 def read(path: PathLike) -> xr.DataTree:
     """Read an output into memory.
 
@@ -323,7 +445,7 @@ def regime(output: PathLike | xr.DataTree) -> xr.Dataset:
 
     if isinstance(output, str | os.PathLike):
         with files.opened_run(Path(output)) as tree:
-            return regimes(tree)
+            return regimes(tree, os.fspath(output))
     return regimes(output)
 
 

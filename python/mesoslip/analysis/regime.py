@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.output.layout import RunResults, group_of
+from mesoslip.output.layout import RunResults, config_of, group_of
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
 
@@ -157,24 +157,31 @@ class _Stage:
         return math.copysign(1.0, self.velocity)
 
 
-def regimes(tree: xr.DataTree) -> xr.Dataset:
+def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     """The regime of each realization of an output, and the numbers by which it is judged.
 
     Parameters
     ----------
     tree
-        Output of a run.
+        Output of a run, or a measured trace with the configuration of the experiment.
+    name
+        What to call it in messages.
 
     Returns
     -------
     xarray.Dataset
         Dimension ``realization``, variables `REGIME`: ``regime`` is 0 smooth, 1 stick-slip, 2
         irregular, 3 transient, with CF's flag attributes.
+
+    Raises
+    ------
+    FileError
+        If it has no configuration of a run.
     """
     import xarray as xr
 
     root, slips = tree.to_dataset(), group_of(tree, "slips")
-    config = Config.from_toml(tree.attrs["configuration"])
+    config = config_of(tree, name)
     time = root["time"].values
     owner = slips["realization_index"].values
     starts, drops = slips["start_time"].values, slips["force_drop"].values

@@ -51,7 +51,8 @@ def slips(
             f"{1e3 * (row['end_time'] - row['start_time']):13.3f} "
             f"{1e6 * row['force_before']:11.4f} "
             f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
-            f"{1e6 * row['peak_velocity']:11.4f} {row['contacts_broken']:8.0f}"
+            f"{_known(row['peak_velocity'], 1e6, '11.4f')} "
+            f"{_known(row['contacts_broken'], 1.0, '8.0f')}"
         )
     typer.echo(f"{len(rows)} slips")
     for name, (scale, unit) in SHOWN.items():
@@ -153,3 +154,10 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         typer.echo(one.told)
     if len(judged) > 1:
         typer.echo(told(judged))
+
+
+def _known(value: float | None, scale: float, form: str) -> str:
+    """A number of a column, or a dash if a measurement does not tell it."""
+    return (
+        format("-", f">{form.partition('.')[0]}") if value is None else format(scale * value, form)
+    )

@@ -16,12 +16,14 @@ from mesoslip.command_line import (
     claims,
     example,
     explore,
+    fit,
     pictures,
     report,
     response,
     run,
     sweep,
     theory,
+    trace,
 )
 from mesoslip.errors import MesoslipError
 from mesoslip.output.provenance import COMMAND_LINE
@@ -32,6 +34,8 @@ COMMANDS = (
     theory.info,
     theory.curve,
     theory.onset,
+    trace.trace,
+    fit.fit,
     catalogues.slips,
     catalogues.avalanches,
     catalogues.regime,

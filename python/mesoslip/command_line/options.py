@@ -59,12 +59,33 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def time_of(text: str, option: str) -> float:
-    """A time given to an option [s]."""
+def quantity(text: str, option: str, unit: str, example: str, *, positive: bool = False) -> float:
+    """A quantity given to an option, in SI.
+
+    Raises
+    ------
+    ConfigError
+        If it is no quantity of the unit's dimension, or not greater than 0 where it must be.
+    """
     from mesoslip.configuration.units import to_si
     from mesoslip.errors import ConfigError, Problem
 
     try:
-        return to_si(text, "s", "2 s")
+        value = to_si(text, unit, example)
     except ValueError as error:
         raise ConfigError([Problem("", option, str(error), text)]) from None
+    if positive and value <= 0:
+        raise ConfigError([Problem("", option, "must be greater than 0", text)])
+    return value
+
+
+def quantity_or_none(
+    text: str | None, option: str, unit: str, example: str, *, positive: bool = False
+) -> float | None:
+    """A quantity given to an option, in SI; None if the option is not given. See `quantity`."""
+    return None if text is None else quantity(text, option, unit, example, positive=positive)
+
+
+def time_of(text: str, option: str) -> float:
+    """A time given to an option [s]."""
+    return quantity(text, option, "s", "2 s")

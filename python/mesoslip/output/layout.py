@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
@@ -502,6 +503,23 @@ def build_tree(results: RunResults) -> xr.DataTree:
         others = {name: made[name] for name in made if name not in coordinates}
         datasets["/" + group] = xr.Dataset(others, coordinates, form.attributes)
     return xr.DataTree.from_dict(datasets)
+
+
+def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
+    """The configuration of an output.
+
+    Raises
+    ------
+    FileError
+        If it has none of a run, as a measured trace of which less is known.
+    """
+    try:
+        return Config.from_toml(tree.attrs["configuration"])
+    except ConfigError:
+        raise FileError(
+            f"{name}: has no configuration of a run; for a measured trace give "
+            "mesoslip trace that of the experiment with --config"
+        ) from None
 
 
 def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:

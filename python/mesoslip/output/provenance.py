@@ -7,12 +7,9 @@ from contextvars import ContextVar
 from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from mesoslip import _build
-
-if TYPE_CHECKING:
-    from mesoslip.configuration.config import Config
 
 # The line that was typed, if the command line is what asks for an output.
 COMMAND_LINE: ContextVar[str | None] = ContextVar("COMMAND_LINE", default=None)
@@ -27,7 +24,26 @@ SUMMARIES = {
     "contacts that break one after another and for a film that melts at once",
     "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
     "over a range of parameters",
+    "trace": "A measured trace of the spring force of a slider, with the slips found in it",
+    "fit": "Parameters of the earthquake-like model of multicontact friction with their "
+    "uncertainty, from a trace of the spring force",
 }
+
+
+class Described(Protocol):
+    """What an output is of: a configuration, or as much of one as is known."""
+
+    @property
+    def title(self) -> str | None: ...
+
+    @property
+    def base(self) -> Described | None:
+        """What it was laid over."""
+        ...
+
+    def to_toml(self) -> str:
+        """The text of a TOML file."""
+        ...
 
 
 @cache
@@ -36,7 +52,7 @@ def version(package: str) -> str:
     return metadata.version(package)
 
 
-def program_attributes(config: Config, command: str) -> dict[str, Any]:
+def program_attributes(config: Described, command: str) -> dict[str, Any]:
     """Attributes of every output: what was computed, by what."""
     # Here, as the command line imports this module, which is to start at once.
     from mesoslip import _core

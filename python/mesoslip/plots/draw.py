@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 
 from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
-from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.plots import avalanches, response, run, sweep, theory
+from mesoslip.output.layout import config_of
+from mesoslip.plots import avalanches, posterior, response, run, sweep, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
 
@@ -33,6 +33,7 @@ KINDS = {
     "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
+    "fit": Kind("a fit", lambda tree: "posterior" in tree.children),
 }
 
 
@@ -97,6 +98,11 @@ def picture(
             lambda figure: sweep.overview(tree, figure, view),
             lambda axes: sweep.draw_measure(axes, tree, view),
         )
+    if kind == "fit":
+        return Picture(
+            lambda figure: posterior.overview(tree, figure),
+            lambda axes: posterior.draw_trace(axes, tree),
+        )
     if view == "lattice":
         chosen = avalanches.chosen_snapshot(tree, snapshot)
         return Picture(
@@ -119,7 +125,8 @@ def picture(
             lambda figure: response.overview(tree, figure),
             lambda axes: response.draw_force(axes, tree),
         )
-    room = avalanches if Config.from_toml(tree.attrs["configuration"]).slider.jumps else run
+    is_measured = tree.attrs.get("origin") == "measured"
+    room = run if is_measured or not config_of(tree).slider.jumps else avalanches
     return Picture(
         lambda figure: room.overview(tree, figure, extent),
         lambda axes: room.draw_force(axes, tree, extent),
@@ -134,8 +141,8 @@ def comparison(
 ) -> Picture:
     """The picture of several outputs of one command over each other; see `draw`."""
     kind = kind_of_all(trees, names)
-    if kind == "sweep":
-        raise FileError("sweeps are drawn one at a time")
+    if kind in {"sweep", "fit"}:
+        raise FileError(f"{kind}s are drawn one at a time")
     _check_view(kind, view, extent)
     labels = labels_of(trees, names)
     if kind == "curve":
@@ -159,8 +166,12 @@ def comparison(
 
 def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
     """A label for each output that says how it differs from the others."""
-    configs = [Config.from_toml(tree.attrs["configuration"]) for tree in trees]
     short = [Path(name).stem if name.endswith(".nc") else name for name in names]
+    try:
+        configs = [config_of(tree) for tree in trees]
+    except FileError:
+        # Of a measured trace less may be known.
+        return short
     return differences.labels(configs, short)
 
 

@@ -131,6 +131,13 @@ class Extent:
 EVERYTHING = Extent()
 
 
+def is_known(tree: xr.DataTree, name: str) -> bool:
+    """Whether an output has values of a variable of the trace: a measured one may not."""
+    if tree.attrs.get("origin") != "measured":
+        return True
+    return bool(np.isfinite(tree.to_dataset()[name][0, 0].item()))
+
+
 def times_of(tree: xr.DataTree) -> Array:
     """Times of the trace [s]."""
     times: Array = tree.to_dataset()["time"].values
@@ -403,6 +410,8 @@ class Abscissa:
 def abscissa(trees: Sequence[xr.DataTree], extent: Extent) -> Abscissa:
     """The axis that fits what is drawn of outputs."""
     name, label = extent.abscissa
+    if name != "time" and not all(is_known(tree, name) for tree in trees):
+        raise FileError(f"a measured trace does not tell the {label}; draw it against time")
     windows = np.array([extent.window(tree) for tree in trees])
     if name != "time":
         lines = [
@@ -472,25 +481,37 @@ def _draw_one(axes: Axes, tree: xr.DataTree, name: str, extent: Extent, along: A
     draw_curves(axes, [*curves, curve(tree, name, extent, color="black")], name, along)
 
 
+def _known_below(trees: Sequence[xr.DataTree]) -> list[str]:
+    """What is drawn below the force, as far as some output has it."""
+    names = ("velocity", "detached_contacts")
+    return [name for name in names if any(is_known(tree, name) for tree in trees)]
+
+
+def _height(below: Sequence[str]) -> float:
+    """Height of a picture [inch] of the force with so many panels below."""
+    return 2.8 + 1.2 * len(below)
+
+
 def overview(
     tree: xr.DataTree, figure: Canvas | None = None, extent: Extent = EVERYTHING
 ) -> Canvas:
     """Force, velocity and detached contacts; beside them the same of the largest slip."""
     slip, along = largest_slip(tree, extent), abscissa([tree], extent)
+    below = _known_below([tree])
     with styled():
-        figure = canvas(figure, (8.0, 5.2) if slip is not None else (6.5, 5.2))
+        figure = canvas(figure, (6.5 if slip is None else 8.0, _height(below)))
         columns = 1 if slip is None else 2
         panels = figure.subplots(
-            3,
+            1 + len(below),
             columns,
             sharex="col",
             squeeze=False,
-            height_ratios=[1.7, 1, 1],
+            height_ratios=[1.7, *(1 for _ in below)],
             width_ratios=[2.1, 1][:columns],
         )
         draw_force(panels[0, 0], tree, extent, along)
-        _draw_one(panels[1, 0], tree, "velocity", extent, along)
-        _draw_one(panels[2, 0], tree, "detached_contacts", extent, along)
+        for axes, name in zip(panels[1:, 0], below, strict=True):
+            _draw_one(axes, tree, name, extent, along)
         if slip is not None:
             draw_slip(list(panels[:, 1]), tree, slip, extent)
             if extent.abscissa[0] == "time":
@@ -499,7 +520,7 @@ def overview(
                 ]
                 for axes in panels[:, 0]:
                     axes.axvspan(*edges, color="tab:orange", alpha=0.25, linewidth=0.8, zorder=0)
-        for axes in panels[:2].flat:
+        for axes in panels[:-1].flat:
             axes.set_xlabel("")
     return figure
 
@@ -507,19 +528,24 @@ def overview(
 def draw_slip(
     panels: Sequence[Axes], tree: xr.DataTree, slip: xr.Dataset, extent: Extent = EVERYTHING
 ) -> None:
-    """Draw both forces, the velocity and the detached contacts of a slip, each into axes."""
+    """Draw both forces, the velocity and the detached contacts of a slip, each into axes.
+
+    Of a measured trace what is known of them, into as many axes.
+    """
     times = times_of(tree)
     low, high = slip_window(slip)
     near = Extent(extent.first, max(low, times[0]), min(high, times[-1]), parts=extent.parts)
     along = since((near.start, near.end))
-    force, velocity, detached = panels
-    curves = [curve(tree, "contact_force", near, **CONTACT)]
+    force, *others = panels
+    curves = []
+    if is_known(tree, "contact_force"):
+        curves.append(curve(tree, "contact_force", near, **CONTACT))
     if force_of(tree) == "elastic_force":
         curves.append(curve(tree, "elastic_force", near, color="tab:green", label="mean elastic"))
     curves.append(curve(tree, "spring_force", near, **SPRING))
     draw_curves(force, curves, "spring_force", along, "force")
     legend_above(force, columns=1, title="largest slip, orange on the left")
-    for axes, name in ((velocity, "velocity"), (detached, "detached_contacts")):
+    for axes, name in zip(others, _known_below([tree]), strict=True):
         draw_curves(axes, [curve(tree, name, near, color="black")], name, along)
 
 
@@ -558,14 +584,16 @@ def comparison(
 ) -> Canvas:
     """Force, velocity and detached contacts of several runs over each other."""
     along = abscissa(trees, extent)
+    below = _known_below(trees)
     with styled():
-        figure = canvas(figure, (6.5, 5.2 + 0.16 * len(trees)))
-        panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.7, 1, 1])
-        for axes, name in zip(panels, ("", "velocity", "detached_contacts"), strict=True):
+        figure = canvas(figure, (6.5, _height(below) + 0.16 * len(trees)))
+        ratios = [1.7, *(1 for _ in below)]
+        panels = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)
+        for axes, name in zip(panels[:, 0], ("", *below), strict=True):
             _compare(axes, trees, labels, name, extent, along)
-        for axes in panels[:2]:
+        for axes in panels[:-1, 0]:
             axes.set_xlabel("")
-        shared_legend(figure, panels[0])
+        shared_legend(figure, panels[0, 0])
     return figure
 
 

@@ -14,6 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from mesoslip.configuration.config import Config
+from mesoslip.output.layout import config_of
 from mesoslip.plots.style import Canvas, styled
 
 # A page shows fewer dots than a picture that is printed.
@@ -36,7 +37,7 @@ class Subject:
     @property
     def config(self) -> Config:
         """The configuration of the output."""
-        return Config.from_toml(self.tree.attrs["configuration"])
+        return config_of(self.tree, self.name)
 
 
 @dataclass(frozen=True)

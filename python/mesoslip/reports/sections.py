@@ -21,6 +21,7 @@ from mesoslip.analysis import slips as slip_catalogue
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import scale_for, with_unit
+from mesoslip.inference import posterior
 from mesoslip.output import variables
 from mesoslip.output.layout import group_of
 from mesoslip.plots import draw, run
@@ -120,7 +121,10 @@ def changes(subjects: Sequence[Subject]) -> Section | None:
 
 def verdict(subjects: Sequence[Subject]) -> Section | None:
     """Which motion each run shows."""
-    told = [(one, regime.told(regime.judgements(regime.regimes(one.tree)))) for one in subjects]
+    told = [
+        (one, regime.told(regime.judgements(regime.regimes(one.tree, one.name))))
+        for one in subjects
+    ]
     blocks = tuple(
         Text(_named(subjects, one, f"{text[:1].upper()}{text[1:]}.")) for one, text in told
     )
@@ -339,7 +343,8 @@ def avalanches(subjects: Sequence[Subject]) -> Section | None:
 def energy(subjects: Sequence[Subject]) -> Section | None:
     """The balance of energy, and what the run promised."""
     blocks: list[Block] = []
-    for subject in subjects:
+    # An experiment has no balance.
+    for subject in (one for one in subjects if one.tree.attrs.get("origin") != "measured"):
         audit = subject.tree.attrs.get("audit", "")
         residual = abs(float(subject.tree.attrs.get("energy_residual", np.nan)))
         told = f"The balance closes to {residual:.1g} of the work of the drive; audit: {audit}."
@@ -360,7 +365,7 @@ def energy(subjects: Sequence[Subject]) -> Section | None:
                 rows.append((meaning.long_name, with_unit(value, "J", 6), part))
         head = ("of all realizations", "energy", "part of the work")
         blocks.append(Table(head, tuple(rows)))
-    return Section("Energy", tuple(blocks))
+    return Section("Energy", tuple(blocks)) if blocks else None
 
 
 def curve_numbers(subjects: Sequence[Subject]) -> Section | None:
@@ -398,6 +403,30 @@ def _numbers(
         if one.tree.attrs.get("comment")
     )
     return Section(title, (table, *comments))
+
+
+def parameters(subjects: Sequence[Subject]) -> Section | None:
+    """What fits found, with its uncertainty, and what they warn of."""
+    blocks: list[Block] = []
+    head = ("parameter", "value", "50 % interval", "90 % interval", "verdict", "told most by")
+    for subject in subjects:
+        rows = []
+        for row in posterior.table(subject.tree):
+            low, lower, middle, upper, high = (
+                with_unit(value, row.unit, 4) for value in row.percentiles
+            )
+            intervals = (f"{lower} to {upper}", f"{low} to {high}")
+            rows.append((row.key, middle, *intervals, row.verdict, row.informed_by))
+        if len(subjects) > 1:
+            blocks.append(Text(subject.name))
+        probability = float(subject.tree.attrs["agreement_probability"])
+        note = f"Agreement of the model with the trace: p = {probability:.2g}."
+        blocks.append(Table(head, tuple(rows), note))
+        warnings = str(subject.tree.attrs["warnings"]).split("\n")
+        blocks += [Text(f"Warning: {one}.", warns=True) for one in warnings if one]
+        caption = "Parameters, and what they predict beside the trace"
+        blocks.append(_picture(subjects, subject, caption, None, run.EVERYTHING))
+    return Section("Parameters", tuple(blocks))
 
 
 def configuration(subjects: Sequence[Subject]) -> Section | None:
@@ -445,4 +474,5 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
     "sweep": (sweep, maps_of_sweep, provenance),
     "curve": (changes, pictures, curve_numbers, configuration, provenance),
     "onset": (changes, pictures, onset_numbers, configuration, provenance),
+    "fit": (parameters, configuration, provenance),
 }

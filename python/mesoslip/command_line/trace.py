@@ -1,0 +1,92 @@
+"""``mesoslip trace``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mesoslip.command_line.options import quantity_or_none
+
+
+def trace(
+    table: Annotated[
+        Path,
+        typer.Argument(
+            help="Table with units in its header, such as 'time [s], force [uN]'",
+            metavar="FILE.csv",
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"
+        ),
+    ] = None,
+    config: Annotated[
+        str | None,
+        typer.Option(
+            "--config",
+            help="Configuration of the experiment, so that every command works on the output",
+            metavar="CONFIG",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help="Headers in the place of those of the file, such as 'time [s], force [uN], -'",
+            metavar="HEADERS",
+        ),
+    ] = None,
+    rate: Annotated[
+        str | None, typer.Option(help="Sampling rate, if there are no times", metavar="1 kHz")
+    ] = None,
+    velocity: Annotated[
+        str | None, typer.Option(help="Velocity of the drive", metavar="'0.1 um/s'")
+    ] = None,
+    stiffness: Annotated[
+        str | None, typer.Option(help="Spring constant", metavar="'97 N/m'")
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="Standard deviation of the noise; estimated by default", metavar="'0.1 uN'"
+        ),
+    ] = None,
+    period: Annotated[
+        str | None,
+        typer.Option(
+            help="Period of the setup; from --config, or else estimated", metavar="'25 ms'"
+        ),
+    ] = None,
+    largest_gap: Annotated[
+        str | None,
+        typer.Option(help="Gaps up to this are filled by straight lines", metavar="'10 ms'"),
+    ] = None,
+) -> None:
+    """Read a measured trace, find its slips, and write an output like that of a run."""
+    from mesoslip import api
+    from mesoslip.output import files
+
+    path = output or Path("out") / f"{table.stem}.nc"
+    files.check_writable(path, [table, *([] if config is None else [config])])
+    tree = api.read_trace(
+        table,
+        columns=columns,
+        rate=quantity_or_none(rate, "--rate", "1/s", "1 kHz", positive=True),
+        largest_gap=quantity_or_none(largest_gap, "--largest-gap", "s", "10 ms", positive=True),
+        drive_velocity=quantity_or_none(velocity, "--velocity", "m/s", "0.1 um/s"),
+        stiffness=quantity_or_none(stiffness, "--stiffness", "N/m", "97 N/m", positive=True),
+        config=config,
+        noise=quantity_or_none(noise, "--noise", "N", "0.1 uN"),
+        period=quantity_or_none(period, "--period", "s", "25 ms", positive=True),
+    )
+    files.write(tree, path)
+    time, known = tree.to_dataset()["time"].values, tree.attrs
+    typer.echo(
+        f"{path}: {time.size} samples, {time[-1] - time[0]:.6g} s, noise "
+        f"{1e6 * known['noise']:.3g} uN, period of the setup {1e3 * known['setup_period']:.3g} ms "
+        f"({known['setup_period_origin']}), {tree['slips'].sizes['slip']} slips",
+        err=True,
+    )

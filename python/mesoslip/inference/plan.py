@@ -1,0 +1,215 @@
+"""What is to be fitted: the table [fit] of a configuration file."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.files import Change, on_base, override, read_toml
+from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
+from mesoslip.configuration.units import to_si
+from mesoslip.errors import ConfigError, Problem
+from mesoslip.inference.prior import Free, Prior
+
+KEYS = ("free", "noise", "after", "simulations", "seed")
+RANGE_KEYS = ("from", "to", "prior")
+# What says nothing of the experiment.
+NOT_FITTED = ("run.", "output.", "curve.")
+PRIORS = ("uniform", "logarithmic")
+LEAST_SIMULATIONS = 300
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A fit.
+
+    Attributes
+    ----------
+    config
+        What is known, with values of the free keys that do not matter.
+    prior
+        The free keys.
+    noise
+        Standard deviation of the noise of the force [N]; None to have it estimated.
+    after
+        Time from which the trace counts [s]; with 0 its first loading and slip are used as well.
+    simulations
+        Number of simulations.
+    seed
+        Of all random numbers of the fit.
+    """
+
+    config: Config
+    prior: Prior
+    noise: float | None = None
+    after: float = 0.0
+    simulations: int = 1600
+    seed: int = 1
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Plan:
+        """Read a configuration file with a table [fit].
+
+        Raises
+        ------
+        FileError
+            If a file cannot be read.
+        ConfigError
+            If anything in it is wrong.
+        """
+        path = Path(path)
+        return cls._checked(override(read_toml(path), overrides), str(path))
+
+    @classmethod
+    def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Plan:
+        """A fit given as nested tables; see `load`."""
+        return cls._checked(on_base(tables, source, Path()), source)
+
+    @classmethod
+    def _checked(cls, tables: Mapping[str, Any], source: str) -> Plan:
+        tables = dict(tables)
+        table = tables.pop("fit", None)
+        config = Config.from_dict(tables, source)
+        if table is None:
+            raise ConfigError(
+                [Problem(source, "fit", "missing; name the free keys in a table [fit.free]")]
+            )
+        if not isinstance(table, Mapping):
+            raise ConfigError([Problem(source, "fit", "must be a table", table)])
+        reader = _Reader(source)
+        for key in table:
+            if key not in KEYS:
+                reader.unknown(f"fit.{key}", key, KEYS)
+        prior = Prior(tuple(reader.free(table.get("free"), config)))
+        plan = cls(
+            config,
+            prior,
+            reader.quantity(table, "noise", "N", "0.1 uN"),
+            reader.quantity(table, "after", "s", "2 s") or 0.0,
+            reader.whole(table, "simulations", cls.simulations, LEAST_SIMULATIONS),
+            reader.whole(table, "seed", cls.seed, 0),
+        )
+        if reader.problems:
+            raise ConfigError(reader.problems)
+        return plan
+
+
+class _Reader:
+    """Reads the table, and gathers everything that is wrong with it."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.problems: list[Problem] = []
+
+    def wrong(self, key: str, message: str, value: object = None) -> None:
+        self.problems.append(Problem(self.source, key, message, value))
+
+    def unknown(self, key: str, name: str, known: Iterable[str]) -> None:
+        near = difflib.get_close_matches(name, known, 1)
+        self.wrong(key, f"unknown key; did you mean {near[0]!r}?" if near else "unknown key")
+
+    def quantity(
+        self, table: Mapping[str, Any], name: str, unit: str, example: str
+    ) -> float | None:
+        """A quantity that is not negative; None if it is not given."""
+        if name not in table:
+            return None
+        value = self._si(f"fit.{name}", table[name], unit, example)
+        if value is not None and value < 0:
+            self.wrong(f"fit.{name}", "must not be negative", table[name])
+        return value
+
+    def whole(self, table: Mapping[str, Any], name: str, default: int, least: int) -> int:
+        value = table.get(name, default)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**31:
+            self.wrong(f"fit.{name}", f"must be a whole number of at least {least}", value)
+            return default
+        return value
+
+    def _si(self, key: str, value: object, unit: str, example: str) -> float | None:
+        try:
+            return to_si(value, unit, example)
+        except ValueError as error:
+            self.wrong(key, str(error), value)
+            return None
+
+    def free(self, table: object, config: Config) -> Iterable[Free]:
+        """The free keys."""
+        if not isinstance(table, Mapping) or not table:
+            self.wrong(
+                "fit.free",
+                'must be a table of free keys, such as "contacts.delay" = '
+                '{ from = "0.01 ms", to = "10 ms", prior = "logarithmic" }',
+            )
+            return
+        for key, ranges in _flat(table):
+            place = f"fit.free.{key}"
+            kind = key_kind(key)
+            takes_number = kind is not None and kind.cf_units is not None and kind.is_single
+            if kind is None or not takes_number or key.startswith(NOT_FITTED):
+                near = [one for one in nearest_keys(key) if one != key]
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                self.wrong(place, f"is no key that can be fitted{hint}")
+                continue
+            one = self._range(place, key, ranges, kind)
+            if one is not None:
+                self._try(place, one, config)
+                yield one
+
+    def _range(self, place: str, key: str, ranges: object, kind: KeyKind) -> Free | None:
+        unit = kind.unit or "1"
+        if not isinstance(ranges, Mapping):
+            self.wrong(place, 'must be a table such as { from = "5 uN", to = "100 uN" }', ranges)
+            return None
+        for name in ranges:
+            if name not in RANGE_KEYS:
+                self.unknown(f"{place}.{name}", name, RANGE_KEYS)
+        ends = []
+        for name in ("from", "to"):
+            if name not in ranges:
+                self.wrong(f"{place}.{name}", "missing; it has no default")
+                return None
+            ends.append(self._si(f"{place}.{name}", ranges[name], unit, f"1 {unit}".strip(" 1")))
+        low, high = ends
+        if low is None or high is None:
+            return None
+        prior = ranges.get("prior", PRIORS[0])
+        if prior not in PRIORS:
+            self.wrong(f"{place}.prior", "must be 'uniform' or 'logarithmic'", prior)
+            return None
+        if not low < high:
+            self.wrong(f"{place}.to", "must be greater than 'from'", ranges["to"])
+            return None
+        if prior == "logarithmic" and low <= 0:
+            self.wrong(
+                f"{place}.from", "must be greater than 0 with a logarithmic prior", ranges["from"]
+            )
+            return None
+        return Free(key, low, high, prior == "logarithmic", unit, kind.is_whole)
+
+    def _try(self, place: str, one: Free, config: Config) -> None:
+        """Make sure that both ends of a range can be run."""
+        for name, value in (("from", one.low), ("to", one.high)):
+            try:
+                config.replace({one.key: int(value) if one.is_whole else value})
+            except ConfigError as error:
+                first = error.problems[0]
+                self.wrong(f"{place}.{name}", f"cannot be run: {first.key}: {first.message}", value)
+
+
+def _flat(table: Mapping[str, Any], outer: str = "") -> Iterable[tuple[str, Any]]:
+    """Dotted keys of a table whose keys may be dotted or nested."""
+    for key, value in table.items():
+        name = f"{outer}{key}"
+        is_range = not isinstance(value, Mapping) or not all(
+            isinstance(inner, Mapping) for inner in value.values()
+        )
+        if is_range or not value:
+            yield name, value
+        else:
+            yield from _flat(value, f"{name}.")

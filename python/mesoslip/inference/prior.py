@@ -1,0 +1,80 @@
+"""What a fit starts from: free keys of a configuration, and their ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Free:
+    """A free parameter: the key of a configuration, and its range.
+
+    Attributes
+    ----------
+    key
+        Dotted name, such as "contacts.delay".
+    low, high
+        Ends of the range, in SI.
+    is_logarithmic
+        Whether the prior is uniform in the logarithm.
+    unit
+        SI unit, such as "N/m"; "1" for plain numbers.
+    is_whole
+        Whether it is a whole number.
+    """
+
+    key: str
+    low: float
+    high: float
+    is_logarithmic: bool = False
+    unit: str = "1"
+    is_whole: bool = False
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Independent priors of all free parameters: uniform on the unit cube of their ranks."""
+
+    free: tuple[Free, ...]
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(one.key for one in self.free)
+
+    def values(self, unit: Array) -> Array:
+        """Parameters in SI, shape (..., parameters), at points of the unit cube."""
+        columns = []
+        for one, place in zip(self.free, np.moveaxis(np.asarray(unit), -1, 0), strict=True):
+            if one.is_logarithmic:
+                value = one.low * (one.high / one.low) ** place
+            else:
+                value = one.low + (one.high - one.low) * place
+            columns.append(np.round(value) if one.is_whole else value)
+        return np.stack(columns, axis=-1)
+
+    def unit(self, values: Array) -> Array:
+        """Points of the unit cube of parameters in SI, shape (..., parameters)."""
+        columns = []
+        for one, value in zip(self.free, np.moveaxis(np.asarray(values), -1, 0), strict=True):
+            if one.is_logarithmic:
+                columns.append(np.log(value / one.low) / np.log(one.high / one.low))
+            else:
+                columns.append((value - one.low) / (one.high - one.low))
+        return np.stack(columns, axis=-1)
+
+    def changes(self, values: Array) -> dict[str, Any]:
+        """Changes of a configuration that set the parameters."""
+        return {
+            one.key: int(value) if one.is_whole else float(value)
+            for one, value in zip(self.free, values, strict=True)
+        }

@@ -1,0 +1,259 @@
+"""A posterior by rounds of simulations that close in on the parameters that matter.
+
+The first round is spread over the prior. After each the synthetic likelihood is learnt from the
+simulations of the region, and the next are drawn around its posterior, twice as wide; the region
+is where they lie. When the posterior is no longer much narrower than the region, all that is left
+of the simulations goes there. What a likelihood learnt over a wide region cannot follow is noise to
+it, so early posteriors are too wide rather than wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import RunError
+from mesoslip.inference.likelihood import Projection, Surrogate, learn, project, usable
+from mesoslip.inference.sampler import draw
+from mesoslip.inference.simulations import Simulations
+
+Array = NDArray[np.float64]
+
+# Parts of the simulations in the first round, in the next ones, and of all until the region stands.
+FIRST, NEXT = 0.16, 0.12
+LEAST_FIRST, LEAST_NEXT = 100, 60
+MOST_CLOSING = 0.65
+# Width of the region over that of the posterior.
+WIDTH = 2.0
+# Ratio of the widths at which the region stands, and rounds before it may.
+CLOSE = 3.2
+LEAST_ROUNDS = 3
+# Part of the draws that lies in the region.
+INSIDE = 0.98
+# Draws of each chain: until the region stands, and at the end.
+ROUGH, FINE = 500, 1000
+CHAINS = 4
+# Points that a chain may start from.
+STARTS = 40
+# Least simulations of a likelihood.
+LEAST_VALID = 40
+# By what the limit of a region grows that has too few of them.
+GROWTH = 1.5
+# Least width of the region on the unit cube, beyond which nothing is resolved.
+NARROWEST = 1e-6
+
+
+@dataclass(frozen=True)
+class Region:
+    """An ellipsoid on the unit cube; the whole cube if it has no centre."""
+
+    centre: Array
+    inverse: Array
+    limit: float
+
+    def contains(self, points: Array) -> NDArray[np.bool_]:
+        """Which of the points, shape (points, parameters), lie in it."""
+        inside = self.distance(points) <= self.limit
+        return np.asarray(inside & np.all((points >= 0) & (points <= 1), axis=1))
+
+    def distance(self, points: Array) -> Array:
+        """Squared distances of points from the centre, shape (points,)."""
+        away = points - self.centre
+        return np.asarray(np.einsum("ij,jk,ik->i", away, self.inverse, away))
+
+    @classmethod
+    def around(cls, points: Array) -> Region:
+        """The ellipsoid around most of some points."""
+        covariance = np.cov(points.T).reshape(points.shape[1], -1)
+        covariance += NARROWEST**2 * np.eye(points.shape[1])
+        whole = cls(points.mean(axis=0), np.asarray(np.linalg.inv(covariance)), np.inf)
+        limit = float(np.quantile(whole.distance(points), INSIDE))
+        return cls(whole.centre, whole.inverse, limit)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is known of the parameters after a round.
+
+    Attributes
+    ----------
+    chains
+        Draws from the posterior on the unit cube, shape (chains, draws, parameters).
+    projection, surrogate, statistics
+        The synthetic likelihood, and the statistics of the trace.
+    coverage
+        Parts of the simulations that lie within the 50 and the 90 % regions of the likelihood.
+    parameters, summaries
+        Of the simulations that it was learnt from.
+    ratio
+        Width of their region over that of the posterior, the greatest of all parameters.
+    """
+
+    chains: Array
+    projection: Projection
+    surrogate: Surrogate
+    statistics: Array
+    coverage: tuple[float, float]
+    parameters: Array
+    summaries: Array
+    ratio: float
+
+    @property
+    def draws(self) -> Array:
+        """Draws of all chains, shape (draws, parameters)."""
+        return self.chains.reshape(-1, self.chains.shape[-1])
+
+
+def close_in(
+    simulations: Simulations, observed: Array, total: int, rng: np.random.Generator
+) -> Estimate:
+    """The posterior after all rounds.
+
+    Parameters
+    ----------
+    simulations
+        To which more are added.
+    observed
+        Summaries of the trace.
+    total
+        Simulations in all.
+    rng
+        Random numbers.
+
+    Raises
+    ------
+    RunError
+        If hardly any simulation is like the trace.
+    """
+    from scipy.stats import qmc
+
+    size = len(simulations.simulator.prior)
+    first = max(LEAST_FIRST, round(FIRST * total))
+    each = max(LEAST_NEXT, round(NEXT * total))
+    simulations.add(qmc.LatinHypercube(size, rng=rng).random(first))
+    region: Region | None = None
+    while (
+        _inside(simulations.parameters, simulations.summaries, observed, None)[0].sum()
+        < LEAST_VALID
+        and len(simulations) + each <= MOST_CLOSING * total
+    ):
+        simulations.add(qmc.LatinHypercube(size, rng=rng).random(each))
+    count = 1
+    while True:
+        estimate = fit_region(simulations, observed, region, rng)
+        left = total - len(simulations)
+        stands = count >= LEAST_ROUNDS and estimate.ratio < CLOSE
+        if stands or len(simulations) + each > MOST_CLOSING * total:
+            break
+        points = around(estimate.draws, min(each, left), rng)
+        region = Region.around(points)
+        simulations.add(points)
+        count += 1
+    # In two goes, so that the region is that of the better posterior.
+    for part in (0.5, 1.0):
+        left = total - len(simulations)
+        points = around(estimate.draws, max(1, round(part * left)), rng)
+        if len(points) > 2 * size:
+            region = Region.around(points)
+        simulations.add(points)
+        estimate = fit_region(simulations, observed, region, rng)
+    return fit_region(simulations, observed, region, rng, chain_count=CHAINS, draws=FINE)
+
+
+def around(draws: Array, count: int, rng: np.random.Generator) -> Array:
+    """Points around a posterior, `WIDTH` times as wide, on the unit cube."""
+    size = draws.shape[1]
+    covariance = np.cov(draws.T).reshape(size, size) + NARROWEST**2 * np.eye(size)
+    points = np.empty((0, size))
+    while len(points) < count:
+        more = draws[rng.choice(len(draws), 2 * count)]
+        more = more + np.sqrt(WIDTH**2 - 1) * rng.multivariate_normal(
+            np.zeros(size), covariance, 2 * count
+        )
+        points = np.concatenate([points, more[np.all((more > 0) & (more < 1), axis=1)]])
+    return points[:count]
+
+
+def fit_region(
+    simulations: Simulations,
+    observed: Array,
+    region: Region | None,
+    rng: np.random.Generator,
+    *,
+    chain_count: int = 1,
+    draws: int = ROUGH,
+) -> Estimate:
+    """The posterior by the simulations of a region; of the whole cube without one.
+
+    Raises
+    ------
+    RunError
+        If hardly any simulation is like the trace.
+    """
+    parameters, summaries = simulations.parameters, simulations.summaries
+    valid, parameters, summaries, region = _inside(parameters, summaries, observed, region)
+    if valid.sum() < LEAST_VALID:
+        raise RunError(
+            f"only {int(valid.sum())} of {len(valid)} simulations have what the trace has, such as "
+            "its slips: no parameters in the ranges of [fit.free] seem to describe it"
+        )
+    order = np.argsort(~valid, kind="stable")
+    parameters, summaries = parameters[order], summaries[order]
+    count = int(valid.sum())
+    projection, statistics = project(summaries[:count], parameters[:count], observed, rng)
+    surrogate = learn(statistics, parameters[:count], parameters)
+    target = projection(observed)
+
+    def log_density(points: Array) -> Array:
+        value = surrogate.log_likelihood(target, points)
+        if region is not None:
+            value = np.where(region.contains(points), value, -np.inf)
+        return np.asarray(value)
+
+    away = np.sum(((statistics - target) / statistics.std(axis=0)) ** 2, axis=1)
+    start = parameters[:count][np.argsort(away)[:STARTS]]
+    chains = draw(log_density, start, rng, chains=chain_count, draws=draws)
+    spread = chains.reshape(-1, chains.shape[-1]).std(axis=0)
+    deviations = surrogate.standardized(statistics, parameters[:count])[0]
+    return Estimate(
+        chains,
+        projection,
+        surrogate,
+        target,
+        _coverage(np.sum(deviations**2, axis=1), statistics.shape[1], surrogate.freedom),
+        parameters[:count],
+        summaries[:count],
+        float(np.max(parameters.std(axis=0) / np.maximum(spread, NARROWEST))),
+    )
+
+
+def _inside(
+    parameters: Array, summaries: Array, observed: Array, region: Region | None
+) -> tuple[NDArray[np.bool_], Array, Array, Region | None]:
+    """Simulations of a region, which is made larger if too few in it have what the trace has.
+
+    Returns
+    -------
+    valid, parameters, summaries, region
+        Which of the simulations have the summaries of the trace; the simulations; the region.
+    """
+    while True:
+        inside = np.full(len(parameters), True) if region is None else region.contains(parameters)
+        used = usable(summaries[inside], observed)
+        valid = np.all(np.isfinite(summaries[inside][:, used]), axis=1) & used.any()
+        if region is None or inside.all() or valid.sum() >= LEAST_VALID:
+            return valid, parameters[inside], summaries[inside], region
+        region = replace(region, limit=GROWTH * region.limit)
+
+
+def _coverage(distance: Array, size: int, freedom: float) -> tuple[float, float]:
+    from scipy.stats import chi2, f
+
+    def limit(part: float) -> float:
+        if np.isfinite(freedom):
+            return float(size * f.ppf(part, size, freedom))
+        return float(chi2.ppf(part, size))
+
+    return float(np.mean(distance <= limit(0.5))), float(np.mean(distance <= limit(0.9)))

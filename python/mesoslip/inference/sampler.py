@@ -1,0 +1,91 @@
+"""Draws from a posterior on the unit cube, whose density costs next to nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import RunError
+
+Array = NDArray[np.float64]
+
+# Walkers of an ensemble, steps before the first draw of them, and between two.
+WALKERS, BURN_IN, THIN = 100, 120, 15
+
+
+def check_installed() -> None:
+    """Make sure that emcee is there, before anything is simulated.
+
+    Raises
+    ------
+    RunError
+        If it is not.
+    """
+    if find_spec("emcee") is None:
+        raise RunError("a fit needs the package emcee: pip install 'mesoslip[fit]', or make setup")
+
+
+def draw(
+    log_density: Callable[[Array], Array],
+    start: Array,
+    rng: np.random.Generator,
+    *,
+    chains: int,
+    draws: int,
+) -> Array:
+    """Draw from a density on the unit cube by ensembles of walkers (emcee).
+
+    Parameters
+    ----------
+    log_density
+        Logarithm of the density of points of shape (points, parameters); -inf outside its support.
+    start
+        Points to start near, where the density is not 0, shape (points, parameters).
+    rng
+        Random numbers.
+    chains
+        Ensembles, which know nothing of each other.
+    draws
+        Draws of each.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (chains, draws, parameters).
+    """
+    import emcee
+
+    size = start.shape[1]
+
+    def bounded(points: Array) -> Array:
+        inside = np.all((points >= 0) & (points <= 1), axis=1)
+        value = np.full(len(points), -np.inf)
+        if inside.any():
+            value[inside] = log_density(points[inside])
+        return value
+
+    found = []
+    for _ in range(chains):
+        chosen = start[rng.choice(len(start), WALKERS)]
+        first = chosen + 0.3 * start.std(axis=0) * rng.standard_normal(chosen.shape)
+        is_out = ~np.isfinite(bounded(first))
+        first[is_out] = chosen[is_out]
+        sampler = emcee.EnsembleSampler(WALKERS, size, bounded, vectorize=True)
+        sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
+        steps = -(-draws // WALKERS) * THIN
+        sampler.run_mcmc(first, BURN_IN + steps, skip_initial_state_check=True)
+        found.append(sampler.get_chain(discard=BURN_IN, thin=THIN).reshape(-1, size)[:draws])
+    return np.array(found)
+
+
+def r_hat(chains: Array) -> Array:
+    """Rank-free split R-hat of each parameter, 1 for chains that agree (Gelman & Rubin 1992)."""
+    half = chains.shape[1] // 2
+    parts = np.concatenate([chains[:, :half], chains[:, half : 2 * half]])
+    within = parts.var(axis=1, ddof=1).mean(axis=0)
+    between = parts.mean(axis=1).var(axis=0, ddof=1)
+    ratio: Array = np.sqrt((half - 1) / half + between / np.maximum(within, 1e-300))
+    return ratio

@@ -1,0 +1,431 @@
+"""Fits: the machinery on problems whose posterior is known, and traces whose truth is."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import klein_tables
+from mesoslip.errors import ConfigError, FileError
+from mesoslip.inference import checks, likelihood
+from mesoslip.inference.fit import prepare
+from mesoslip.inference.plan import Plan
+from mesoslip.inference.prior import Free, Prior
+from mesoslip.inference.rounds import close_in
+from mesoslip.inference.sampler import draw, r_hat
+from mesoslip.inference.simulations import Simulations, StoppedError
+from mesoslip.inference.summaries import Feature, Summarizer
+from mesoslip.simulation.stop import StopFlag
+from scipy.stats import kstest
+
+FREE = {
+    "contacts.static_force": {"from": "5 uN", "to": "40 uN", "prior": "logarithmic"},
+    "contacts.delay": {"from": "0.2 ms", "to": "4 ms", "prior": "logarithmic"},
+}
+# Few contacts, so that a simulation takes some milliseconds.
+SMALL = {
+    "run__duration": 4.0,
+    "contacts__count": 150,
+    "contacts__threshold__relative_width": 0.05,
+    "contacts__delay": 1e-3,
+    "output__interval": 2e-3,
+}
+NOISE = 5e-8
+
+
+def fit_tables(**changes):
+    """What is known of the small experiment, and a fit of it."""
+    tables = klein_tables(**SMALL)
+    tables["fit"] = {"free": FREE, "simulations": 300, "noise": NOISE} | changes
+    return tables
+
+
+def experiment(**changes):
+    """A trace of the small experiment, with noise."""
+    tree = mesoslip.run(klein_tables(**SMALL | {"run__seed": 99} | changes))
+    rng = np.random.default_rng(5)
+    tree["spring_force"] = tree["spring_force"] + NOISE * rng.standard_normal(
+        tree["spring_force"].shape
+    )
+    return tree
+
+
+class Linear:
+    """Simulations whose summaries are linear in the parameters, with normal noise."""
+
+    def __init__(self, matrix, deviation, seed):
+        self.simulator = SimpleNamespace(prior=range(matrix.shape[1]))
+        self.matrix, self.deviation = matrix, deviation
+        self.rng = np.random.default_rng(seed)
+        self.parameters = np.empty((0, matrix.shape[1]))
+        self.summaries = np.empty((0, matrix.shape[0]))
+
+    def __len__(self):
+        return len(self.parameters)
+
+    def simulate(self, points):
+        noise = self.rng.standard_normal((len(points), len(self.matrix)))
+        return points @ self.matrix.T + self.deviation * noise
+
+    def add(self, points):
+        self.parameters = np.concatenate([self.parameters, points])
+        self.summaries = np.concatenate([self.summaries, self.simulate(points)])
+
+
+def linear_problem(seed, total=400):
+    """The truth, the estimate, and mean and standard deviations of the exact posterior."""
+    rng = np.random.default_rng(seed)
+    matrix = rng.standard_normal((12, 2))
+    truth = rng.random(2)
+    made = Linear(matrix, 0.1, seed)
+    observed = made.simulate(truth[None])[0]
+    estimate = close_in(made, observed, total, np.random.default_rng(seed))
+    covariance = 0.1**2 * np.linalg.inv(matrix.T @ matrix)
+    mean = np.linalg.lstsq(matrix, observed, rcond=None)[0]
+    return truth, estimate, mean, np.sqrt(np.diag(covariance))
+
+
+def test_a_normal_problem_has_its_exact_posterior():
+    """Where the bounds of the prior are far: mean and standard deviation of a linear regression."""
+    shifts, widths = [], []
+    for seed in range(6):
+        _, estimate, mean, deviation = linear_problem(seed)
+        if np.all((mean > 4 * deviation) & (mean < 1 - 4 * deviation)):
+            shifts.append((estimate.draws.mean(axis=0) - mean) / deviation)
+            widths.append(estimate.draws.std(axis=0) / deviation)
+        assert np.max(r_hat(estimate.chains)) < 1.05
+        # The likelihood knows how uncertain it is.
+        assert estimate.coverage[0] == pytest.approx(0.5, abs=0.12)
+        assert estimate.coverage[1] == pytest.approx(0.9, abs=0.06)
+    assert len(shifts) >= 3
+    assert np.max(np.abs(shifts)) < 0.6
+    assert np.abs(np.mean(shifts)) < 0.2
+    assert 0.95 < np.mean(widths) < 1.25
+
+
+def test_ranks_of_the_truth_are_uniform():
+    """Calibration by simulation, of a problem that takes no time; that of the model is a study."""
+    ranks = []
+    for seed in range(100, 116):
+        truth, estimate, _, _ = linear_problem(seed, 300)
+        ranks += list(np.mean(estimate.draws < truth, axis=0))
+    assert kstest(ranks, "uniform").pvalue > 0.02
+    assert 0.7 < np.mean(np.abs(np.array(ranks) - 0.5) < 0.45) <= 1
+
+
+def test_draws_are_of_the_density():
+    """A normal density cut off by the cube, against its moments."""
+
+    def log_density(points):
+        return -0.5 * np.sum(((points - [0.5, 0.0]) / [0.05, 0.2]) ** 2, axis=1)
+
+    rng = np.random.default_rng(0)
+    chains = draw(log_density, rng.random((40, 2)), rng, chains=4, draws=1000)
+    assert chains.shape == (4, 1000, 2)
+    draws = chains.reshape(-1, 2)
+    assert np.mean(draws[:, 0]) == pytest.approx(0.5, abs=0.005)
+    assert np.std(draws[:, 0]) == pytest.approx(0.05, rel=0.06)
+    # A half-normal one.
+    assert np.mean(draws[:, 1]) == pytest.approx(0.2 * np.sqrt(2 / np.pi), rel=0.06)
+    assert np.max(r_hat(chains)) < 1.02
+
+
+def test_the_likelihood_learns_means_widths_and_tails():
+    rng = np.random.default_rng(3)
+    parameters = rng.random((2000, 2))
+    mean = np.stack([parameters[:, 0] ** 2, parameters[:, 0] * parameters[:, 1]], axis=1)
+    width = 0.1 * np.exp(parameters[:, :1])
+    for freedom in (4.0, np.inf):
+        noise = rng.standard_normal((2000, 2))
+        if np.isfinite(freedom):
+            noise /= np.sqrt(rng.chisquare(freedom, (2000, 1)) / freedom)
+        surrogate = likelihood.learn(mean + width * noise, parameters, parameters)
+        at = np.array([[0.3, 0.7], [0.8, 0.2]])
+        exact = np.stack([at[:, 0] ** 2, at[:, 0] * at[:, 1]], axis=1)
+        np.testing.assert_allclose(surrogate.mean(at), exact, atol=0.03)
+        deviations, _ = surrogate.standardized(exact + 0.1 * np.exp(at[:, :1]), at)
+        np.testing.assert_allclose(deviations, 1, rtol=0.2)
+        if np.isfinite(freedom):
+            assert 3 <= surrogate.freedom <= 6
+            continue
+        assert surrogate.freedom > 20
+        # Against the normal density itself, its width and all.
+        statistics = np.array([0.3, 0.2])
+        away = (statistics - exact) / (0.1 * np.exp(at[:, :1]))
+        density = -0.5 * np.sum(away**2, axis=1) - 2 * at[:, 0]
+        learnt = surrogate.log_likelihood(statistics, at)
+        assert learnt[0] - learnt[1] == pytest.approx(density[0] - density[1], rel=0.2)
+
+
+def test_summaries_that_few_simulations_have_lower_the_likelihood_where_they_have_not():
+    rng = np.random.default_rng(4)
+    parameters = rng.random((500, 1))
+    has = rng.random(500) < parameters[:, 0]
+    order = np.argsort(~has, kind="stable")
+    statistics = rng.standard_normal((int(has.sum()), 1))
+    surrogate = likelihood.learn(statistics, parameters[has], parameters[order])
+    low, high = surrogate.log_likelihood(np.zeros(1), np.array([[0.1], [0.9]]))
+    assert low < high - 1
+
+
+def test_priors_go_to_the_unit_cube_and_back():
+    prior = Prior(
+        (Free("a", 1e-6, 1e-4, True), Free("b", -1.0, 3.0), Free("c", 1, 9, False, "1", True))
+    )
+    unit = np.random.default_rng(0).random((5, 3))
+    values = prior.values(unit)
+    np.testing.assert_allclose(prior.unit(values)[:, :2], unit[:, :2])
+    np.testing.assert_allclose(prior.values(np.array([0.5, 0.5, 0.5])), [1e-5, 1.0, 5])
+    assert prior.changes(values[0])["c"] == round(values[0, 2])
+
+
+def summarizer(tree, **changes):
+    time = tree["time"].values
+    known = {"noise": NOISE, "period": 0.0245, "scale": 18e-6} | changes
+    return Summarizer(time, **known)
+
+
+def test_summaries_do_not_depend_on_direction_or_later_phase():
+    tree = experiment()
+    force = tree["spring_force"].values[0]
+    one = summarizer(tree)
+    values = one(force)
+    assert len(one.names) == len(set(one.names)) == values.size
+    np.testing.assert_allclose(summarizer(tree, direction=-1.0)(-force), values)
+    # Without its start, a trace moved by some slips has nearly the same statistics.
+    moved = summarizer(tree, has_start=False)
+    kept = np.flatnonzero(np.isin(moved.names, ["mean_peak", "mean_drop", "wave_+0.50"]))
+    whole = moved(force)[kept]
+    tail = Summarizer(tree["time"].values[:-500], NOISE, 0.0245, 18e-6, has_start=False)
+    np.testing.assert_allclose(tail(force[500:])[kept], whole, rtol=0.25, atol=0.05)
+
+
+def test_a_trace_without_slips_has_no_summaries_of_slips():
+    tree = experiment()
+    one = summarizer(tree)
+    values = dict(zip(one.names, one(1e-5 * (1 - np.exp(-tree["time"].values))), strict=True))
+    assert np.isnan(values["mean_drop"])
+    assert np.isnan(values["first_wave_+0.50"])
+    assert np.isfinite(values["mean_force"])
+    assert values["slip_count"] == np.log(0.5)
+
+
+@pytest.fixture(scope="module")
+def small_fit(tmp_path_factory):
+    """The trace of the small experiment, and its posterior."""
+    folder = tmp_path_factory.mktemp("fit")
+    tree = experiment()
+    posterior = mesoslip.fit(tree, fit_tables(), store=folder / "kept.npz", workers=1)
+    return tree, posterior, folder
+
+
+def test_the_truth_lies_in_the_posterior(small_fit):
+    _, posterior, _ = small_fit
+    truth = {"contacts.static_force": 18e-6, "contacts.delay": 1e-3}
+    for key, value in truth.items():
+        draws = posterior["posterior"][key]
+        assert draws.dims == ("chain", "draw")
+        low, high = np.percentile(draws, [0.5, 99.5])
+        assert low < value < high
+        assert high < 1.7 * low
+    assert posterior["posterior"]["contacts.static_force"].attrs["units"] == "N"
+    assert not posterior.attrs["warnings"] or "describe" not in posterior.attrs["warnings"]
+    assert posterior.attrs["simulation_count"] == 300
+
+
+def test_the_same_seed_gives_the_same_posterior(small_fit):
+    """With any number of workers, and after a stop at any time."""
+    tree, posterior, folder = small_fit
+    stop = StopFlag()
+    done = []
+
+    def watch(part):
+        done.append(part)
+        if part > 0.4:
+            stop.set()
+
+    store = folder / "stopped.npz"
+    with pytest.raises(StoppedError):
+        mesoslip.fit(tree, fit_tables(), store=store, workers=2, progress=watch, stop=stop)
+    assert store.exists()
+    again = []
+    resumed = mesoslip.fit(
+        tree, fit_tables(), store=store, workers=2, progress=lambda part: again.append(part)
+    )
+    assert len(again) < 0.85 * len(again + done)
+    for key in FREE:
+        np.testing.assert_array_equal(resumed["posterior"][key], posterior["posterior"][key])
+
+
+def test_simulations_of_another_fit_are_refused(small_fit):
+    tree, _, folder = small_fit
+    with pytest.raises(FileError, match="of another fit"):
+        mesoslip.fit(tree, fit_tables(seed=2), store=folder / "kept.npz")
+    (folder / "damaged.npz").write_bytes(b"PK\x03\x04")
+    with pytest.raises(FileError, match="damaged"):
+        mesoslip.fit(tree, fit_tables(), store=folder / "damaged.npz")
+
+
+def test_another_mass_is_no_part_of_the_model():
+    """The wave of slips of a trace of four times the mass is told to disagree."""
+    tree = experiment(slider__mass=4 * 1.47e-3)
+    posterior = mesoslip.fit(tree, fit_tables())
+    assert posterior.attrs["agreement_probability"] < checks.REJECTED
+    assert "no parameters in the ranges describe the trace" in posterior.attrs["warnings"]
+
+
+def test_what_predictions_never_have_is_told():
+    rng = np.random.default_rng(1)
+
+    def drawn(count):
+        return rng.standard_normal((count, 1)) + 0.2 * rng.standard_normal((count, 5))
+
+    features = [Feature(f"s{one}", "gh"[one % 2], "a summary") for one in range(5)]
+    usual = [
+        checks.compare(features, drawn(100), drawn(100), drawn(1)[0]).probability
+        for _ in range(200)
+    ]
+    assert kstest(usual, "uniform").pvalue > 0.01
+    simulated, predicted = drawn(200), drawn(200)
+    # Each summary of a group is as usual, but not together with the others.
+    unlikely = np.array([1.0, 0, -1.0, 0, 0])
+    assert checks.compare(features, simulated, predicted, unlikely).is_rejected
+    off = checks.compare(features, simulated, predicted, np.array([0, 0, 30.0, 0, 0]))
+    assert off.is_rejected
+    assert off.worst[0].feature.name == "s2"
+    lacking = checks.compare(features, simulated, predicted, np.array([0, np.nan, 0, 0, 0]))
+    assert lacking.is_rejected
+    assert "the trace has not" in str(lacking.worst[0])
+    predicted[:, 3] = np.nan
+    extra = checks.compare(features, simulated, predicted, np.zeros(5))
+    assert extra.is_rejected
+    assert "hardly any prediction" in str(extra.worst[0])
+
+
+def test_warnings_tell_what_is_not_determined():
+    prior = Prior((Free("a", 0, 1), Free("b", 0, 1), Free("c", 0, 1), Free("d", 0, 1)))
+    rng = np.random.default_rng(2)
+    first = 0.5 + 0.02 * rng.standard_normal(4000)
+    draws = np.stack(
+        [
+            first,
+            first + 0.002 * rng.standard_normal(4000),
+            rng.random(4000),
+            1 - np.abs(0.05 * rng.standard_normal(4000)),
+        ],
+        axis=1,
+    )
+    fine = checks.Agreement(0.5, np.zeros(1), ())
+    told = "\n".join(checks.warnings(prior, draws, fine, np.ones(4)))
+    assert "c is not determined" in told
+    assert "a and b are only determined together (correlation +" in told
+    assert "d lies at the end of its range: widen fit.free.d.to" in told
+    assert "a is not" not in told
+    assert "describe the trace" not in told
+
+
+def test_the_command_fits_and_draws(tmp_path, command):
+    trace = tmp_path / "trace.csv"
+    tree = experiment()
+    force = tree["spring_force"].values[0]
+    trace.write_text("force [nN]\n" + "".join(f"{1e9 * one:.1f}\n" for one in force))
+    output, config = tmp_path / "trace.nc", tmp_path / "fit.toml"
+    assert command("trace", trace, "--rate", "500 1/s", "-o", output)[0] == 0
+    import tomli_w
+
+    config.write_text(tomli_w.dumps(fit_tables()))
+    posterior = tmp_path / "posterior.nc"
+    status, told, _ = command("fit", output, config, "-o", posterior, "--quiet")
+    assert status == 0
+    assert "contacts.static_force" in told
+    assert "uN" in told
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        ["trace.csv", "trace.nc", "fit.toml", "posterior.nc"]
+    )
+    picture = tmp_path / "posterior.png"
+    assert command("plot", posterior, "-o", picture)[0] == 0
+    assert picture.stat().st_size > 20_000
+    status, told, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
+    row = json.loads(told)["parameters"]["contacts.delay"]
+    assert row["interval_90"][0] < row["median"] < row["interval_90"][1]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"free": None}, "fit.free: must be a table of free keys"),
+        ({"free": {"contacts.dely": {"from": 0, "to": 1}}}, "did you mean 'contacts.delay'"),
+        ({"free": {"contacts.delay": {"from": "1 ms"}}}, "fit.free.contacts.delay.to: missing"),
+        ({"free": {"contacts.delay": {"from": "2 ms", "to": "1 ms"}}}, "greater than 'from'"),
+        ({"free": {"contacts.delay": {"from": "1 N", "to": "2 N"}}}, "has the unit N"),
+        (
+            {"free": {"contacts.delay": {"from": 0, "to": 1, "prior": "logarithmic"}}},
+            "greater than 0 with a logarithmic prior",
+        ),
+        ({"free": {"contacts.delay": {"from": 0, "to": 1, "prior": "flat"}}}, "'uniform' or"),
+        ({"free": {"contacts.delay": {"from": 0, "to": 1, "prio": "x"}}}, "did you mean 'prior'"),
+        (
+            {"free": {"contacts.back_force_ratio": {"from": 0.1, "to": 1.5}}},
+            "contacts.back_force_ratio.to = 1.5: cannot be run",
+        ),
+        ({"free": {"run.seed": {"from": 1, "to": 5}}}, "no key that can be fitted"),
+        ({"simulations": 10}, "at least 300"),
+        ({"noise": "-1 uN"}, "must not be negative"),
+        ({"smulations": 1000}, "did you mean 'simulations'"),
+    ],
+)
+def test_what_is_wrong_with_a_fit_is_told(change, said):
+    tables = fit_tables(**change)
+    with pytest.raises(ConfigError, match=said.replace("(", r"\(")):
+        Plan.from_dict(tables)
+
+
+def test_a_fit_needs_a_table_and_a_trace(tmp_path, command):
+    with pytest.raises(ConfigError, match="name the free keys"):
+        Plan.from_dict(klein_tables())
+    tree = experiment()
+    plan = Plan.from_dict(fit_tables(after="3.99 s"))
+    with pytest.raises(FileError, match=r"after 3\.99 s; a fit needs at least"):
+        prepare(tree, plan)
+    status, _, told = command("fit", tmp_path / "none.nc", tmp_path / "none.toml")
+    assert status == 2
+    assert "no such file" in told
+
+
+def test_a_configuration_that_contradicts_the_trace_is_refused():
+    tree = experiment(slider__stiffness=140.0)
+    with pytest.raises(ConfigError, match="the trace says 140"):
+        prepare(tree, Plan.from_dict(fit_tables()))
+    free = FREE | {"slider.stiffness": {"from": 50, "to": 300}}
+    simulator, _ = prepare(tree, Plan.from_dict(fit_tables(free=free)))
+    assert simulator.noise == NOISE
+
+
+def test_a_trace_may_count_from_a_time_on():
+    """Then its start is not summed up, and simulations are cut as well."""
+    plan = Plan.from_dict(fit_tables(after="1 s"))
+    simulator, force = prepare(experiment(), plan)
+    assert len(force) == 1501
+    assert not simulator.summarizer.has_start
+    assert "first_peak" not in simulator.summarizer.names
+    made = Simulations(simulator, simulator.summarizer(force), expected=4, workers=1)
+    made.add(np.full((2, 2), 0.5))
+    assert np.isfinite(made.summaries[:, :3]).all()
+
+
+def test_a_trace_without_noise_is_given_some():
+    tables = fit_tables()
+    del tables["fit"]["noise"]
+    tree = mesoslip.run(klein_tables(**SMALL))
+    simulator, force = prepare(tree, Plan.from_dict(tables))
+    assert simulator.noise == pytest.approx(5e-4 * np.max(np.abs(tree["spring_force"].values)))
+    assert np.std(force - tree["spring_force"].values[0]) == pytest.approx(simulator.noise, rel=0.1)
+
+
+def test_without_emcee_it_is_told_before_anything_is_simulated(monkeypatch):
+    monkeypatch.setattr("mesoslip.inference.sampler.find_spec", lambda _: None)
+    with pytest.raises(mesoslip.RunError, match="needs the package emcee"):
+        mesoslip.fit(experiment(), fit_tables())

@@ -1,0 +1,205 @@
+"""Measured traces: read from tables, and the slips found in them against the exact catalogue."""
+
+from __future__ import annotations
+
+import json
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import ROOT, klein_tables
+from mesoslip.measured.slips import estimated_period, find_slips, noise_level
+
+HIDDEN = {
+    "slider__stiffness": 140.0,
+    "contacts__static_force": 25e-6,
+    "contacts__delay": 1.3e-3,
+    "contacts__threshold__relative_width": 0.04,
+}
+CASES = {
+    "Klein": {},
+    "long delay": HIDDEN,
+    "wide thresholds": {"contacts__threshold__relative_width": 0.1},
+    "no delay": {"contacts__delay": 0.0},
+    "stiff": {"slider__stiffness": 2000.0, "contacts__delay": 0.0, "run__duration": 2.0},
+}
+SINE = "time [s],force [uN]\n" + "".join(
+    f"{0.001 * n:.3f},{5 + np.sin(0.01 * n):.5f}\n" for n in range(50)
+)
+
+
+def sampled(tree, noise: float, seed: int = 1):
+    """Times and noisy forces of a run's first realization."""
+    force = tree["spring_force"].values[0]
+    rng = np.random.default_rng(seed)
+    return tree["time"].values, force + noise * rng.standard_normal(force.size)
+
+
+def write(path, text):
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("relative_noise", [0.0, 1e-3, 5e-3, 0.015])
+def test_slips_of_noisy_traces_are_those_of_the_exact_catalogue(case, relative_noise):
+    """Found, missed, spurious; times within a quarter of a period, drops within some noise."""
+    config = mesoslip.Config.from_dict(klein_tables(**CASES[case]))
+    tree = mesoslip.run(config)
+    exact = mesoslip.slips(tree)
+    noise = relative_noise * config.contacts.static_force
+    time, force = sampled(tree, noise)
+    found = find_slips(time, force)
+    # Of the same slip if they overlap.
+    overlap = (found.start_time[:, None] < exact["end_time"].values) & (
+        found.end_time[:, None] > exact["start_time"].values
+    )
+    drop = exact["force_drop"].values
+    visible = drop > 12 * noise
+    assert overlap.any(axis=0)[visible].all()
+    assert overlap.any(axis=1).all()
+    assert (overlap.sum(axis=1) == 1).all()
+    which = overlap.argmax(axis=1)
+    period = 2 * config.slider.quiet_time
+    late = found.start_time - exact["start_time"].values[which]
+    assert np.median(np.abs(late)) < period / 4 + 1e-3 + 4 * relative_noise
+    error = found.force_before - found.force_after - drop[which]
+    # Five samples in a period of the stiff setup do not tell the least force.
+    sampling = 0.15 * np.abs(drop[which]) if case == "stiff" else 0.1e-6
+    assert (np.abs(error) < 4 * noise + sampling).all()
+
+
+@pytest.mark.parametrize("noise", [1e-8, 1e-7, 1e-6])
+def test_the_level_of_the_noise_is_found(noise):
+    tree = mesoslip.run(klein_tables(**HIDDEN))
+    assert noise_level(sampled(tree, noise)[1]) == pytest.approx(noise, rel=0.05)
+
+
+def test_the_noise_of_a_digitized_trace_is_at_least_that_of_its_steps():
+    force = np.round(np.linspace(0, 1, 3000), 2)
+    assert noise_level(force) == pytest.approx(0.01 / np.sqrt(12), rel=0.3)
+
+
+def test_the_period_of_the_setup_is_guessed():
+    for changes in CASES.values():
+        config = mesoslip.Config.from_dict(klein_tables(**changes))
+        time, force = sampled(mesoslip.run(config), 2e-8)
+        guessed = estimated_period(time, force, 2e-8)
+        assert guessed == pytest.approx(2 * config.slider.quiet_time, rel=0.15)
+
+
+def test_noise_alone_has_no_slips():
+    rng = np.random.default_rng(2)
+    time = 1e-3 * np.arange(200_000)
+    assert len(find_slips(time, 1e-5 + 1e-7 * rng.standard_normal(time.size))) == 0
+    loading = 1e-6 * time + 1e-7 * rng.standard_normal(time.size)
+    assert len(find_slips(time, loading, period=0.02)) == 0
+
+
+def test_ringing_is_no_slip():
+    time = 1e-3 * np.arange(4000)
+    ringing = 1e-5 + 2e-6 * np.exp(-time) * np.cos(2 * np.pi * time / 0.0245)
+    assert len(find_slips(time, ringing, noise=0.0, period=0.0245)) == 0
+
+
+def test_the_other_direction_is_the_same():
+    time, force = sampled(mesoslip.run(klein_tables(**HIDDEN)), 5e-8)
+    forward = find_slips(time, force)
+    backward = find_slips(time, -force, direction=-1)
+    np.testing.assert_array_equal(forward.start_time, backward.start_time)
+    np.testing.assert_allclose(forward.force_before, -backward.force_before)
+
+
+def test_a_table_becomes_an_output(tmp_path, command):
+    """On which commands work like on that of a run."""
+    run = mesoslip.run(klein_tables(**HIDDEN))
+    time, force = sampled(run, 5e-8)
+    table, output = tmp_path / "trace.csv", tmp_path / "trace.nc"
+    rows = "".join(f"{t:.4f};{1e6 * f:.4f}\n" for t, f in zip(time, force, strict=True))
+    write(table, "# made up\ntime [s];Force (uN)\n" + rows.replace(".", ","))
+    known = ("--velocity", "0.1 um/s", "--stiffness", "140 N/m")
+    status, _, told = command("trace", table, "-o", output, *known)
+    assert status == 0
+    assert "7 slips" in told
+    tree = mesoslip.read(output)
+    np.testing.assert_allclose(tree["spring_force"].values[0], force, atol=1e-10)
+    # Displacements follow from the spring, which sticks to the run's but for noise over stiffness.
+    error = tree["displacement"].values[0] - run["displacement"].values[0]
+    assert np.std(error) < 2 * 5e-8 / 140
+    assert abs(np.mean(error)) < 3 * 5e-8 / 140
+    np.testing.assert_allclose(
+        mesoslip.slips(tree)["peak_velocity"], mesoslip.slips(run)["peak_velocity"], rtol=0.15
+    )
+    status, shown, _ = command("slips", output, "--json")
+    assert status == 0
+    assert json.loads(shown)["slips"][0]["contacts_broken"] is None
+    assert command("slips", output)[0] == 0
+    assert command("plot", output, "-o", tmp_path / "trace.png")[0] == 0
+    bare = mesoslip.read_trace(table)
+    assert np.isnan(bare["displacement"]).all()
+    assert mesoslip.slips(bare).sizes["slip"] == 7
+    mesoslip.plot(bare, tmp_path / "bare.png")
+
+
+def test_with_a_configuration_it_is_an_output_of_that(tmp_path):
+    table = write(tmp_path / "trace.csv", SINE)
+    tree = mesoslip.read_trace(table, config=ROOT / "runs" / "klein.toml")
+    config = mesoslip.Config.from_toml(tree.attrs["configuration"])
+    assert config.run.duration == pytest.approx(0.049)
+    assert config.output.interval == pytest.approx(1e-3)
+    drive = tree["drive_displacement"].values[0]
+    np.testing.assert_allclose(np.diff(drive), 1e-10, rtol=1e-6)
+    assert tree["displacement"].values[0, 0] == 0
+
+
+def test_rates_columns_and_gaps(tmp_path):
+    plain = write(tmp_path / "plain.txt", "1 9 2\n2 9 3\n3 9 4\n4 9 5\n5 9 6\n")
+    tree = mesoslip.read_trace(plain, columns="force [mN], -, displacement [nm]", rate=1e3)
+    np.testing.assert_allclose(tree["time"], [0, 1e-3, 2e-3, 3e-3, 4e-3])
+    np.testing.assert_allclose(tree["spring_force"].values[0], [1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
+    np.testing.assert_allclose(tree["displacement"].values[0], [2e-9, 3e-9, 4e-9, 5e-9, 6e-9])
+    rows = SINE.splitlines(keepends=True)
+    rows[20] = "0.019,nan\n"
+    holed = write(tmp_path / "holed.csv", "".join(rows[:30] + rows[33:]))
+    filled = mesoslip.read_trace(holed, largest_gap=5e-3)
+    whole = mesoslip.read_trace(write(tmp_path / "whole.csv", SINE))
+    np.testing.assert_allclose(filled["time"], whole["time"])
+    np.testing.assert_allclose(filled["spring_force"], whole["spring_force"], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (SINE.replace("force [uN]", "load [uN]"), [], "no column of the force"),
+        (SINE.replace("force [uN]", "force [uM]"), [], "unit 'uM'"),
+        (SINE.replace("force [uN]", "force"), [], "has no unit"),
+        (SINE.replace("time [s]", "clock"), [], "--rate"),
+        (SINE.replace("time [s]", "force [nN]"), [], "two columns of force"),
+        (SINE.replace("0.010,", "0.009,"), [], "line 12: the time 0.009 s does not come after"),
+        (SINE.replace("0.010,", "0.0x0,"), [], "line 12: '0.0x0' is no number"),
+        (SINE.replace("0.010,", "nan,"), [], "line 12: 'nan' is not a finite number"),
+        (SINE.replace("0.010,", ""), [], "line 12: has 1 columns"),
+        (SINE.replace("0.049,", "0.074,"), [], "line 51: a gap of 0.026 s after 0.048 s"),
+        (SINE.replace("0.049,", "0.074,"), ["--largest-gap", "5 ms"], "line 51: a gap"),
+        ("", [], "is empty"),
+        ("1,2\n2,3\n", [], "line 1: has no header"),
+        ("time [s],force [N]\n0,1\n", [], "1 samples"),
+        (SINE, ["--columns", "force [N]"], "names 1 columns, the file has 2"),
+        (SINE, ["--stiffness", "3 kg"], "--stiffness"),
+        (SINE, ["--noise", "-1 uN"], "must not be negative"),
+        (SINE, ["--config", "no.toml"], "no such file"),
+    ],
+)
+def test_what_is_wrong_is_told_with_the_line(tmp_path, command, text, options, said):
+    table = write(tmp_path / "trace.csv", text)
+    status, _, told = command("trace", table, "-o", tmp_path / "out.nc", *options)
+    assert status == 2
+    assert said in told
+    assert not (tmp_path / "out.nc").exists()
+
+
+def test_what_is_no_table_is_told(tmp_path, command):
+    assert "no such file" in command("trace", tmp_path / "none.csv", "-o", tmp_path / "a.nc")[2]
+    assert "directory" in command("trace", tmp_path, "-o", tmp_path / "a.nc")[2]
+    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
+    assert "UTF-8" in command("trace", tmp_path / "binary.csv", "-o", tmp_path / "a.nc")[2]

@@ -1,0 +1,165 @@
+"""Is the uncertainty of fits right? Simulation-based calibration (Talts et al. 2018).
+
+Parameters are drawn from the prior, an experiment is simulated with them and fitted with the same
+prior; the rank of the truth among the draws of its posterior must be uniform. Short runs of few
+contacts, so that a fit takes half a minute of a processor. What is done is kept in a file, and the
+study goes on from there:
+
+    python tests/studies/fit_calibration.py out/calibration.csv --experiments 100
+    python tests/studies/fit_calibration.py out/calibration.csv --report docs/fit-calibration.png
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import time
+from pathlib import Path
+
+import mesoslip
+import numpy as np
+from mesoslip.errors import RunError
+from mesoslip.inference.fit import prepare
+from mesoslip.inference.plan import Plan
+from mesoslip.inference.rounds import close_in
+from mesoslip.inference.simulations import Simulations
+
+NOISE = 5e-8
+TABLES = {
+    "run": {"duration": 6.0},
+    "drive": {"velocity": 1e-7},
+    "slider": {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2},
+    "contacts": {
+        "count": 800,
+        "area": 1e-10,
+        "film_thickness": 3.5e-9,
+        "film_density": 956.0,
+        "static_force": 18e-6,
+        "stiffness": 2000.0,
+        "drag_rate": 2e11,
+        "delay": 5e-4,
+        "back_force_ratio": 0.1,
+        "threshold": {"law": "gaussian", "relative_width": 0.01},
+    },
+    "output": {"interval": 2e-3},
+    "fit": {
+        "noise": NOISE,
+        "simulations": 500,
+        "free": {
+            "contacts.static_force": {"from": 8e-6, "to": 2.5e-5, "prior": "logarithmic"},
+            "contacts.threshold.relative_width": {
+                "from": 0.01,
+                "to": 0.15,
+                "prior": "logarithmic",
+            },
+            "contacts.delay": {"from": 3e-4, "to": 3e-3, "prior": "logarithmic"},
+            "slider.stiffness": {"from": 60.0, "to": 250.0, "prior": "logarithmic"},
+        },
+    },
+}
+
+
+def experiment(number: int, simulations: int | None = None, workers: int = 1) -> dict[str, object]:
+    """One experiment: ranks of the truth, by parameter, and what the fit took."""
+    tables = {**TABLES, "fit": {**TABLES["fit"], "seed": number}}  # type: ignore[dict-item]
+    if simulations is not None:
+        tables["fit"]["simulations"] = simulations
+    plan = Plan.from_dict(tables)
+    rng = np.random.default_rng([2026, number])
+    truth = rng.random(len(plan.prior))
+    changes = plan.prior.changes(plan.prior.values(truth))
+    tree = mesoslip.run(plan.config.replace({**changes, "run.seed": 10**6 + number}))
+    noisy = tree["spring_force"] + NOISE * rng.standard_normal(tree["spring_force"].shape)
+    tree["spring_force"] = noisy
+    start = time.process_time()
+    simulator, force = prepare(tree, plan)
+    observed = simulator.summarizer(force)
+    made = Simulations(simulator, observed, expected=plan.simulations, workers=workers)
+    row: dict[str, object] = {"experiment": number, "status": "fitted"}
+    try:
+        estimate = close_in(made, observed, plan.simulations, np.random.default_rng(number))
+    except RunError:
+        return row | {"status": "failed"}
+    draws = estimate.draws
+    for place, key in enumerate(plan.prior.keys):
+        row[f"rank {key}"] = float(np.mean(draws[:, place] < truth[place]))
+        row[f"truth {key}"] = float(truth[place])
+        row[f"deviation {key}"] = float(draws[:, place].std())
+    row["seconds"] = time.process_time() - start
+    return row
+
+
+def fields() -> list[str]:
+    keys = list(TABLES["fit"]["free"])  # type: ignore[index,call-overload]
+    columns = [f"{what} {key}" for key in keys for what in ("rank", "truth", "deviation")]
+    return ["experiment", "status", *columns, "seconds"]
+
+
+def read(path: Path) -> list[dict[str, str]]:
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def coverage(ranks: np.ndarray, part: float) -> float:
+    """Part of the truths within the central interval."""
+    return float(np.mean(np.abs(ranks - 0.5) <= part / 2))
+
+
+def report(rows: list[dict[str, str]], picture: Path | None) -> None:
+    """Tell, and draw, how uniform the ranks are."""
+    from matplotlib.figure import Figure
+    from scipy.stats import binom, kstest
+
+    fitted = [row for row in rows if row["status"] == "fitted"]
+    print(f"{len(rows)} experiments, {len(fitted)} fitted")
+    keys = list(TABLES["fit"]["free"])  # type: ignore[index,call-overload]
+    figure = Figure(figsize=(6.5, 1.9 * ((len(keys) + 1) // 2)), layout="constrained", dpi=200)
+    axes = figure.subplots((len(keys) + 1) // 2, 2).ravel()
+    for key, panel in zip(keys, axes, strict=False):
+        ranks = np.array([float(row[f"rank {key}"]) for row in fitted])
+        deviations = np.array([float(row[f"deviation {key}"]) for row in fitted])
+        p = kstest(ranks, "uniform").pvalue
+        print(
+            f"{key:36} KS p {p:.2f}, 50 % covers {100 * coverage(ranks, 0.5):.0f} %, "
+            f"90 % covers {100 * coverage(ranks, 0.9):.0f} %, shrinkage "
+            f"{1 - np.median(deviations) * np.sqrt(12):.2f}"
+        )
+        bins = 10
+        low, high = binom.ppf([0.025, 0.975], len(ranks), 1 / bins)
+        panel.axhspan(low, high, color="0.9")
+        panel.hist(ranks, bins, range=(0, 1), color="0.4")
+        panel.set_title(f"{key} (p = {p:.2f})", loc="left", fontsize=7)
+        panel.tick_params(labelsize=7)
+    if picture is not None:
+        figure.supxlabel("rank of the truth in the posterior", fontsize=8)
+        figure.supylabel("experiments", fontsize=8)
+        figure.savefig(picture)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("table", type=Path)
+    parser.add_argument("--experiments", type=int, default=0)
+    parser.add_argument("--report", type=Path, default=None, metavar="PICTURE")
+    parser.add_argument("--workers", type=int, default=1)
+    options = parser.parse_args()
+    done = read(options.table)
+    numbers = {int(row["experiment"]) for row in done}
+    if not done:
+        options.table.parent.mkdir(parents=True, exist_ok=True)
+        with options.table.open("w", newline="") as file:
+            csv.DictWriter(file, fields()).writeheader()
+    for number in range(options.experiments):
+        if number in numbers:
+            continue
+        row = experiment(number, workers=options.workers)
+        with options.table.open("a", newline="") as file:
+            csv.DictWriter(file, fields()).writerow(row)
+        print(row["experiment"], row["status"], row.get("seconds"), flush=True)
+    report(read(options.table), options.report)
+
+
+if __name__ == "__main__":
+    main()

@@ -75,7 +75,7 @@ class Linear:
         self.summaries = np.concatenate([self.summaries, self.simulate(points)])
 
 
-def linear_problem(seed, total=400):
+def linear_problem(seed, total=300):
     """The truth, the estimate, and mean and standard deviations of the exact posterior."""
     rng = np.random.default_rng(seed)
     matrix = rng.standard_normal((12, 2))
@@ -88,11 +88,16 @@ def linear_problem(seed, total=400):
     return truth, estimate, mean, np.sqrt(np.diag(covariance))
 
 
-def test_a_normal_problem_has_its_exact_posterior():
+@pytest.fixture(scope="module")
+def linear_problems():
+    """Some of them, for what is tested of them together."""
+    return [linear_problem(seed) for seed in range(7)]
+
+
+def test_a_normal_problem_has_its_exact_posterior(linear_problems):
     """Where the bounds of the prior are far: mean and standard deviation of a linear regression."""
     shifts, widths = [], []
-    for seed in range(6):
-        _, estimate, mean, deviation = linear_problem(seed)
+    for _, estimate, mean, deviation in linear_problems:
         if np.all((mean > 4 * deviation) & (mean < 1 - 4 * deviation)):
             shifts.append((estimate.draws.mean(axis=0) - mean) / deviation)
             widths.append(estimate.draws.std(axis=0) / deviation)
@@ -106,11 +111,10 @@ def test_a_normal_problem_has_its_exact_posterior():
     assert 0.95 < np.mean(widths) < 1.25
 
 
-def test_ranks_of_the_truth_are_uniform():
+def test_ranks_of_the_truth_are_uniform(linear_problems):
     """Calibration by simulation, of a problem that takes no time; that of the model is a study."""
     ranks = []
-    for seed in range(100, 116):
-        truth, estimate, _, _ = linear_problem(seed, 300)
+    for truth, estimate, _, _ in linear_problems:
         ranks += list(np.mean(estimate.draws < truth, axis=0))
     assert kstest(ranks, "uniform").pvalue > 0.02
     assert 0.7 < np.mean(np.abs(np.array(ranks) - 0.5) < 0.45) <= 1
@@ -234,6 +238,16 @@ def test_the_truth_lies_in_the_posterior(small_fit):
     assert posterior["posterior"]["contacts.static_force"].attrs["units"] == "N"
     assert not posterior.attrs["warnings"] or "describe" not in posterior.attrs["warnings"]
     assert posterior.attrs["simulation_count"] == 300
+
+
+def test_a_report_tells_the_parameters(small_fit, tmp_path):
+    _, posterior, _ = small_fit
+    mesoslip.report(posterior, tmp_path / "fit.html")
+    page = (tmp_path / "fit.html").read_text()
+    assert "contacts.static_force" in page
+    assert "Agreement of the model with the trace" in page
+    with pytest.raises(FileError, match="fits are drawn one at a time"):
+        mesoslip.plot([posterior, posterior])
 
 
 def test_the_same_seed_gives_the_same_posterior(small_fit):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import mesoslip
 import numpy as np
@@ -35,6 +36,17 @@ def sampled(tree, noise: float, seed: int = 1):
     return tree["time"].values, force + noise * rng.standard_normal(force.size)
 
 
+def missed(tree, slips):
+    """Greatest second difference of the force about its least sample in each slip."""
+    time, force = tree["time"].values, tree["spring_force"].values[0]
+    found = []
+    for start, end in zip(slips["start_time"].values, slips["end_time"].values, strict=True):
+        first, after = np.searchsorted(time, (start, end + time[1]))
+        least = first + int(np.argmin(force[first:after]))
+        found.append(np.max(np.abs(np.diff(force[least - 2 : least + 3], 2))))
+    return np.array(found)
+
+
 def write(path, text):
     path.write_text(text)
     return path
@@ -64,8 +76,12 @@ def test_slips_of_noisy_traces_are_those_of_the_exact_catalogue(case, relative_n
     late = found.start_time - exact["start_time"].values[which]
     assert np.median(np.abs(late)) < period / 4 + 1e-3 + 4 * relative_noise
     error = found.force_before - found.force_after - drop[which]
-    # Five samples in a period of the stiff setup do not tell the least force.
-    sampling = 0.15 * np.abs(drop[which]) if case == "stiff" else 0.1e-6
+    # Samples miss a smooth least force by up to an eighth of the second difference there. Five in a
+    # period of the stiff setup do not tell it.
+    if case == "stiff":
+        sampling = 0.15 * np.abs(drop[which])
+    else:
+        sampling = 0.02e-6 + missed(tree, exact.isel(slip=which)) / 8
     assert (np.abs(error) < 4 * noise + sampling).all()
 
 
@@ -139,6 +155,10 @@ def test_a_table_becomes_an_output(tmp_path, command):
     assert np.isnan(bare["displacement"]).all()
     assert mesoslip.slips(bare).sizes["slip"] == 7
     mesoslip.plot(bare, tmp_path / "bare.png")
+    both = mesoslip.plot([bare, tree])
+    assert len(both.axes) == 2
+    with pytest.raises(mesoslip.FileError, match="does not tell the displacement"):
+        mesoslip.plot(bare, x="displacement")
 
 
 def test_with_a_configuration_it_is_an_output_of_that(tmp_path):
@@ -150,6 +170,44 @@ def test_with_a_configuration_it_is_an_output_of_that(tmp_path):
     drive = tree["drive_displacement"].values[0]
     np.testing.assert_allclose(np.diff(drive), 1e-10, rtol=1e-6)
     assert tree["displacement"].values[0, 0] == 0
+
+
+def test_analyses_need_the_configuration_of_the_experiment(tmp_path, command):
+    run = mesoslip.run(klein_tables(run__duration=6.0))
+    lines = zip(run["time"].values, 1e6 * run["spring_force"].values[0], strict=True)
+    rows = "".join(f"{time:.6f},{force:.6f}\n" for time, force in lines)
+    table = write(tmp_path / "trace.csv", f"time [s],force [uN]\n{rows}")
+    tree = mesoslip.read_trace(table, config=klein_tables(run__duration=6.0))
+    judged, exact = mesoslip.regime(tree), mesoslip.regime(run)
+    assert judged["regime"].item() == exact["regime"].item()
+    assert judged["slips"].item() == exact["slips"].item()
+    measured, known = (mesoslip.response(one)["steady"]["steady_force"] for one in (tree, run))
+    np.testing.assert_allclose(measured, known, rtol=0.02)
+    mesoslip.report(tree, tmp_path / "trace.html")
+    page = (tmp_path / "trace.html").read_text()
+    assert "Regime" in page
+    assert "Energy" not in page
+    bare = tmp_path / "bare.nc"
+    assert command("trace", table, "-o", bare)[0] == 0
+    for name, *options in (("regime",), ("response",), ("report", "-o", tmp_path / "bare.html")):
+        status, _, message = command(name, bare, *options)
+        assert status == 2
+        assert re.search(r"\bbare(\.nc)?: has no configuration of a run", message)
+
+
+def test_the_drive_of_a_trace_follows_ramps(tmp_path):
+    """Against the quadrature of the velocity; after its stages it goes on."""
+    stages = [
+        {"duration": 0.01, "velocity": 1e-7},
+        {"duration": 0.02, "start_velocity": 1e-7, "end_velocity": 5e-7},
+    ]
+    tables = klein_tables(run__duration=None, drive={"stage": stages})
+    tree = mesoslip.read_trace(write(tmp_path / "trace.csv", SINE), config=tables)
+    time = tree["time"].values
+    velocity = np.interp(time, [0.01, 0.03], [1e-7, 5e-7])
+    way = np.concatenate([[0], np.cumsum(0.5 * np.diff(time) * (velocity[1:] + velocity[:-1]))])
+    drive = tree["drive_displacement"].values[0]
+    np.testing.assert_allclose(drive - drive[0], way, rtol=1e-9, atol=1e-16)
 
 
 def test_rates_columns_and_gaps(tmp_path):

@@ -116,7 +116,7 @@ def compare(
     low, high = np.nanpercentile(predicted[:, compared], [16, 84], axis=0)
     spread[compared] = (high - low) / 2
     compared &= spread > 1e-9 * (1 + np.abs(centre))
-    scores[compared] = ((observed - centre) / spread)[compared]
+    scores[compared] = (observed - centre)[compared] / spread[compared]
     names = np.array([one.group for one in features])
     groups = [one for one in dict.fromkeys(names) if np.any(compared & (names == one))]
     own, trace = np.zeros((len(predicted), len(groups))), np.zeros(len(groups))

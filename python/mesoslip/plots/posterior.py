@@ -134,7 +134,8 @@ def _slips(figure: Canvas, grid: object, tree: xr.DataTree) -> None:
         axes.set_yticks([])
         axes.set_xlabel(title)
         if column == 0:
-            axes.legend()
+            axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
+            axes.legend(loc="upper left", ncols=2)
 
 
 def _later(group: xr.Dataset) -> tuple[Array, Array, Array]:

@@ -24,6 +24,7 @@ from conftest import ROOT
 from mesoslip import Config
 from mesoslip.campaign.plan import Plan
 from mesoslip.command_line.main import app
+from mesoslip.inference.plan import Plan as FitPlan
 
 DOCS = ROOT / "docs"
 PAGES = [
@@ -126,6 +127,8 @@ def check_toml(block, workshop):
     make_shorter(path)
     if "sweep" in tables:
         assert Plan.load(path).combinations
+    elif "fit" in tables:
+        assert FitPlan.load(path)
     else:
         Config.load(path)
 

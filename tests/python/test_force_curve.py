@@ -263,8 +263,10 @@ def test_a_rough_law_tells_its_digits(klein):
     assert np.max(np.abs(curve.force(x) - again.force(x))) / FORCE <= again.error + curve.error
 
 
-@pytest.mark.parametrize("newborn_width", [9e-11, 9e-10, 2e-9])
-@pytest.mark.parametrize("width", [0.01, 0.2])
+@pytest.mark.parametrize(
+    ("width", "newborn_width"),
+    [(0.01, 9e-11), (0.05, 9e-10), (0.05, 2e-9), (0.2, 9e-11), (0.2, 9e-10), (0.2, 2e-9)],
+)
 def test_newborns_of_any_spread_are_conserved(klein, width, newborn_width):
     curve = ForceCurve(klein(curve={"newborn_width": newborn_width}, **dispersion(width)))
     assert curve.conservation_error < 1e-6

@@ -25,7 +25,7 @@ ANSWER_SECONDS = 3.0
 
 def test_attack():
     """A few cases of most attacks, each in a process of its own; make fuzz tries thousands."""
-    counts = "configurations=6 mutations=40 outputs=6 checkpoints=4 terminals=2"
+    counts = "configurations=4 mutations=20 outputs=5 checkpoints=3 terminals=2"
     line = [sys.executable, ROOT / "tests" / "fuzz" / "fuzz.py", *counts.split(), "--jobs", "1"]
     line += ["--seed", "2026", "--no-keep"]
     result = subprocess.run(line, capture_output=True, text=True, check=False)

@@ -222,3 +222,15 @@ def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
     assert "steady_growth_rate" not in mesoslip.info(klein(contacts__delay=1e4))
     for slider in ({"kind": "prescribed"}, {"kind": "quasistatic", "stiffness": 97.0}):
         assert "steady_growth_rate" not in mesoslip.info(klein(slider=slider))
+
+
+def test_what_leaves_the_range_of_numbers_is_told(klein):
+    """A mountain on a spring, driven at a metre in a second: no number, and no warning."""
+    config = klein(
+        drive__velocity=1.0,
+        slider__mass=1e13,
+        contacts__threshold={"law": "exponential", "relative_width": 1.0},
+    )
+    with pytest.raises(mesoslip.RunError, match="range of floating-point numbers"):
+        _ = SteadySliding(config).unstable_count
+    assert "steady_growth_rate" not in mesoslip.info(config)

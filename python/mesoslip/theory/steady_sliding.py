@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.configuration.threshold_law import ThresholdLaw
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError, Problem, RunError
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -346,19 +346,23 @@ class SteadySliding:
 
         Z + Λ has no poles there. It grows like a power of λ, by whose degree its argument turns on
         the way around the half-plane; what turns on the way up the line itself is seen.
+
+        Raises
+        ------
+        RunError
+            If that leaves the range of floating-point numbers.
         """
         slider = self.config.slider.dynamic_stiffness(np.array([1j * self._scale]))
         assert slider is not None
         path = self._path
-        entire, births = self._characteristic(real + 1j * path)
-        values = np.stack([entire, births])
+        values = self._values(real + 1j * path)
         for _ in range(MOST_HALVINGS):
             turns = np.abs(np.angle(values[:, 1:] / values[:, :-1])).max(axis=0)
             large = np.flatnonzero(turns > LARGEST_TURN)
             if large.size == 0 or path.size > MOST_POINTS:
                 break
             between = (path[large] + path[large + 1]) / 2
-            added = np.stack(self._characteristic(real + 1j * between))
+            added = self._values(real + 1j * between)
             path = np.insert(path, large + 1, between)
             values = np.insert(values, large + 1, added, axis=1)
         turned = np.sum(np.angle(values[:, 1:] / values[:, :-1]), axis=1)
@@ -370,9 +374,25 @@ class SteadySliding:
         argument += slider.degree * (math.pi / 2 - angle)
         return round(slider.degree / 2 - argument / math.pi)
 
+    def _values(self, rate: Complex) -> Complex:
+        """Both parts of the characteristic function, shape (2, rates), none of them zero."""
+        with np.errstate(all="ignore"):
+            values: Complex = np.stack(self._characteristic(rate))
+        if not np.all(np.isfinite(values) & (np.abs(values) > 0)):
+            raise RunError(
+                "the stability of steady sliding leaves the range of floating-point numbers"
+            )
+        return values
+
     @cached_property
     def unstable_count(self) -> int:
-        """Number of roots that grow, each of a pair counted."""
+        """Number of roots that grow, each of a pair counted.
+
+        Raises
+        ------
+        RunError
+            If that leaves the range of floating-point numbers.
+        """
         if not self._has_motion or self.delay == 0:
             return 0
         return self._right_of(NO_GROWTH * self._scale)
@@ -530,7 +550,16 @@ def steady_sliding(config: Config, most_work: int) -> SteadySliding | None:
         sliding = SteadySliding(config)
     except ConfigError:
         return None
-    return sliding if sliding.work <= most_work else None
+    if sliding.work > most_work:
+        return None
+    try:
+        # What is told of it needs both, and keeps them. Far from all experiments it may overflow.
+        with np.errstate(all="ignore"):
+            if sliding.leading_root is not None and not sliding.is_stable:
+                _ = sliding.is_stable_out_of_step
+    except RunError:
+        return None
+    return sliding
 
 
 class _Parts(NamedTuple):

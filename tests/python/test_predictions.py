@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import mesoslip
+import numpy as np
 import pytest
+import xarray as xr
 from conftest import klein_tables
+from matplotlib.contour import ContourSet
 from mesoslip.campaign.measures import MEASURES, RunView
 
 SHORT = {"run__duration": 0.3, "contacts__count": 100}
@@ -36,3 +39,44 @@ def test_critical_stiffness_is_that_of_the_curve(klein):
 def test_waiting_over_damping():
     """Klein's case slips every half second or so, and its ringing is damped at 51 1/s."""
     assert 10 < measured("waiting_over_damping", run__duration=8.0) < 100
+
+
+def sweep_over_two_keys(third=None):
+    """A sweep made by hand: growth passes zero between the second and the third delay."""
+    delays, stiffness = np.array([1e-4, 1e-3, 1e-2, 1e-1]), np.array([50.0, 100.0, 200.0])
+    shape = (delays.size, stiffness.size, 2)
+    growth = np.broadcast_to(np.array([-1.0, -1.0, 1.0, 1.0])[:, None, None], shape)
+    dimensions = ("contacts.delay", "slider.stiffness", "realization")
+    flags = {"flag_values": np.arange(4, dtype=np.int8), "flag_meanings": "smooth a b c"}
+    data = xr.Dataset(
+        {
+            "status": (dimensions, np.zeros(shape, dtype=np.int8)),
+            "regime": (dimensions, (growth > 0).astype(np.int8), flags),
+            "growth_rate": (dimensions, growth, {"units": "s-1"}),
+        },
+        {"contacts.delay": delays, "slider.stiffness": stiffness, "realization": [0, 1]},
+        {"configuration": "", "sweep": ""},
+    )
+    if third is not None:
+        data = xr.concat([data] * len(third), xr.IndexVariable("drive.velocity", third))
+    return xr.DataTree(data)
+
+
+def test_a_map_of_the_regime_has_the_lines_of_theory():
+    """Where growth is zero, between two delays, and no panel of its own for what is a line."""
+    figure = mesoslip.plot(sweep_over_two_keys())
+    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    assert [axes.get_title(loc="left") for axes in panels] == ["regime"]
+    (line,) = [one for one in panels[0].collections if isinstance(one, ContourSet)]
+    (path,) = [one for one in line.get_paths() if len(one.vertices)]
+    assert np.all((path.vertices[:, 0] > 1e-3) & (path.vertices[:, 0] < 1e-2))
+    (text,) = panels[0].get_legend().get_texts()
+    assert "steady sliding" in text.get_text()
+
+
+def test_a_third_key_has_a_map_for_each_value():
+    figure = mesoslip.plot(sweep_over_two_keys(third=[1e-7, 1e-6]), view="regime")
+    titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
+    assert titles == ["regime; drive.velocity = 1e-07", "regime; drive.velocity = 1e-06"]
+    with pytest.raises(mesoslip.FileError, match="no measure 'foo'; it has regime, growth_rate"):
+        mesoslip.plot(sweep_over_two_keys(), view="foo")

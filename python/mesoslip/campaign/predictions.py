@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mesoslip.configuration.config import Config
+from mesoslip.errors import RunError
 from mesoslip.theory.force_curve import ForceCurve
-from mesoslip.theory.steady_sliding import steady_sliding
+from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,12 +29,17 @@ def _configuration(tree: xr.DataTree) -> Config:
 
 def growth_rate(tree: xr.DataTree) -> float:
     """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
-    return _growth_rate(_configuration(tree))
+    sliding = _sliding(_configuration(tree))
+    return math.nan if sliding is None else sliding.growth_rate
 
 
 def stable_out_of_step(tree: xr.DataTree) -> float:
     """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
-    return _stable_out_of_step(_configuration(tree))
+    sliding = _sliding(_configuration(tree))
+    try:
+        return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
+    except RunError:
+        return math.nan
 
 
 def critical_stiffness_ratio(tree: xr.DataTree) -> float:
@@ -55,15 +61,8 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 
 # Realizations of a configuration come one after another.
 @lru_cache(maxsize=16)
-def _growth_rate(config: Config) -> float:
-    sliding = steady_sliding(config, MOST_WORK)
-    return math.nan if sliding is None else sliding.growth_rate
-
-
-@lru_cache(maxsize=16)
-def _stable_out_of_step(config: Config) -> float:
-    sliding = steady_sliding(config, MOST_WORK)
-    return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
+def _sliding(config: Config) -> SteadySliding | None:
+    return steady_sliding(config, MOST_WORK)
 
 
 @lru_cache(maxsize=16)

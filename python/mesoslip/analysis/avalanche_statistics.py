@@ -17,8 +17,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts are loaded when they are used
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, optimize, special
 
 from mesoslip.errors import MesoslipError
 
@@ -240,7 +240,7 @@ def _block(length: int) -> tuple[Array, Array]:
         return np.arange(length, dtype=np.float64), np.ones(length)
     k = np.arange(1.0, NODES)
     beside = np.sqrt(k**2 * (float(length) ** 2 - k**2) / (4 * (4 * k**2 - 1)))
-    node, vectors = linalg.eigh_tridiagonal(np.zeros(NODES), beside)
+    node, vectors = scipy.linalg.eigh_tridiagonal(np.zeros(NODES), beside)
     return node + (length - 1) / 2, length * vectors[0] ** 2
 
 
@@ -377,7 +377,7 @@ def _pure_law(rule: _Rule, largest: int | None, log_mean: float) -> _Law:
         high *= 2
     exponent = low
     if low > LEAST_EXPONENT:
-        exponent = optimize.brentq(excess, low, high, xtol=1e-12)
+        exponent = scipy.optimize.brentq(excess, low, high, xtol=1e-12)
     return _Law(rule.smallest, largest, exponent, 0.0, _moments(rule, exponent, 0.0))
 
 
@@ -491,7 +491,7 @@ def _misfit(law: _Law, tally: _Tally) -> _Misfit:
     expected = np.diff(bins[ends_kept])
     chi_squared = float(np.sum((np.diff(counts[ends_kept]) - expected) ** 2 / expected))
     freedom = len(expected) - (3 if law.rate > 0 else 2)
-    agreement = float(special.chdtrc(freedom, chi_squared)) if freedom > 0 else 1.0
+    agreement = float(scipy.special.chdtrc(freedom, chi_squared)) if freedom > 0 else 1.0
     return _Misfit(distance, chi_squared, agreement)
 
 
@@ -799,7 +799,7 @@ def compare_laws(sizes: ArrayLike, fit: PowerLawFit) -> tuple[LawComparison, ...
 
 
 def _log_norm(rule: _Rule, height: Array) -> float:
-    return float(special.logsumexp(rule.log_weight + height))
+    return float(scipy.special.logsumexp(rule.log_weight + height))
 
 
 def _likeliest_parameters(
@@ -817,7 +817,7 @@ def _likeliest_parameters(
         return _log_norm(rule, height) - float(part @ logarithm(r, parameters))
 
     found = [
-        optimize.minimize(
+        scipy.optimize.minimize(
             cost,
             start,
             bounds=bounds,

@@ -11,7 +11,7 @@ import numpy as np
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
 from mesoslip.theory.force_curve import ForceCurve
-from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
+from mesoslip.theory.steady_sliding import steady_sliding
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,13 +29,13 @@ def _configuration(tree: xr.DataTree) -> Config:
 
 def growth_rate(tree: xr.DataTree) -> float:
     """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
-    sliding = _sliding(_configuration(tree))
+    sliding = steady_sliding(_configuration(tree), MOST_WORK)
     return math.nan if sliding is None else sliding.growth_rate
 
 
 def stable_out_of_step(tree: xr.DataTree) -> float:
     """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
-    sliding = _sliding(_configuration(tree))
+    sliding = steady_sliding(_configuration(tree), MOST_WORK)
     try:
         return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
     except RunError:
@@ -60,11 +60,6 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 
 
 # Realizations of a configuration come one after another.
-@lru_cache(maxsize=16)
-def _sliding(config: Config) -> SteadySliding | None:
-    return steady_sliding(config, MOST_WORK)
-
-
 @lru_cache(maxsize=16)
 def _critical_stiffness_ratio(config: Config) -> float:
     spring = config.spring_stiffness

@@ -13,7 +13,7 @@ argument principle. The derivation is in ``docs/steady-sliding.md``.
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -542,8 +542,12 @@ class SteadySliding:
         return f"an oscillation of {self.frequency / (2 * math.pi):.3g} Hz"
 
 
+@lru_cache(maxsize=16)
 def steady_sliding(config: Config, most_work: int) -> SteadySliding | None:
-    """Steady sliding of a configuration, if there is a theory of it that takes no more work."""
+    """Steady sliding of a configuration, if there is a theory of it that takes no more work.
+
+    The last ones are kept, as several are asked for the same configuration one after another.
+    """
     if config.interaction is not None and config.interaction.strength > 0:
         return None
     try:
@@ -578,6 +582,13 @@ def _spaced(low: float, high: float, step: float) -> Array:
     return np.linspace(low, high, min(math.ceil((high - low) / step) + 1, MOST_POINTS // 4))
 
 
+@cache
+def _quadrature() -> tuple[Array, Array]:
+    """Points between -1 and 1, and weighted Legendre polynomials there, shape (points, orders)."""
+    point, weight = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
+    return point, weight[:, None] * np.polynomial.legendre.legvander(point, POINTS - 1)
+
+
 def _legendre_transforms(z: Complex, side: Array) -> Complex:
     """∫ P_n(x) e^(-z (x + side)) dx over [-1, 1], shape (arguments, orders).
 
@@ -585,8 +596,7 @@ def _legendre_transforms(z: Complex, side: Array) -> Complex:
     """
     result = np.empty((len(z), POINTS), dtype=np.complex128)
     is_large = np.abs(z) > LARGE
-    point, weight = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
-    legendre = weight[:, None] * np.polynomial.legendre.legvander(point, POINTS - 1)
+    point, legendre = _quadrature()
     near = z[~is_large, None] * (point + side[~is_large, None])
     result[~is_large] = np.exp(-near) @ legendre
     # From e^(-z x) by parts: I_(n+1) = I_(n-1) - (2n + 1)/z I_n but for the sign (-1)^n.

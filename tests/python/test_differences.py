@@ -7,7 +7,7 @@ import pytest
 import tomli_w
 from conftest import ROOT, klein_tables
 from mesoslip.configuration import differences
-from mesoslip.configuration.units import scale_for, to_si, with_unit
+from mesoslip.configuration.units import percent, scale_for, to_si, with_unit
 
 KLEIN = ROOT / "runs" / "klein.toml"
 
@@ -36,6 +36,14 @@ def test_a_number_is_told_in_the_unit_that_suits_it(value, unit, text):
     assert with_unit(value, unit) == text
     if unit != "1":
         assert to_si(text, unit, "") == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.0211, "2.1 %"), (0.9949, "99 %"), (0.9951, "100 %"), (1.74, "174 %"), (0.0, "0 %")],
+)
+def test_a_share_is_told_in_percent_without_an_exponent(share, text):
+    assert percent(share) == text
 
 
 @pytest.mark.parametrize("exponent", range(-18, 10))

@@ -100,6 +100,36 @@ def test_there_is_a_report_of_every_kind(kind, tmp_path):
     assert "svg" in page.tags
 
 
+def test_a_report_has_what_is_read_off_a_drive_with_stages(klein, tmp_path):
+    stages = [
+        {"displacement": 1e-7, "velocity": 1e-6},
+        {"duration": 0.1, "velocity": 0.0},
+        {"displacement": 1e-7, "velocity": 1e-6},
+        {"displacement": 1e-7, "velocity": 1e-5},
+    ]
+    run = mesoslip.run(
+        klein(
+            run__duration=None,
+            drive={"stage": stages},
+            slider={"kind": "prescribed"},
+            contacts__initial="steady",
+            contacts__count=1000,
+            output__interval=1e-4,
+        )
+    )
+    _, page = written([run], tmp_path / "response.html")
+    assert "Response to the drive" in page.words
+    assert {"Steady sliding:", "Velocity steps:", "Holds:", "Rate and state:"} <= set(page.words)
+    found = mesoslip.response(run)
+    force = found["steady/steady_force_ratio"].values[0]
+    assert any(word.startswith(f"{force:.4g} ±") for word in page.words)
+    notes = found["holds/note"].values
+    assert all(note in page.words for note in notes if note)
+    # There is nothing of that at one velocity.
+    _, page = written(mesoslip.run(klein(run__duration=0.2)), tmp_path / "one.html")
+    assert "Response to the drive" not in page.words
+
+
 def test_reports_of_the_theory(klein, tmp_path):
     curve = mesoslip.curve(klein())
     _, page = written([curve, mesoslip.curve(klein(slider__stiffness=1e6))], tmp_path / "a.html")

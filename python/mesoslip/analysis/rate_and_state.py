@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment, Stage
+from mesoslip.configuration.units import percent
 from mesoslip.errors import RunError
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.theory.rate_and_state import LAWS, Loading, RateAndState, spring_slider
@@ -503,7 +504,7 @@ def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
 def _verdict(record: Record, found: Fit, relative: float, described: bool) -> str:
     """In words: whether the law describes the record, and if not, how one sees it."""
     if described:
-        what = "within the noise" if record.has_noise else f"to {100 * relative:.2g} %"
+        what = "within the noise" if record.has_noise else f"to {percent(relative)}"
         return f"describes the record {what}"
     reasons = []
     if found.at_bounds:
@@ -512,7 +513,7 @@ def _verdict(record: Record, found: Fit, relative: float, described: bool) -> st
         reasons.append(f"residuals are {math.sqrt(found.chi_square):.2g} times the noise")
     if found.runs_p_value < DESCRIBES:
         reasons.append("residuals have structure")
-    reasons.append(f"it misses {100 * relative:.2g} % of the variation")
+    reasons.append(f"it misses {percent(relative)} of the variation")
     return "does not describe the record: " + ", ".join(reasons)
 
 

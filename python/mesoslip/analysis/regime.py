@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.units import percent
 from mesoslip.output.layout import RunResults, config_of, group_of
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
@@ -131,13 +132,13 @@ class Judgement:
         name = NAMES[self.regime].replace("_", "-")
         if not math.isfinite(self.relative_amplitude):
             return f"{name}: the run is too short to say"
-        told = f"{name}: force amplitude {100 * self.relative_amplitude:.2g} % of the mean"
+        told = f"{name}: force amplitude {percent(self.relative_amplitude)} of the mean"
         if self.regime == SMOOTH:
             return told
         if self.cycles < LEAST_CYCLES:
             return f"{told}, too short a run to say more"
         told += f", {self.cycles} cycles of {self.period:.3g} s"
-        return f"{told} varying by {100 * self.period_variation:.2g} %"
+        return f"{told} varying by {percent(self.period_variation)}"
 
 
 @dataclass(frozen=True)

@@ -259,3 +259,10 @@ def with_unit(value: float, unit: str, digits: int = 4) -> str:
         if float(f"{number:.{digits}g}") != number:
             return f"{value:.{digits}g} s"
     return f"{value / scale.size:.{digits}g} {scale.name}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A share as a text such as "2.1 %" or "174 %"."""
+    number = 100 * share
+    # Two digits of what is more would have an exponent.
+    return f"{number:.0f} %" if abs(number) >= 99.5 else f"{number:.2g} %"

@@ -16,11 +16,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mesoslip.analysis import avalanches as avalanche_catalogue
-from mesoslip.analysis import regime
+from mesoslip.analysis import regime, response_tables
+from mesoslip.analysis import response as responses
 from mesoslip.analysis import slips as slip_catalogue
+from mesoslip.analysis.experiment import Experiment
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import scale_for, with_unit
+from mesoslip.errors import FileError
 from mesoslip.inference import posterior
 from mesoslip.output import variables
 from mesoslip.output.layout import group_of
@@ -340,6 +343,35 @@ def avalanches(subjects: Sequence[Subject]) -> Section | None:
     return Section("Avalanches", tuple(blocks))
 
 
+def response(subjects: Sequence[Subject]) -> Section | None:
+    """Steady forces, velocity steps, holds and rate-and-state parameters of a drive with stages."""
+    there = []
+    for subject in subjects:
+        if len({one.stage for one in subject.config.drive_parts}) < 2:
+            continue
+        try:
+            there.append((subject, Experiment(subject.tree, subject.name)))
+        except FileError:
+            # Driven by a force, or ended before its first sample.
+            continue
+    if not there:
+        return None
+    blocks: list[Block] = []
+    for subject, experiment in there:
+        tree = responses.response([experiment])
+        blocks.append(Text(_named(subjects, subject, response_tables.unit_of_forces(tree))))
+        for one in response_tables.tables(tree):
+            head, rows = one.head, one.rows
+            if any(one.notes):
+                head = (*head, "note")
+                rows = tuple((*row, note) for row, note in zip(rows, one.notes, strict=True))
+            blocks.append(Text(f"{one.title}:"))
+            blocks.append(Table(head, rows, one.line))
+        caption = "The force against the way of the load point, and what is read off it"
+        blocks.append(_picture(subjects, subject, caption, "response", run.EVERYTHING))
+    return Section("Response to the drive", tuple(blocks))
+
+
 def energy(subjects: Sequence[Subject]) -> Section | None:
     """The balance of energy, and what the run promised."""
     blocks: list[Block] = []
@@ -467,6 +499,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
         pictures,
         slips,
         avalanches,
+        response,
         energy,
         configuration,
         provenance,

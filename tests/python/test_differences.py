@@ -7,7 +7,14 @@ import pytest
 import tomli_w
 from conftest import ROOT, klein_tables
 from mesoslip.configuration import differences
-from mesoslip.configuration.units import percent, scale_for, to_si, with_unit
+from mesoslip.configuration.units import (
+    cf_units,
+    from_cf_units,
+    percent,
+    scale_for,
+    to_si,
+    with_unit,
+)
 
 KLEIN = ROOT / "runs" / "klein.toml"
 
@@ -44,6 +51,15 @@ def test_a_number_is_told_in_the_unit_that_suits_it(value, unit, text):
 )
 def test_a_share_is_told_in_percent_without_an_exponent(share, text):
     assert percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("unit", "units"),
+    [("N/m", "N m-1"), ("1/s", "s-1"), ("kg/m^3", "kg m-3"), ("m^2", "m2"), ("1", "1"), ("s", "s")],
+)
+def test_units_of_files_are_those_of_configurations(unit, units):
+    assert cf_units(unit) == units
+    assert from_cf_units(units) == unit
 
 
 @pytest.mark.parametrize("exponent", range(-18, 10))

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.messages import all_keys, tables_in
 from mesoslip.configuration.table import Table
+from mesoslip.configuration.units import cf_units
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,7 @@ class KeyKind:
         """The unit as CF writes it, such as "N m-1"; None for names."""
         if self.unit is None:
             return "1" if self.is_whole else None
-        above, _, below = self.unit.replace("^", "").partition("/")
-        parts = [part for part in (above,) if part != "1"]
-        if below:
-            name = below.rstrip("0123456789")
-            parts.append(f"{name}-{below[len(name) :] or '1'}")
-        return " ".join(parts) or "1"
+        return cf_units(self.unit)
 
 
 @cache

@@ -261,6 +261,29 @@ def with_unit(value: float, unit: str, digits: int = 4) -> str:
     return f"{value / scale.size:.{digits}g} {scale.name}".rstrip()
 
 
+def cf_units(unit: str) -> str:
+    """A unit as files have it, by the conventions of CF: "N m-1" for "N/m"."""
+    above, _, below = unit.replace("^", "").partition("/")
+    parts = [part for part in (above,) if part != "1"]
+    if below:
+        name = below.rstrip("0123456789")
+        parts.append(f"{name}-{below[len(name) :] or '1'}")
+    return " ".join(parts) or "1"
+
+
+def from_cf_units(units: str) -> str:
+    """A unit of a file as configurations have it: "N/m" for "N m-1"."""
+    above: list[str] = []
+    below: list[str] = []
+    for part in units.split():
+        name = part.rstrip("-0123456789")
+        power = part[len(name) :]
+        size = power.lstrip("-")
+        factor = name if size in {"", "1"} else f"{name}^{size}"
+        (below if power.startswith("-") else above).append(factor)
+    return "/".join([" ".join(above) or "1", *below])
+
+
 def percent(share: float) -> str:
     """A share as a text such as "2.1 %" or "174 %"."""
     number = 100 * share

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.configuration.units import cf_units
 from mesoslip.inference.checks import DETERMINED, UNDETERMINED, shrinkage, warnings
 from mesoslip.inference.fit import Fitted
 from mesoslip.inference.sampler import r_hat
@@ -61,7 +62,7 @@ def build_tree(fitted: Fitted) -> xr.DataTree:
                 one.key: (
                     ("chain", "draw"),
                     draws[..., place],
-                    {"units": _cf_units(one.unit), "long_name": one.key},
+                    {"units": cf_units(one.unit), "long_name": one.key},
                 )
                 for place, one in enumerate(prior.free)
             },
@@ -204,12 +205,3 @@ def table(tree: xr.DataTree) -> list[Row]:
             )
         )
     return rows
-
-
-def _cf_units(unit: str) -> str:
-    """A unit as CF has it, such as "N m-1"."""
-    above, slash, below = unit.replace("^", "").partition("/")
-    if not slash:
-        return above
-    name = below.rstrip("0123456789")
-    return f"{'' if above == '1' else above + ' '}{name}-{below[len(name) :] or '1'}"

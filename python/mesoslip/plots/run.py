@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from mesoslip.analysis.slips import slips
-from mesoslip.configuration.units import Scale, scale_for
+from mesoslip.configuration.units import Scale, from_cf_units, scale_for
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.layout import group_of
 from mesoslip.output.variables import TRACE
@@ -338,7 +338,7 @@ NAMES = {
     "detached_contacts": "detached contacts",
 }
 # Units of the trace as a configuration writes them.
-UNITS = {name: one.units.replace(" s-1", "/s") for name, one in TRACE.items()} | {"time": "s"}
+UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()} | {"time": "s"}
 
 
 class Curve(NamedTuple):

@@ -15,6 +15,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mesoslip.configuration.units import Scale, from_cf_units, scale_for
 from mesoslip.errors import FileError
 from mesoslip.plots.style import Canvas, canvas, styled
 
@@ -44,7 +45,7 @@ MOST_COLUMNS = 3
 
 @dataclass(frozen=True)
 class _Scale:
-    """An axis of a picture: where the places of a swept key are, and how it is labelled."""
+    """An axis of a picture: where the places of a swept key are, in the unit of its label."""
 
     label: str
     places: Array
@@ -54,13 +55,12 @@ class _Scale:
     @classmethod
     def of(cls, coordinate: xr.DataArray) -> _Scale:
         values = coordinate.values
-        units = coordinate.attrs.get("units", "1")
-        label = str(coordinate.name) + ("" if units == "1" else f" [{units}]")
         if values.dtype.kind not in "fiu":
             places = np.arange(len(values), dtype=np.float64)
-            return cls(label, places, tuple(map(str, values)), False)
+            return cls(str(coordinate.name), places, tuple(map(str, values)), False)
+        unit = _unit_of(coordinate)
         is_wide = bool(np.min(values) > 0 and np.max(values) > WIDE * np.min(values))
-        return cls(label, values.astype(np.float64), (), is_wide)
+        return cls(unit.label(str(coordinate.name)), values / unit.size, (), is_wide)
 
     @property
     def edges(self) -> Array:
@@ -89,6 +89,13 @@ class _Scale:
         if len(self.places) <= MOST_LABELS and not self.names:
             getattr(axes, f"set_{which}ticks")([], minor=True)
             getattr(axes, f"set_{which}ticks")(self.places, [f"{one:.3g}" for one in self.places])
+
+
+def _unit_of(data: xr.DataArray) -> Scale:
+    """The unit in which a key or a measure is best read."""
+    values = np.abs(data.values[np.isfinite(data.values)])
+    units = from_cf_units(data.attrs.get("units", "1"))
+    return scale_for(float(values.max(initial=0.0)), units)
 
 
 def _chosen(data: xr.Dataset) -> tuple[xr.Dataset, list[str], str]:
@@ -139,8 +146,9 @@ def _draw(axes: Axes, data: xr.Dataset, name: str) -> None:
     data, keys, left_out = _chosen(data)
     measure = data[name]
     flags = tuple(measure.attrs.get("flag_meanings", "").split())
-    units = measure.attrs.get("units", "1")
-    title = name if units == "1" else f"{name} [{units}]"
+    unit = _unit_of(measure)
+    measure = (measure / unit.size).assign_attrs(measure.attrs)
+    title = unit.label(name)
     scales = [_Scale.of(data[key]) for key in keys]
     if len(keys) == 1:
         _draw_line(axes, measure, scales[0], flags)

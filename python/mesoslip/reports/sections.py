@@ -22,7 +22,7 @@ from mesoslip.analysis import slips as slip_catalogue
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.units import scale_for, with_unit
+from mesoslip.configuration.units import from_cf_units, scale_for, with_unit
 from mesoslip.errors import FileError
 from mesoslip.inference import posterior
 from mesoslip.output import variables
@@ -83,7 +83,7 @@ PROVENANCE = {
 
 def _shown(value: float, unit: str) -> str:
     """A number of a table; numbers of breaks to the last one."""
-    return with_unit(value, unit, 4 if unit != "1" else 8)
+    return with_unit(value, unit) if unit != "1" else f"{value:.0f}"
 
 
 def _named(subjects: Sequence[Subject], subject: Subject, text: str) -> str:
@@ -163,7 +163,7 @@ def _measured(data: xr.DataArray) -> tuple[str, ...]:
     values = data.values.astype(float)
     there = values[np.isfinite(values)]
     # As a configuration has it.
-    name, unit = str(data.name), str(data.attrs.get("units", "1")).replace(" s-1", "/s")
+    name, unit = str(data.name), from_cf_units(str(data.attrs.get("units", "1")))
     if "flag_meanings" in data.attrs:
         meanings = str(data.attrs["flag_meanings"]).split()
         codes = np.asarray(data.attrs["flag_values"]).tolist()
@@ -300,15 +300,21 @@ def _slip_rows(subject: Subject) -> list[Block]:
     rows = slip_catalogue.rows(subject.tree)
     if not rows:
         return []
+    # A measured trace does not tell the breaks.
+    columns = {
+        name: column
+        for name, column in SLIP_COLUMNS.items()
+        if any(row[name] is not None for row in rows)
+    }
     shown = []
     for row in rows[:MOST_ROWS]:
         values = (
             "" if row[name] is None else _shown(float(row[name]), unit)
-            for name, (_, unit) in SLIP_COLUMNS.items()
+            for name, (_, unit) in columns.items()
         )
         start = with_unit(row["start_time"], "s", 7)
         shown.append((str(row["realization_index"]), start, *values))
-    head = ("realization", "start", *(told for told, _ in SLIP_COLUMNS.values()))
+    head = ("realization", "start", *(told for told, _ in columns.values()))
     note = f"The first {MOST_ROWS} of {len(rows)}." if len(rows) > MOST_ROWS else ""
     return [Table(head, tuple(shown), note)]
 

@@ -281,3 +281,11 @@ def test_what_pages_load_from_elsewhere_is_found(tmp_path):
         done = subprocess.run(check, check=False, capture_output=True, text=True)
         assert done.returncode == 1
         assert "example.org" in done.stderr
+
+
+def test_every_page_has_a_place_in_the_list_on_the_left():
+    trees = re.findall(r"^```{toctree}\n(.*?)^```", (DOCS / "index.md").read_text(), re.M | re.S)
+    entries = [line for tree in trees for line in tree.splitlines() if line and line[0] != ":"]
+    listed = {str(path.relative_to(DOCS)) for entry in entries for path in DOCS.glob(f"{entry}.md")}
+    pages = {str(path.relative_to(DOCS)) for path in PAGES if DOCS in path.parents}
+    assert pages - {"index.md"} == {one for one in listed if "generated" not in one}

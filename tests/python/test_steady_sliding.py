@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from mesoslip import ConfigError, SteadySliding
-from mesoslip.theory.steady_sliding import stability_boundary
+from mesoslip.configuration.units import with_unit
+from mesoslip.theory.steady_sliding import stability_boundary, stable_stiffness
 from scipy import special
 
 
@@ -180,6 +181,25 @@ def test_boundary_is_where_growth_begins(klein):
     # A stiffer spring, with its damping, takes more delay.
     stiff = config.replace({"slider.stiffness": 400.0})
     assert stability_boundary(stiff, "contacts.delay", 1e-5, 1e-3) > delay
+
+
+def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
+    config = klein()
+    found, most = stable_stiffness(config), stable_stiffness(config, out_of_step=True)
+    # K* is far above, and the spring of the experiment below.
+    assert 97 < most < found < mesoslip.ForceCurve(config).K_star[0] / 10
+    for factor, is_stable in ((0.99, False), (1.01, True), (8, True)):
+        sliding = SteadySliding(config.replace({"slider.stiffness": factor * found}))
+        assert sliding.is_stable == is_stable
+        sliding = SteadySliding(config.replace({"slider.stiffness": factor * most}))
+        assert sliding.is_stable_out_of_step == is_stable
+    assert stable_stiffness(klein(contacts__delay=0.0)) is None
+    file = tmp_path / "klein.toml"
+    file.write_text(config.to_toml())
+    told = command("curve", file)[1]
+    assert f"from {with_unit(found, 'N/m', 3)} on; of contacts" in told
+    assert f"from {with_unit(most, 'N/m', 3)} on, and" in told
+    assert "springs from" not in command("curve", file, "--set", "contacts.delay=0")[1]
 
 
 def test_what_has_no_steady_sliding_is_refused(klein):

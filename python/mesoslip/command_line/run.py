@@ -142,5 +142,7 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
     say(f"{path}: {regime.told(list(regime.regimes_of_results(results)))}")
     if told["audit"] != "passed":
         say(f"{path}: warning: {told['audit']}")
+    if config.unreached_drive is not None:
+        say(f"{path}: warning: {config.unreached_drive}")
     if told["ending"] != ENDINGS[1]:
         say(f"{path}: the run ended as follows: {told['ending']}")

@@ -39,9 +39,9 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         return
     for name, one in quantities.items():
         show(name, one.value, one.unit, one.meaning)
-    told = verdict(checked)
-    if told is not None:
-        typer.echo(told)
+    for told in (verdict(checked), checked.unreached_drive):
+        if told is not None:
+            typer.echo(told)
 
 
 def curve(
@@ -57,7 +57,7 @@ def curve(
     from mesoslip import api
     from mesoslip.output import files
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
-    from mesoslip.theory.steady_sliding import steady_sliding
+    from mesoslip.theory.steady_sliding import steady_sliding, told_of_stiffness
 
     checked = api.as_config(config, changes or ())
     if output is not None:
@@ -74,8 +74,12 @@ def curve(
             show(name, value, *SUMMARY[name])
         typer.echo(force_curve.verdict)
         sliding = steady_sliding(checked, MOST_WORK)
-        if sliding is not None and sliding.told is not None:
-            typer.echo(sliding.told)
+        for told in (
+            None if sliding is None else sliding.told,
+            told_of_stiffness(checked, MOST_WORK),
+        ):
+            if told is not None:
+                typer.echo(told)
     if force_curve.error > checked.curve.tolerance:
         typer.echo(
             f"the force has {force_curve.digits} digits; more would take too much work, as its "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -67,6 +68,7 @@ def trace(
 ) -> None:
     """Read a measured trace, find its slips, and write an output like that of a run."""
     from mesoslip import api
+    from mesoslip.configuration.units import with_unit
     from mesoslip.output import files
 
     path = output or Path("out") / f"{table.stem}.nc"
@@ -84,9 +86,15 @@ def trace(
     )
     files.write(tree, path)
     time, known = tree.to_dataset()["time"].values, tree.attrs
-    typer.echo(
-        f"{path}: {time.size} samples, {time[-1] - time[0]:.6g} s, noise "
-        f"{1e6 * known['noise']:.3g} uN, period of the setup {1e3 * known['setup_period']:.3g} ms "
-        f"({known['setup_period_origin']}), {tree['slips'].sizes['slip']} slips",
-        err=True,
-    )
+    told = [
+        f"{time.size} samples",
+        with_unit(time[-1] - time[0], "s", 6),
+        f"noise {with_unit(known['noise'], 'N', 3)}",
+        f"{tree['slips'].sizes['slip']} slips",
+    ]
+    if math.isfinite(known["setup_period"]):
+        period = with_unit(known["setup_period"], "s", 3)
+        told.insert(3, f"period of the setup {period} ({known['setup_period_origin']})")
+    typer.echo(f"{path}: {', '.join(told)}", err=True)
+    if known["comment"]:
+        typer.echo(f"{path}: {known['comment']}", err=True)

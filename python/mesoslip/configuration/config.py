@@ -33,6 +33,7 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
 from mesoslip.configuration.tables import Curve, Output, Run
+from mesoslip.configuration.units import with_unit
 from mesoslip.errors import ConfigError
 
 
@@ -176,6 +177,22 @@ class Config(Table):
     def drive_parts(self) -> tuple[DrivePart, ...]:
         """Parts of the drive until the end of the run."""
         return self.drive.until(self.duration)
+
+    @property
+    def unreached_drive(self) -> str | None:
+        """What of a drive with an end the run does not come to, in words; None if it comes to all
+        of it."""
+        length = self.drive.length
+        # But for rounding of the sum of the stages.
+        if not self.duration < (1 - 1e-9) * length < math.inf:
+            return None
+        stages, reached = self.drive.parts[-1].stage + 1, self.drive_parts[-1].stage + 1
+        given = "duration" if self.run.duration is not None else "drive_displacement"
+        where = f", in stage {reached} of {stages}" if stages > 1 else ""
+        return (
+            f"run.{given} ends the run after {with_unit(self.duration, 's')} of a drive of "
+            f"{with_unit(length, 's')}{where}"
+        )
 
     @property
     def output_interval(self) -> float:

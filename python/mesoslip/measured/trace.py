@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,20 +116,31 @@ def read_trace(
     time, force = _even(measured.time, measured.force)
     noise = noise_level(force) if noise is None else noise
     estimated = period is None
-    period = estimated_period(time, force, noise) if period is None else period
     direction = -1.0 if velocity is not None and velocity < 0 else 1.0
+    period = estimated_period(time, direction * force, noise) if period is None else period
     found = find_slips(time, force, noise=noise, period=period, direction=direction)
     details = {
         "origin": "measured",
         "measured_file": path.name,
         "complete": "true",
-        "comment": "",
+        "comment": "; ".join(_doubts(direction * force, noise, period)),
         "noise": noise,
         "setup_period": period,
         "setup_period_origin": "estimated" if estimated else "given",
     }
     attributes = program_attributes(described, "trace") | details
     return _tree(measured, drive, displacement, found, velocity, stiffness, period, attributes)
+
+
+def _doubts(force: Array, noise: float, period: float) -> Iterator[str]:
+    """What makes a force along the drive unlike one that friction gives."""
+    if float(np.median(force)) < -noise:
+        yield (
+            "the force is against the drive most of the time; if the cell counts it the other way, "
+            "give a velocity of the other sign, here or in the configuration"
+        )
+    if not math.isfinite(period):
+        yield "no fall of the force stands out of the noise: there is no slip, and no period"
 
 
 def even_trace(tree: xr.DataTree, realization: int = 0) -> tuple[Array, Array]:

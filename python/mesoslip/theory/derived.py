@@ -125,7 +125,8 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "K_star_estimate",
         contacts.stiffness * (1 - contacts.back_force_ratio) / width,
         "N/m",
-        "estimate of K*, above which slow sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48)",
+        "estimate of K*, above which slow sliding is smooth; softer springs may do, "
+        "see mesoslip curve; Nk (f_s - f_b)/Delta f_s (S48)",
     )
     if config.interaction is not None:
         bond = config.bond_stiffness

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.configuration.threshold_law import ThresholdLaw
+from mesoslip.configuration.units import with_unit
 from mesoslip.errors import ConfigError, Problem, RunError
 
 if TYPE_CHECKING:
@@ -57,6 +58,10 @@ MOST_CANDIDATES = 40
 
 # Relative width of thresholds with which contacts do not break in step.
 OUT_OF_STEP = 0.5
+
+# Springs of which the least one is looked for with which sliding is stable, over the stiffness of
+# all contacts.
+STIFFEST, SOFTEST = 16.0, 1e-4
 # Layers whose frequencies the points of the path still tell apart.
 MOST_LAYERS = 16
 
@@ -610,7 +615,13 @@ def _legendre_transforms(z: Complex, side: Array) -> Complex:
 
 
 def stability_boundary(
-    config: Config, key: str, low: float, high: float, tolerance: float = 1e-3
+    config: Config,
+    key: str,
+    low: float,
+    high: float,
+    tolerance: float = 1e-3,
+    *,
+    out_of_step: bool = False,
 ) -> float | None:
     """Value of a key at which steady sliding becomes stable or unstable, between two others.
 
@@ -624,6 +635,9 @@ def stability_boundary(
         Positive values, in SI, between which is looked; on a logarithmic scale.
     tolerance
         Relative.
+    out_of_step
+        Whether contacts that break out of step count, as after slips
+        (`SteadySliding.is_stable_out_of_step`): that boundary is nearer to what runs do.
 
     Returns
     -------
@@ -632,7 +646,8 @@ def stability_boundary(
     """
 
     def is_stable(logarithm: float) -> bool:
-        return SteadySliding(config.replace({key: math.exp(logarithm)})).is_stable
+        sliding = SteadySliding(config.replace({key: math.exp(logarithm)}))
+        return sliding.is_stable_out_of_step if out_of_step else sliding.is_stable
 
     from scipy import optimize
 
@@ -644,3 +659,55 @@ def stability_boundary(
         lambda place: 1.0 if is_stable(place) == begins else -1.0, first, last, xtol=tolerance
     )
     return math.exp(found)
+
+
+def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | None:
+    """Stiffness of the spring from which on steady sliding at the drive's velocity is stable [N/m].
+
+    All else stays as it is, the mass of the slider for example. It is looked for from a spring
+    `STIFFEST` times as stiff as the contacts down to one `SOFTEST` times, to a thousandth.
+
+    Parameters
+    ----------
+    config
+        The configuration, of a slider on a spring.
+    out_of_step
+        As in `stability_boundary`.
+
+    Returns
+    -------
+    float or None
+        None if sliding is stable with all of these springs, or unstable with the stiffest one.
+    """
+    high = STIFFEST * config.contacts.stiffness
+    while high > SOFTEST * config.contacts.stiffness:
+        low = high / 2
+        found = stability_boundary(config, "slider.stiffness", low, high, out_of_step=out_of_step)
+        if found is not None:
+            return found
+        high = low
+    return None
+
+
+def told_of_stiffness(config: Config, most_work: int) -> str | None:
+    """From which stiffness of the spring on sliding is stable, in words; None if that takes more
+    work than some ten times the stability of one, or there is none."""
+    sliding = steady_sliding(config, most_work // 10)
+    if sliding is None or sliding.delay == 0 or not 0 < config.spring_stiffness < math.inf:
+        return None
+    try:
+        stable, most = stable_stiffness(config), stable_stiffness(config, out_of_step=True)
+    except RunError:
+        return None
+    if stable is None:
+        return None
+    told = (
+        f"steady sliding at {sliding.velocity:.3g} m/s is stable with springs from "
+        f"{with_unit(stable, 'N/m', 3)} on"
+    )
+    if most is None or most >= stable:
+        return told
+    return (
+        f"{told}; of contacts that break out of step from {with_unit(most, 'N/m', 3)} on, and with "
+        "springs in between oscillations stay at a few hundredths of the force, mostly"
+    )

@@ -56,8 +56,10 @@ def example(name: str, file: Path) -> list[Path]:
     """
     known = examples()
     if name not in known:
-        near = difflib.get_close_matches(name, known, 3, 0.5) or list(known)
-        told = f"no such example; choose of {', '.join(near)}"
+        near = difflib.get_close_matches(name, known, 3, 0.6)
+        told = "no such example; " + (
+            f"did you mean {' or '.join(near)}?" if near else "mesoslip example lists them"
+        )
         raise ConfigError([Problem("", "example", told, name)])
     if file.exists():
         raise FileError(f"{file}: is there already; give another name with -o, or remove it")

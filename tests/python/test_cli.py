@@ -96,7 +96,7 @@ def test_slips(short, tmp_path, command):
         rows = list(csv.reader(file))
     assert rows[0][1] == "start_time [s]"
     assert len(rows) == 1 + len(catalogue["slips"])
-    assert "slips" in command("slips", output)[1]
+    assert "1 slip" in command("slips", output)[1]
     command("run", short, "-o", output, "--quiet", "--set", "run.duration=1s")
     assert command("slips", output)[1].endswith("0 slips\n")
     assert command("plot", output)[0] == 0
@@ -257,7 +257,7 @@ def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
     output = tmp_path / "me.nc"
     status, _, told = command("run", short, "-o", output, "--set", "run.engine=me")
     assert status == 0
-    assert "1 slips" in told
+    assert "1 slip, " in told
     assert command("slips", output)[0] == 0
     assert command("plot", output)[0] == 0
     detached = mesoslip.read(output)["detached_contacts"].values
@@ -279,3 +279,52 @@ def test_json_has_no_number_that_is_not_finite(capsys):
     print_json({"a": [1.5, math.nan, (math.inf,)], "b": {"c": -math.inf, "d": None, "e": True}})
     told = json.loads(capsys.readouterr().out)
     assert told == {"a": [1.5, None, [None]], "b": {"c": None, "d": None, "e": True}}
+
+
+def test_messages_name_what_would_be_right(short, tmp_path, command):
+    table, output = tmp_path / "trace.csv", tmp_path / "out.nc"
+    table.write_text("time [s],force [uN]\n0,0\n1,1\n2,2\n3,3\n")
+    assert "mesoslip trace" in command("slips", table)[2]
+    assert command("run", short, "-o", output)[0] == 0
+    assert "is an output already" in command("trace", output, "-o", tmp_path / "other.nc")[2]
+    # Whose result is lost is told.
+    told = command("run", short, "-o", output, "--set", "run.seed=7")[2]
+    assert "replaces the output of another configuration" in told
+    assert "replaces" not in command("run", short, "-o", output, "--set", "run.seed=7")[2]
+    for name in ("out.csv", "out.png"):
+        status, _, told = command("run", short, "-o", tmp_path / name)
+        assert status == 2
+        assert "out.nc would be right" in told
+    assert "there is no sample from 70 s on" in command("plot", output, "--from", "70 s")[2]
+    # Plain numbers are in SI, in options as in --set.
+    assert "there is no sample from 70 s on" in command("plot", output, "--from", "70")[2]
+    still = ("--set", "drive.velocity=1e-12", "-o", tmp_path / "still.nc")
+    assert "no contact broke" in command("run", short, *still)[2]
+    lost = tmp_path / "lost.toml"
+    lost.write_text('base = "nothing.toml"\n')
+    status, _, told = command("info", lost)
+    assert status == 2
+    assert "lost.toml: base = 'nothing.toml': there is no such file beside it" in told
+    lost.write_text("[slider]\nstiffness = 97 N/m\n")
+    assert 'quotes, as in "97 N/m"' in command("info", lost)[2]
+    assert "mesoslip example lists them" in command("example", "mine")[2]
+    assert "Usage" in command("run", "-h")[1]
+
+
+def test_a_drive_that_the_run_cuts_is_told(short, tmp_path, command):
+    stages = tmp_path / "stages.toml"
+    stage = '[[drive.stage]]\nvelocity = "1 um/s"\nduration = "1 s"\n'
+    stages.write_text(f'base = "{short}"\n{3 * stage}[drive]\nrepeat = 2\n')
+    cut = ("--set", "run.duration=2.5 s")
+    told = "run.duration ends the run after 2.5 s of a drive of 6 s, in stage 3 of 6"
+    assert told in command("info", stages, *cut)[1]
+    assert f"warning: {told}" in command("run", stages, *cut, "-o", tmp_path / "cut.nc")[2]
+    assert "ends the run" not in command("info", stages, "--set", "run.duration=6 s")[1]
+
+
+def test_whole_numbers_may_have_an_exponent(short, command):
+    status, told, _ = command("info", short, "--set", "contacts.count=1e3", "--json")
+    assert status == 0
+    other = command("info", short, "--set", "contacts.count=1000", "--json")[1]
+    assert told == other
+    assert "integer" in command("info", short, "--set", "contacts.count=1.5e0")[2]

@@ -73,7 +73,7 @@ def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
     assert (tmp_path / "S20.toml").exists()
     status, _, errors = command("example", "kleim")
     assert status == 2
-    assert "choose of klein" in errors
+    assert "did you mean klein?" in errors
     assert command("example", "klein", "-o", "/dev/null/x.toml")[0] == 2
 
 

@@ -80,3 +80,15 @@ def test_a_third_key_has_a_map_for_each_value():
     assert titles == ["regime; drive.velocity = 1e-07", "regime; drive.velocity = 1e-06"]
     with pytest.raises(mesoslip.FileError, match="no measure 'foo'; it has regime, growth_rate"):
         mesoslip.plot(sweep_over_two_keys(), view="foo")
+
+
+def test_along_one_key_the_lines_of_theory_are_where_they_pass():
+    tree = sweep_over_two_keys()
+    data = tree.to_dataset().isel({"slider.stiffness": 0})
+    (axes,) = (one for one in mesoslip.plot(xr.DataTree(data)).axes if one.get_ylabel() == "")
+    vertical = [line for line in axes.lines if len(set(line.get_xdata())) == 1]
+    # Growth goes from -1 to 1 between 1 ms and 10 ms, on a logarithmic axis.
+    places = {line.get_xdata()[0] for line in vertical if len(line.get_xdata()) == 2}
+    assert any(place == pytest.approx(10**-2.5) for place in places)
+    (text,) = axes.get_legend().get_texts()
+    assert "steady sliding" in text.get_text()

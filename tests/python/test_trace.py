@@ -261,3 +261,28 @@ def test_what_is_no_table_is_told(tmp_path, command):
     assert "directory" in command("trace", tmp_path, "-o", tmp_path / "a.nc")[2]
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
     assert "UTF-8" in command("trace", tmp_path / "binary.csv", "-o", tmp_path / "a.nc")[2]
+
+
+def test_a_cell_that_counts_the_other_way(tmp_path, klein, command):
+    """The same slips with the sign of the drive; a word where they do not go together."""
+    run = mesoslip.run(klein(run__duration=4.0)).to_dataset()
+    time, force = run["time"].values, run["spring_force"].values[0]
+    table = tmp_path / "force.csv"
+    found = {}
+    for sign in (1, -1):
+        rows = zip(time, sign * force * 1e6, strict=True)
+        table.write_text("time [s],force [uN]\n" + "".join(f"{t:.6f},{f:.5f}\n" for t, f in rows))
+        for velocity in (1, -1):
+            tree = mesoslip.read_trace(table, drive_velocity=velocity * 1e-7)
+            found[sign, velocity] = tree["slips"]["start_time"].values, tree.attrs["comment"]
+    assert len(found[1, 1][0]) >= 2
+    np.testing.assert_array_equal(found[1, 1][0], found[-1, -1][0])
+    assert found[1, 1][1] == found[-1, -1][1] == ""
+    for pair in ((1, -1), (-1, 1)):
+        assert "against the drive most of the time" in found[pair][1]
+    table.write_text("time [s],force [uN]\n" + "".join(f"{t},1\n" for t in range(100)))
+    told = command("trace", table, "-o", tmp_path / "flat.nc")[2]
+    assert "no fall of the force stands out" in told
+    assert "inf" not in told
+    with pytest.raises(mesoslip.FileError, match="has times, so no rate"):
+        mesoslip.read_trace(table, rate=100.0)

@@ -136,7 +136,10 @@ class Judgement:
         if self.regime == SMOOTH:
             return told
         if self.cycles < LEAST_CYCLES:
-            return f"{told}, too short a run to say more"
+            return (
+                f"{told}; it has {self.cycles} whole cycles in the {self.judged_end:.4g} s of the "
+                f"run and needs {LEAST_CYCLES} after the start has died away: give it longer"
+            )
         told += f", {self.cycles} cycles of {self.period:.3g} s"
         return f"{told} varying by {percent(self.period_variation)}"
 

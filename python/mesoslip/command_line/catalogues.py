@@ -54,7 +54,9 @@ def slips(
             f"{_known(row['peak_velocity'], 1e6, '11.4f')} "
             f"{_known(row['contacts_broken'], 1.0, '8.0f')}"
         )
-    typer.echo(f"{len(rows)} slips")
+    typer.echo(f"{len(rows)} slip{'s' if len(rows) != 1 else ''}")
+    if len(rows) == 1:
+        return
     for name, (scale, unit) in SHOWN.items():
         if name in statistics:
             mean, deviation, least, greatest = (

@@ -62,7 +62,7 @@ def fit(
         raise FileError(f"{config}: is an output; a fit needs a TOML file with a table [fit.free]")
     plan = Plan.load(config, changes or ())
     path = posterior or Path("out") / f"{output.stem}.posterior.nc"
-    files.check_writable(path, [output, config])
+    files.check_output(path, [output, config])
     store = path.with_name(f"{path.stem}.simulations.npz")
     trace = files.read_run(output)
     with stopped_by_signals() as stop:

@@ -39,6 +39,8 @@ def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None
     """A line for a quantity."""
     if isinstance(value, bool) or value is None:
         shown = {True: "yes", False: "no", None: "none"}[value]
+    elif math.isnan(value):
+        shown = "not known"
     else:
         shown = f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
     typer.echo(f"{name:22} {shown:20} {meaning}")
@@ -71,12 +73,20 @@ def quantity(text: str, option: str, unit: str, example: str, *, positive: bool 
     from mesoslip.errors import ConfigError, Problem
 
     try:
-        value = to_si(text, unit, example)
+        value = to_si(_number_or_text(text), unit, example)
     except ValueError as error:
         raise ConfigError([Problem("", option, str(error), text)]) from None
     if positive and value <= 0:
         raise ConfigError([Problem("", option, "must be greater than 0", text)])
     return value
+
+
+def _number_or_text(text: str) -> float | str:
+    """A plain number, which is in SI; or a text that has a unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def quantity_or_none(

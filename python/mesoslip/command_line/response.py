@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, print_json
+from mesoslip.command_line.options import JsonOption, print_json, quantity_or_none
 
 if TYPE_CHECKING:
     from mesoslip.analysis.response_tables import ResponseTable
@@ -40,7 +40,7 @@ def response(
     from mesoslip.analysis.response import rows_of, scalars_of, write_csv
     from mesoslip.output import files
 
-    scale = None if normal_force is None else _force(normal_force)
+    scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
         files.check_writable(table, outputs)
     tree = api.response(outputs, normal_force=scale, fit=fit, free_stiffness=free_stiffness)
@@ -55,20 +55,6 @@ def response(
     typer.echo(response_tables.unit_of_forces(tree))
     for one in response_tables.tables(tree):
         _print(one)
-
-
-def _force(text: str) -> float:
-    """A force given to an option [N]."""
-    from mesoslip.configuration.units import to_si
-    from mesoslip.errors import ConfigError, Problem
-
-    try:
-        force = to_si(text, "N", "10 mN")
-        if force <= 0:
-            raise ValueError("must be greater than 0; expected a quantity such as '10 mN'")
-    except ValueError as error:
-        raise ConfigError([Problem("", "--normal-force", str(error), text)]) from None
-    return force
 
 
 def _print(table: ResponseTable) -> None:

@@ -49,7 +49,9 @@ def run(
         typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
     ] = None,
     scheduler: SchedulerOption = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="Show neither progress nor what came of it")
+    ] = False,
 ) -> None:
     """Simulate, and write an output file.
 
@@ -62,7 +64,7 @@ def run(
 
     checked = api.as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
-    files.check_writable(path, [config])
+    files.check_output(path, [config])
 
     def tell(text: str) -> None:
         say(f"{path}: {text}")
@@ -84,6 +86,7 @@ def run(
             )
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
+        replaces = files.is_of_another(path, checked)
         try:
             files.write_results(results, path)
         except FileError as error:
@@ -95,6 +98,8 @@ def run(
             raise
         if not quiet:
             _tell_results(results, checked, path)
+            if replaces:
+                tell("it replaces the output of another configuration; -o gives other names")
         _partial(path).unlink(missing_ok=True)
         checkpoint.remove()
 
@@ -130,7 +135,8 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
     from mesoslip.simulation.realization import ENDINGS
 
     told = layout.attributes(results)
-    found = f"{sum(len(one.rows('slips')) for one in results.realizations)} slips"
+    slips = sum(len(one.rows("slips")) for one in results.realizations)
+    found = f"{slips} slip{'s' if slips != 1 else ''}"
     if config.has_avalanches:
         count = sum(one.avalanche_count for one in results.realizations)
         found = f"{count} avalanches, {found}"
@@ -140,6 +146,8 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
         f"{told['wall_seconds']:.2f} s",
     )
     say(f"{path}: {regime.told(list(regime.regimes_of_results(results)))}")
+    if told["break_count"] == 0:
+        say(f"{path}: no contact broke: the drive did not come far enough in this time")
     if told["audit"] != "passed":
         say(f"{path}: warning: {told['audit']}")
     if config.unreached_drive is not None:

@@ -66,7 +66,7 @@ def sweep(
         return
     # All of them are checked before anything is made.
     _ = plan.combinations
-    files.check_writable(path, [file])
+    files.check_output(path, [file])
     with Store(folder) as store, stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:

@@ -61,7 +61,7 @@ def curve(
 
     checked = api.as_config(config, changes or ())
     if output is not None:
-        files.check_writable(output, [config])
+        files.check_output(output, [config])
     _tell_without_interaction(checked)
     force_curve = ForceCurve(checked)
     if output is not None:
@@ -104,7 +104,7 @@ def onset(
 
     checked = api.as_config(config, changes or ())
     if output is not None:
-        files.check_writable(output, [config])
+        files.check_output(output, [config])
     _tell_without_interaction(checked)
     tree = api.onset(checked)
     if output is not None:

@@ -72,7 +72,7 @@ def trace(
     from mesoslip.output import files
 
     path = output or Path("out") / f"{table.stem}.nc"
-    files.check_writable(path, [table, *([] if config is None else [config])])
+    files.check_output(path, [table, *([] if config is None else [config])])
     tree = api.read_trace(
         table,
         columns=columns,

@@ -10,7 +10,7 @@ from typing import Any
 
 from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.sliders import DEFAULT, SLIDERS
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError, FileError, Problem
 
 # Keys that exclude each other: laid over a base, one replaces the other.
 EXCLUSIVE = {
@@ -75,7 +75,21 @@ def _on_base(
     path = folder / base
     if any(_are_the_same(path, one) for one in outer):
         raise ConfigError([Problem(source, "base", "files are based on each other", base)])
+    _check_base(path, source, base)
     return _lay(_read(path, outer), tables)
+
+
+def _check_base(path: Path, source: str, base: str) -> None:
+    """Tell whose base is missing; what else is wrong with it is told by who reads it."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise FileError(
+            f"{source}: base = {base!r}: there is no such file beside it; mesoslip example writes "
+            "those that come along"
+        ) from None
+    except (OSError, ValueError):
+        return
 
 
 def _place_history(tables: dict[str, Any], folder: Path) -> None:
@@ -109,7 +123,8 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise ConfigError([Problem(source, "", "is nested too deeply")]) from None
     # The parser's own error is one of these, and so is that of a number with too many digits.
     except ValueError as error:
-        raise ConfigError([Problem(source, "", f"not valid TOML: {error}")]) from None
+        message = f'not valid TOML: {error}; quantities have quotes, as in "97 N/m"'
+        raise ConfigError([Problem(source, "", message)]) from None
 
 
 def _lay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,8 +28,10 @@ def _quantity(unit: str, example: str, least: float, most: float) -> Any:
 
 
 def _whole(value: object) -> object:
-    """Whole numbers of other libraries as Python's own."""
+    """Whole numbers of other libraries, and those written like 1e4, as Python's own."""
     if isinstance(value, Integral) and not isinstance(value, int):
+        return int(value)
+    if isinstance(value, float) and value.is_integer():
         return int(value)
     return value
 

@@ -102,6 +102,10 @@ def read_table(
             f"'{IGNORED}' stands for one that is not read"
         )
     place = _places(path, headers, has_rate=rate is not None)
+    if "time" in place and rate is not None:
+        raise FileError(
+            f"{path}: has times, so no rate must be given; '{IGNORED}' in --columns leaves them out"
+        )
     values = _values(path, lines, delimiter, place, keep_missing=largest_gap is not None)
     numbers = np.array([number for number, _ in lines])
     if "time" not in place:
@@ -123,7 +127,9 @@ def _lines(path: Path) -> list[tuple[int, str]]:
             raise FileError(f"{path}: is longer than {LONGEST_FILE / 2**30:g} GiB")
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not a text in UTF-8: {error.reason}") from None
+        is_output = path.suffix == ".nc"
+        told = "is an output already" if is_output else f"is not a text in UTF-8: {error.reason}"
+        raise FileError(f"{path}: {told}; expected a table of measurements") from None
     except (OSError, ValueError) as error:
         raise FileError(f"{path}: cannot be read: {error}") from None
     lines = [

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 # Variables with fewer values are not worth compressing.
 LEAST_COMPRESSED = 1000
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+# How names of files end that are no outputs.
+OTHER_KINDS = {".csv", ".txt", ".png", ".pdf", ".svg", ".html", ".json"}
 # Bytes that are written to see whether more can be.
 PROBE_BYTES = 2**16
 # Memory for chunks of each variable that is read; the library's own is 64 MB.
@@ -113,6 +115,22 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def check_output(path: Path, reads: Iterable[str | Path] = ()) -> None:
+    """Make sure that a path is one for an output, and that it can be written; see `check_writable`.
+
+    Raises
+    ------
+    FileError
+        Also if its name ends like that of another kind of file.
+    """
+    if path.suffix.lower() in OTHER_KINDS:
+        raise FileError(
+            f"{path}: an output is netCDF, and its name must not end in {path.suffix}; "
+            f"{path.with_suffix('.nc')} would be right"
+        )
+    check_writable(path, reads)
 
 
 def _target(path: Path) -> Path:
@@ -380,7 +398,12 @@ def _check_signature(path: Path) -> None:
             f"mesoslip run {path}"
         )
     if start != b"\x89HDF\r\n\x1a\n":
-        raise FileError(f"{path}: not a netCDF-4 file")
+        told = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
+        raise FileError(f"{path}: not an output (netCDF-4){told}")
+
+
+def _is_table(path: Path) -> bool:
+    return path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
 
 
 def _check_layout(tree: xr.DataTree, path: Path) -> None:
@@ -474,7 +497,17 @@ def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
 
 def _check_run(tree: xr.DataTree, path: str | Path) -> None:
     if "spring_force" not in tree.data_vars:
-        raise FileError(f"{path}: not an output of mesoslip run")
+        kind = " but of mesoslip sweep" if "status" in tree.data_vars else ""
+        raise FileError(f"{path}: not an output of mesoslip run{kind}")
+
+
+def is_of_another(path: Path, config: Config) -> bool:
+    """Whether there is an output of another configuration at a path."""
+    try:
+        with netCDF4.Dataset(path) as file:
+            return bool(file.getncattr("configuration") != config.to_toml())
+    except (OSError, AttributeError):
+        return False
 
 
 def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:

@@ -378,7 +378,8 @@ def attributes(results: RunResults) -> dict[str, Any]:
             "complete": "true" if results.complete else "false",
             "comment": ""
             if results.complete
-            else f"interrupted; every realization came to {reached:.6g} s",
+            else f"interrupted; {'it' if len(realizations) == 1 else 'every realization'} came to "
+            f"{reached:.6g} s",
             "break_count": sum(one.breaks for one in realizations),
             "ending": "; ".join(sorted({one.ending for one in realizations})),
             "advance_count": sum(one.advances for one in realizations),
@@ -505,6 +506,11 @@ def build_tree(results: RunResults) -> xr.DataTree:
     return xr.DataTree.from_dict(datasets)
 
 
+def is_measured(tree: xr.DataTree) -> bool:
+    """Whether an output is a measured trace, and no run."""
+    return bool(tree.attrs.get("origin") == "measured")
+
+
 def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
     """The configuration of an output.
 
@@ -517,8 +523,8 @@ def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
         return Config.from_toml(tree.attrs["configuration"])
     except ConfigError:
         raise FileError(
-            f"{name}: has no configuration of a run; for a measured trace give "
-            "mesoslip trace that of the experiment with --config"
+            f"{name}: has no configuration of a run; if it is a measured trace, read it again with "
+            "that of the experiment: mesoslip trace FILE.csv --config EXPERIMENT.toml"
         ) from None
 
 

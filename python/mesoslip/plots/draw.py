@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output.layout import config_of
+from mesoslip.output.layout import config_of, is_measured
 from mesoslip.plots import avalanches, posterior, response, run, sweep, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
@@ -125,8 +125,7 @@ def picture(
             lambda figure: response.overview(tree, figure),
             lambda axes: response.draw_force(axes, tree),
         )
-    is_measured = tree.attrs.get("origin") == "measured"
-    room = run if is_measured or not config_of(tree).slider.jumps else avalanches
+    room = run if is_measured(tree) or not config_of(tree).slider.jumps else avalanches
     return Picture(
         lambda figure: room.overview(tree, figure, extent),
         lambda axes: room.draw_force(axes, tree, extent),
@@ -172,7 +171,11 @@ def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
     except FileError:
         # Of a measured trace less may be known.
         return short
-    return differences.labels(configs, short)
+    labels = differences.labels(configs, short)
+    return [
+        f"measured: {name}" if is_measured(tree) else label
+        for tree, name, label in zip(trees, short, labels, strict=True)
+    ]
 
 
 def _with_legend(panel: Callable[[Axes], None]) -> Callable[[Axes], None]:

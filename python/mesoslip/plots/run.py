@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.slips import slips
 from mesoslip.configuration.units import Scale, from_cf_units, scale_for
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output.layout import group_of
+from mesoslip.output.layout import group_of, is_measured
 from mesoslip.output.variables import TRACE
 from mesoslip.plots.style import (
     COLORS,
@@ -122,10 +122,17 @@ class Extent:
         window = max(self.start, float(times[0])), min(self.end, float(times[-1]))
         if not np.any((times >= window[0]) & (times <= window[1])):
             raise FileError(
-                f"there is no sample from {self.start:g} s to {self.end:g} s: the run goes from "
+                f"there is no sample {_between(self.start, self.end)}: the run goes from "
                 f"{times[0]:g} s to {times[-1]:g} s"
             )
         return window
+
+
+def _between(start: float, end: float) -> str:
+    """A window of time in words; it may be open at either end."""
+    parts = [f"from {start:g} s on"] if math.isfinite(start) else []
+    parts += [f"until {end:g} s"] if math.isfinite(end) else []
+    return " ".join(parts).replace(" on until", " to")
 
 
 EVERYTHING = Extent()
@@ -133,7 +140,7 @@ EVERYTHING = Extent()
 
 def is_known(tree: xr.DataTree, name: str) -> bool:
     """Whether an output has values of a variable of the trace: a measured one may not."""
-    if tree.attrs.get("origin") != "measured":
+    if not is_measured(tree):
         return True
     return bool(np.isfinite(tree.to_dataset()[name][0, 0].item()))
 
@@ -411,7 +418,10 @@ def abscissa(trees: Sequence[xr.DataTree], extent: Extent) -> Abscissa:
     """The axis that fits what is drawn of outputs."""
     name, label = extent.abscissa
     if name != "time" and not all(is_known(tree, name) for tree in trees):
-        raise FileError(f"a measured trace does not tell the {label}; draw it against time")
+        raise FileError(
+            f"the measured trace does not tell the {label}: mesoslip trace finds it with the "
+            "velocity of the drive and the stiffness of the spring, or with --config"
+        )
     windows = np.array([extent.window(tree) for tree in trees])
     if name != "time":
         lines = [
@@ -568,8 +578,17 @@ def _compare(
     """Draw a variable of several runs over each other; the force that each is judged by if it has
     no name."""
     names = [name or force_of(tree) for tree in trees]
+    # The noise of what was measured must not hide what was computed.
     curves = [
-        curve(tree, one, extent, label=label, color=COLORS[number % len(COLORS)], alpha=0.8)
+        curve(
+            tree,
+            one,
+            extent,
+            label=label,
+            color=COLORS[number % len(COLORS)],
+            alpha=0.8,
+            zorder=1.9 if is_measured(tree) else 2.0,
+        )
         for number, (tree, one, label) in enumerate(zip(trees, names, labels, strict=True))
     ]
     told = dict.fromkeys(NAMES[one] for one in names)

@@ -3,6 +3,7 @@ theory gives where the sweep has its measures."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -31,7 +32,8 @@ MOST_LABELS = 8
 CHOICES = ("#a6cee3", "#ee8877", "#e6d488", "#d9d9d9", "#7fbf7b", "#c2a5cf")
 # What theory says, as lines of a map of the regime: the measure, the value at the line, its style,
 # and what it is.
-BOUNDARIES: tuple[tuple[str, float, Literal["-", "--", "-.", ":"], str], ...] = (
+LineStyle = Literal["-", "--", "-.", ":"]
+BOUNDARIES: tuple[tuple[str, float, LineStyle, str], ...] = (
     ("growth_rate", 0.0, "-.", "steady sliding with delay turns unstable"),
     ("stable_out_of_step", 0.5, "-", "the same, contacts out of step"),
     ("critical_stiffness_ratio", 1.0, "--", "$K = K^*$"),
@@ -152,6 +154,8 @@ def _draw(axes: Axes, data: xr.Dataset, name: str) -> None:
     scales = [_Scale.of(data[key]) for key in keys]
     if len(keys) == 1:
         _draw_line(axes, measure, scales[0], flags)
+        if name == REGIME:
+            _draw_crossings(axes, data, scales[0])
     else:
         _draw_map(axes, measure, scales, flags)
         if name == REGIME:
@@ -198,17 +202,45 @@ def _draw_boundaries(
     axes: Axes, data: xr.Dataset, dimensions: tuple[Hashable, ...], scales: list[_Scale]
 ) -> None:
     """Draw the lines that theory gives, those of which there are measures that pass their value."""
+    order = [np.argsort(scale.places) for scale in scales]
+    x, y = (scale.places[one] for scale, one in zip(scales, order, strict=True))
     handles = []
     for name, level, style, meaning in BOUNDARIES:
         if name not in data:
             continue
         values = data[name].mean("realization").transpose(*dimensions).values
-        order = [np.argsort(scale.places) for scale in scales]
         values = np.ma.masked_invalid(values[np.ix_(*order)].T)
         if values.count() and values.min() < level < values.max():
-            x, y = (scale.places[one] for scale, one in zip(scales, order, strict=True))
             axes.contour(x, y, values, [level], colors="black", linestyles=style, linewidths=1.2)
-            handles.append(Line2D([], [], color="black", linestyle=style, label=meaning))
+            handles.append(_line_of(style, meaning))
+    _tell_lines(axes, handles)
+
+
+def _draw_crossings(axes: Axes, data: xr.Dataset, scale: _Scale) -> None:
+    """Draw where theory puts a change along one key, by straight lines between its places."""
+    order = np.argsort(scale.places)
+    places = np.log(scale.places[order]) if scale.is_logarithmic else scale.places[order]
+    handles = []
+    for name, level, style, meaning in BOUNDARIES:
+        if name not in data:
+            continue
+        above = data[name].mean("realization").values[order] - level
+        changes = np.flatnonzero(above[1:] * above[:-1] < 0)
+        for one in changes:
+            share = above[one] / (above[one] - above[one + 1])
+            place = places[one] + share * (places[one + 1] - places[one])
+            place = math.exp(place) if scale.is_logarithmic else place
+            axes.axvline(place, color="black", linestyle=style, linewidth=1.2)
+        if changes.size:
+            handles.append(_line_of(style, meaning))
+    _tell_lines(axes, handles)
+
+
+def _line_of(style: LineStyle, meaning: str) -> Line2D:
+    return Line2D([], [], color="black", linestyle=style, label=meaning)
+
+
+def _tell_lines(axes: Axes, handles: list[Line2D]) -> None:
     if handles:
         axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, -0.2), ncols=1)
 

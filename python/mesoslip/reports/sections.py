@@ -6,7 +6,7 @@ what tells it apart to `mesoslip.plots.draw.KINDS`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from mesoslip.configuration.units import from_cf_units, scale_for, with_unit
 from mesoslip.errors import FileError
 from mesoslip.inference import posterior
 from mesoslip.output import variables
-from mesoslip.output.layout import group_of
+from mesoslip.output.layout import group_of, is_measured
 from mesoslip.plots import draw, run
 from mesoslip.plots import sweep as sweep_plots
 from mesoslip.plots.run import Extent
@@ -94,6 +94,9 @@ def _named(subjects: Sequence[Subject], subject: Subject, text: str) -> str:
 def changes(subjects: Sequence[Subject]) -> Section | None:
     """What outputs differ in, and what each changes of what it is based on."""
     blocks: list[Block] = []
+    for subject in subjects:
+        if is_measured(subject.tree):
+            blocks += _about_trace(subject)
     if len(subjects) > 1:
         found = differences.differences([one.config for one in subjects])
         if found:
@@ -120,6 +123,19 @@ def changes(subjects: Sequence[Subject]) -> Section | None:
         blocks.append(Text(_named(subjects, subject, f"Changes {of}:")))
         blocks.append(Table(("key", "here", "base"), rows))
     return Section("What differs" if len(subjects) > 1 else "What it changes", tuple(blocks))
+
+
+def _about_trace(subject: Subject) -> Iterator[Block]:
+    """What was measured, and that its configuration is only what is known of the experiment."""
+    attributes = subject.tree.attrs
+    samples = subject.tree.sizes["time"]
+    noise = with_unit(attributes["noise"], "N", 3)
+    yield Text(
+        f"{subject.name}: measured ({attributes['measured_file']}, {samples} samples, noise "
+        f"{noise}); its configuration is that of the experiment as far as it is known."
+    )
+    if attributes.get("comment"):
+        yield Text(f"{subject.name}: {attributes['comment']}.", warns=True)
 
 
 def verdict(subjects: Sequence[Subject]) -> Section | None:
@@ -382,7 +398,7 @@ def energy(subjects: Sequence[Subject]) -> Section | None:
     """The balance of energy, and what the run promised."""
     blocks: list[Block] = []
     # An experiment has no balance.
-    for subject in (one for one in subjects if one.tree.attrs.get("origin") != "measured"):
+    for subject in (one for one in subjects if not is_measured(one.tree)):
         audit = subject.tree.attrs.get("audit", "")
         residual = abs(float(subject.tree.attrs.get("energy_residual", np.nan)))
         told = f"The balance closes to {residual:.1g} of the work of the drive; audit: {audit}."

@@ -173,6 +173,16 @@ class Fit:
     at_bounds: tuple[str, ...]
 
     @property
+    def misfit(self) -> float:
+        """Root of the mean square of the residuals [N]."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    def relative_misfit(self, record: Record) -> float:
+        """That over the standard deviation of the whole record; NaN if the force does not vary."""
+        variation = float(record.force.std())
+        return self.misfit / variation if variation > 0 else math.nan
+
+    @property
     def errors(self) -> Array:
         """Standard errors of reference force, a, b, D_c, and the stiffness where it was free."""
         errors: Array = np.sqrt(np.diag(self.covariance))
@@ -465,9 +475,7 @@ def _empty(number: int, law: str, note: str) -> dict[str, Any]:
 
 def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
     errors = found.errors
-    misfit = float(np.sqrt(np.mean(found.residual**2)))
-    variation = float(record.force.std())
-    relative = misfit / variation if variation > 0 else math.nan
+    relative = found.relative_misfit(record)
     described = (
         found.p_value >= DESCRIBES and not found.runs_p_value < DESCRIBES
         if record.has_noise
@@ -489,7 +497,7 @@ def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
         "stiffness_error": errors[4] if errors.size > 4 else 0.0,
         "critical_stiffness": found.law.critical_stiffness,
         "noise": float(np.sqrt(np.mean(record.deviation**2))) if record.has_noise else 0.0,
-        "residual": misfit,
+        "residual": found.misfit,
         "relative_misfit": relative,
         "chi_square": found.chi_square if record.has_noise else math.nan,
         "independent_points": found.independent_points,

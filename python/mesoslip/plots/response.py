@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
-from mesoslip.analysis.rate_and_state import Fit, Record, fit, record_of
+from mesoslip.analysis.rate_and_state import SMALL_MISFIT, Fit, Record, fit, record_of
 from mesoslip.analysis.response import healing_line, response, steady_line
+from mesoslip.configuration.units import percent
 from mesoslip.errors import RunError
 from mesoslip.plots.style import Canvas, canvas, styled
 from mesoslip.theory.rate_and_state import LAWS
@@ -102,6 +103,9 @@ def _draw_law(axes: Axes, experiment: Experiment, record: Record, found: Fit) ->
     label = f"{found.law.law} law, $a$ = {found.law.a / experiment.static_force:.2g} $F_s$, "
     label += f"$b$ = {found.law.b / experiment.static_force:.2g} $F_s$, "
     label += f"$D_c$ = {found.law.slip_distance * 1e9:.3g} nm"
+    # As the table says of a law that does not describe the record.
+    missed = found.relative_misfit(record)
+    label += f" (misses {percent(missed)})" if missed > SMALL_MISFIT else ""
     axes.plot(drive * 1e6, force, color="tab:red", label=label)
     axes.legend(loc="lower right")
 

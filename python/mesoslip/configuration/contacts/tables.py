@@ -154,7 +154,8 @@ class Contacts(Table):
     count: Annotated[Whole, Field(ge=1, lt=2**31)]
     """Number of contacts, N."""
     static_force: Annotated[Force, Field(gt=0)]
-    """Static friction force of all contacts together, F_s = N f_s."""
+    """Mean static threshold of all contacts together, F_s = N f_s. They do not break at once, so
+    that a run comes to less: `F_peak` of `mesoslip curve`."""
     stiffness: Annotated[Stiffness, Field(gt=0)]
     """Stiffness of all contacts together, Nk."""
     area: Annotated[Area, Field(gt=0)] | None = None

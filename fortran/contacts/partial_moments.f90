@@ -36,10 +36,10 @@ module mesoslip_contacts_partial_moments
       real(wp), allocatable, private :: table(:, :, :)
    contains
       !> Moments above a threshold, to rounding
-      procedure :: above
+      procedure, non_overridable :: above
       !> Moments above a threshold by interpolation, to about 1e-12
-      procedure :: interpolate
-      procedure, private :: coordinate, density
+      procedure, non_overridable :: interpolate
+      procedure, non_overridable, private :: coordinate, density
    end type partial_moments_type
 
 contains

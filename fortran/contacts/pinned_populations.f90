@@ -375,7 +375,8 @@ contains
       self%trial%sense = sense
       call self%list_breaking(displacement, sense, row, listed, next)
 
-      ! Apart from what comes of them: the square roots of some do not wait for those of others.
+      ! Thresholds of all first, then moments, then losses: those of one do not wait for those of
+      ! another.
       do trial = 1, listed
          place = self%trial%population(trial)
          force = sense * self%population(place, row_force)
@@ -390,6 +391,13 @@ contains
          self%trial%distance(trial) = distance
          self%trial%broken(trial) = max(self%population(place, row_broken), broken)
       end do
+      do trial = 1, listed
+         place = self%trial%population(trial)
+         call self%moments(int(self%population(place, row_law)))%interpolate( &
+            & self%trial%broken(trial), moments)
+         self%trial%moments(:, trial) = min(self%population(place, row_weight) * moments, &
+            & self%left(:, place))
+      end do
 
       breaks = 0.0_wp
       mass = 0.0_wp
@@ -398,13 +406,9 @@ contains
          place = self%trial%population(trial)
          force = self%trial%force(trial)
          distance = self%trial%distance(trial)
-         broken = self%trial%broken(trial)
-         call self%moments(int(self%population(place, row_law)))%interpolate(broken, moments)
-         moments = min(self%population(place, row_weight) * moments, self%left(:, place))
-         loss = self%left(:, place) - moments
-         self%trial%moments(:, trial) = moments
+         loss = self%left(:, place) - self%trial%moments(:, trial)
          if (self%ages) loss(lost) = loss(lost) + loss(number) &
-            & * more_lost(place, broken, distance + force)
+            & * more_lost(place, self%trial%broken(trial), distance + force)
          self%trial%lost(trial) = loss(lost)
          breaks = breaks + loss(number)
          mass = mass + loss(massive)

@@ -550,24 +550,31 @@ contains
       !> Elastic energy lost by breaking [J]
       type(accumulator_type), intent(inout) :: break_loss
 
-      real(wp) :: loss(moments_length)
+      type(accumulator_type) :: stiffness, offset, energy
+      real(wp) :: loss(moments_length), ahead, behind
       integer :: trial, place
 
+      ! In variables of their own, which stay in registers: each break waits for the one before.
+      stiffness = self%stiffness
+      offset = self%offset
+      energy = break_loss
+      ahead = self%ahead
+      behind = self%behind
       if (self%trial%sense > 0.0_wp) then
-         self%ahead = self%trial%next
+         ahead = self%trial%next
       else
-         self%behind = self%trial%next
+         behind = self%trial%next
       end if
       associate (population => self%population, parameters => self%parameters)
          ! The last population takes the place of one that is removed: it has had its turn.
          do trial = self%trial%count, 1, -1
             place = self%trial%population(trial)
             loss = self%left(:, place) - self%trial%moments(:, trial)
-            call self%stiffness%add(-parameters%stiffness * loss(stiff))
-            call self%offset%add(parameters%static_force * loss(number) &
+            call stiffness%add(-parameters%stiffness * loss(stiff))
+            call offset%add(parameters%static_force * loss(number) &
                & * population(place, row_force) &
                & - parameters%stiffness * loss(stiff) * population(place, row_origin))
-            call break_loss%add(0.5_wp * parameters%static_force * self%stretch &
+            call energy%add(0.5_wp * parameters%static_force * self%stretch &
                & * self%trial%lost(trial))
             self%left(:, place) = self%trial%moments(:, trial)
             population(place, row_broken) = self%trial%broken(trial)
@@ -579,8 +586,8 @@ contains
                   population(place, row_behind) = self%trial%end
                   population(place, row_ahead) = self%next_break(place, 1.0_wp, self%trial%time)
                end if
-               self%ahead = min(self%ahead, population(place, row_ahead))
-               self%behind = max(self%behind, population(place, row_behind))
+               ahead = min(ahead, population(place, row_ahead))
+               behind = max(behind, population(place, row_behind))
             else
                population(place, :) = population(self%count, :)
                self%left(:, place) = self%left(:, self%count)
@@ -588,6 +595,11 @@ contains
             end if
          end do
       end associate
+      self%stiffness = stiffness
+      self%offset = offset
+      break_loss = energy
+      self%ahead = ahead
+      self%behind = behind
       if (self%count == 0) then
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()

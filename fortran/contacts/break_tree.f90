@@ -212,14 +212,14 @@ contains
       !> Number of the contact; 0 if none breaks
       integer :: contact
 
-      integer :: level
+      integer :: level, place
 
       contact = 0
       if (self%first() > coordinate) return
       contact = 1
       do level = self%levels - 1, 0, -1
-         contact = (contact - 1) * branches &
-            & + first_of(self%least(self%before(level) + (contact - 1) * branches + 1:), self%first())
+         place = self%before(level) + (contact - 1) * branches
+         contact = (contact - 1) * branches + first_of(self%least(place + 1:), self%first())
       end do
    end function due
 

@@ -169,7 +169,7 @@ contains
       type(contact_lattice_type) :: contacts
       real(wp) :: displacement
       integer :: step, extent(extent_length)
-      real(wp), parameter :: bond = 5.0_wp
+      real(wp), parameter :: bond = 5.0_wp, shift = 0.3_wp
       logical :: is_whole, bears, adds_up
 
       call build(contacts, columns, rows, bond, 1.0e-3_wp)
@@ -188,10 +188,10 @@ contains
          bears = bears .and. bearing(contacts, displacement)
          adds_up = adds_up .and. is_sum_of_bonds(contacts, displacement, columns, rows, bond)
          if (step == 200) then
-            call contacts%shift_origin(0.3_wp, displacement - 0.3_wp)
-            adds_up = adds_up .and. is_sum_of_bonds(contacts, displacement - 0.3_wp, columns, rows, &
-               & bond)
-            call contacts%shift_origin(-0.3_wp, displacement)
+            call contacts%shift_origin(shift, displacement - shift)
+            adds_up = adds_up &
+               & .and. is_sum_of_bonds(contacts, displacement - shift, columns, rows, bond)
+            call contacts%shift_origin(-shift, displacement)
          end if
          call contacts%take_extent(extent)
       end do

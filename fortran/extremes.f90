@@ -19,7 +19,7 @@ module mesoslip_extremes
       !> Take a force into account
       procedure, non_overridable :: note
       !> Put the state into an archive or take it out
-      procedure :: exchange
+      procedure, non_overridable :: exchange
    end type extremes_type
 
 contains

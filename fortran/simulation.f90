@@ -93,26 +93,26 @@ module mesoslip_simulation
       real(wp), private :: start_energy = 0.0_wp
    contains
       !> Prepare the start of a run
-      procedure :: start
+      procedure, non_overridable :: start
       !> Go on for some advances, or until the end
-      procedure :: run
+      procedure, non_overridable :: run
       !> Terms of the energy balance
-      procedure :: energy_balance
+      procedure, non_overridable :: energy_balance
       !> Put the state into an archive or take it out
-      procedure :: exchange
+      procedure, non_overridable :: exchange
       !> A table of what was recorded, rows of it that can be taken away, and taking them away
-      procedure :: table
-      procedure :: rows_to_drain
-      procedure :: drain
+      procedure, non_overridable :: table
+      procedure, non_overridable :: rows_to_drain
+      procedure, non_overridable :: drain
       !> Put the state away, fetch it, and go on from it
-      procedure :: save
-      procedure :: fetch
-      procedure :: restore
+      procedure, non_overridable :: save
+      procedure, non_overridable :: fetch
+      procedure, non_overridable :: restore
       !> Whether all parts are there
-      procedure :: is_whole
-      procedure, private :: advance, advance_once, run_ahead, change_drive, take_part, &
-         & acceleration, follow, finish, is_broken, slides, longest_step, stop_early, is_there, &
-         & look_for_steady
+      procedure, non_overridable :: is_whole
+      procedure, non_overridable, private :: advance, advance_once, run_ahead, change_drive, &
+         & take_part, acceleration, follow, finish, is_broken, slides, longest_step, stop_early, &
+         & is_there, look_for_steady
    end type simulation_type
 
 contains

@@ -31,13 +31,13 @@ module mesoslip_contacts_avalanche_track
       integer, allocatable :: contact(:, :)
    contains
       !> A contact breaks
-      procedure :: add
+      procedure, non_overridable :: add
       !> Columns and rows that the avalanche reaches over
-      procedure :: extent
+      procedure, non_overridable :: extent
       !> Forget the avalanche
-      procedure :: clear
+      procedure, non_overridable :: clear
       !> Put the state into an archive or take it out
-      procedure :: exchange
+      procedure, non_overridable :: exchange
    end type avalanche_track_type
 
 contains

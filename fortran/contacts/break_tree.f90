@@ -142,6 +142,20 @@ contains
       least = min(min(part(1), part(2)), min(part(3), part(4)))
    end function least_of
 
+   !> The first branch of a node that is not above the least, without a branch of the program: which
+   !> one it is could not be guessed.
+   pure function first_of(branch, least) result(place)
+      real(wp), intent(in) :: branch(branches), least
+      integer :: place
+
+      integer :: later
+
+      place = branches
+      do later = branches - 1, 1, -1
+         place = merge(place, later, branch(later) > least)
+      end do
+   end function first_of
+
    !> Forget all contacts.
    pure subroutine clear(self)
       !> The tree
@@ -198,16 +212,14 @@ contains
       !> Number of the contact; 0 if none breaks
       integer :: contact
 
-      integer :: level
+      integer :: level, place
 
       contact = 0
       if (self%first() > coordinate) return
       contact = 1
       do level = self%levels - 1, 0, -1
-         contact = (contact - 1) * branches + 1
-         do while (self%least(self%before(level) + contact) > self%first())
-            contact = contact + 1
-         end do
+         place = self%before(level) + (contact - 1) * branches
+         contact = (contact - 1) * branches + first_of(self%least(place + 1:), self%first())
       end do
    end function due
 

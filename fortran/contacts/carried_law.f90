@@ -34,8 +34,8 @@ module mesoslip_contacts_carried_law
       real(wp), private :: mean = 1.0_wp
    contains
       !> Threshold that is exceeded with a given probability
-      procedure :: quantile
-      procedure, private :: slope
+      procedure, non_overridable :: quantile
+      procedure, non_overridable, private :: slope
    end type carried_law_type
 
 contains

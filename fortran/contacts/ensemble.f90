@@ -41,7 +41,7 @@ module mesoslip_contacts_ensemble
       procedure :: shift_origin
       procedure :: exchange
       procedure :: rebuild
-      procedure, private :: break_due, attach_due, face, farthest_behind
+      procedure, non_overridable, private :: break_due, attach_due, face, farthest_behind
    end type contact_ensemble_type
 
 contains

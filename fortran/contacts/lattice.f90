@@ -3,8 +3,10 @@
 !> The force that breaks a contact is f_i = k_i x_i + G sum_j (x_i - x_j) over its neighbours, with
 !> x_j = 0 for a detached one. While neighbours stay as they are it grows with the displacement at
 !> the rate k_i + G n_i, n_i of them being detached: breaks are events in the displacement, which
-!> move when a neighbour breaks or attaches. Their order is kept for one direction of motion; what
-!> breaks on the way back is bounded, and the order made anew when the slider comes to the bound.
+!> move when a neighbour breaks or attaches. Each contact keeps what its neighbours are to it, a sum
+!> that changes by one of them at a time, made anew when it attaches. The order of breaking is kept
+!> for one direction of motion; what breaks on the way back is bounded, and the order made anew when
+!> the slider comes to the bound.
 module mesoslip_contacts_lattice
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -26,6 +28,10 @@ module mesoslip_contacts_lattice
    !> Breaks of each contact in one cascade, on average, beyond which it is taken to have no end.
    real(wp), parameter :: most_lives = 1000.0_wp
 
+   !> What the neighbours are to a pinned contact: sum over the pinned ones of how far their origins
+   !> are ahead of its own [m], and how many are detached
+   integer, parameter :: surroundings_length = 2, row_ahead = 1, row_free = 2
+
    !> How contacts act on each other.
    type :: interaction_type
       !> Stiffness of the bond between neighbours, G [N/m]; 0 for none
@@ -42,6 +48,8 @@ module mesoslip_contacts_lattice
       real(wp), private :: bond = 0.0_wp, bonds = 0.0_wp
       !> Neighbours of each contact, shape (neighbours, count)
       integer, allocatable, private :: neighbour(:, :)
+      !> What these are to it while it is pinned, shape (surroundings_length, count)
+      real(wp), allocatable, private :: surroundings(:, :)
       !> Contacts that let go together
       integer, allocatable, private :: generation(:)
       !> Direction of motion for which the order of breaking is kept, +1 or -1
@@ -58,7 +66,7 @@ module mesoslip_contacts_lattice
       procedure :: snapshot
       procedure :: exchange
       procedure, private, non_overridable :: cascade, list_due, list_behind, attach_due, refresh, &
-         & refresh_neighbours
+         & look_around, tell_neighbours
    end type contact_lattice_type
 
 contains
@@ -88,12 +96,14 @@ contains
       if (allocated(error)) return
       allocate (self%neighbour(neighbours, parameters%count), stat=stat)
       if (stat == 0) allocate (self%generation(parameters%count), stat=stat)
+      if (stat == 0) allocate (self%surroundings(surroundings_length, parameters%count), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the neighbours of contacts")
          return
       end if
       call find_neighbours(interaction%lattice, interaction%columns, interaction%rows, &
          & self%neighbour)
+      self%surroundings = 0.0_wp
       call new_break_tree(self%tree, parameters%count, error)
    end subroutine new_contact_lattice
 
@@ -129,7 +139,12 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
+      integer :: contact
+
       call self%draw(state)
+      do contact = 1, self%parameters%count
+         call self%look_around(contact)
+      end do
       call self%rebuild(0.0_wp)
       self%behind = farthest_behind(self)
       call self%respond(pose_type(), pose_type())
@@ -200,7 +215,7 @@ contains
             call self%let_go(self%generation(place), displacement, time)
          end do
          do place = 1, number
-            call self%refresh_neighbours(self%generation(place))
+            call self%tell_neighbours(self%generation(place), -1.0_wp)
          end do
       end do
    end subroutine cascade
@@ -244,8 +259,8 @@ contains
       self%behind = -huge(1.0_wp)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
-            & self%record, self%neighbour, self%bond, centre, limit)
+         call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &
+            & limit)
          if (self%direction * displacement <= self%direction * centre - limit) then
             call self%tree%remove(contact)
             number = number + 1
@@ -267,8 +282,8 @@ contains
       coordinate = -huge(1.0_wp)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
-            & self%record, self%neighbour, self%bond, centre, limit)
+         call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &
+            & limit)
          coordinate = max(coordinate, self%direction * centre - limit)
       end do
    end function farthest_behind
@@ -291,25 +306,77 @@ contains
             end associate
          end do
          call self%take_hold(displacement, back_force + self%bond * pull, self%bonds, contact)
+         call self%look_around(contact)
          call self%refresh(contact)
-         call self%refresh_neighbours(contact)
+         call self%tell_neighbours(contact, 1.0_wp)
       end do
    end subroutine attach_due
 
-   !> Neighbours of a contact that broke or attached break elsewhere now.
-   subroutine refresh_neighbours(self, contact)
+   !> See what the neighbours are to a contact.
+   pure subroutine look_around(self, contact)
       class(contact_lattice_type), intent(inout) :: self
       integer, intent(in) :: contact
 
+      integer :: side
+      real(wp) :: ahead, free, is_pinned
+
+      ahead = 0.0_wp
+      free = 0.0_wp
+      do side = 1, size(self%neighbour, 1)
+         associate (record => self%record(:, self%neighbour(side, contact)))
+            is_pinned = merge(1.0_wp, 0.0_wp, record(row_stiffness) > 0.0_wp)
+            ahead = ahead + is_pinned * (record(row_origin) - self%record(row_origin, contact))
+            free = free + (1.0_wp - is_pinned)
+         end associate
+      end do
+      self%surroundings(:, contact) = [ahead, free]
+   end subroutine look_around
+
+   !> Neighbours of a contact that broke (change -1) or attached (+1) break elsewhere now.
+   subroutine tell_neighbours(self, contact, change)
+      class(contact_lattice_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: change
+
       ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
       if (size(self%neighbour, 1) == 6) then
-         call refresh_all(self%neighbour(:, contact), 6, self%parameters%count, &
-            & self%record, self%neighbour, self%bond, self%direction, self%tree, self%behind)
+         call tell_all(contact, change, 6, self%neighbour(:, contact), self%parameters%count, &
+            & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
       else
-         call refresh_all(self%neighbour(:, contact), 4, self%parameters%count, &
-            & self%record, self%neighbour, self%bond, self%direction, self%tree, self%behind)
+         call tell_all(contact, change, 4, self%neighbour(:, contact), self%parameters%count, &
+            & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
       end if
-   end subroutine refresh_neighbours
+   end subroutine tell_neighbours
+
+   !> Tell the pinned neighbours of a contact that it broke or attached: where do they break now?
+   pure subroutine tell_all(contact, change, sides, neighbour, count, record, surroundings, bond, &
+      & direction, tree, behind)
+      !> The contact, -1 if it broke and +1 if it attached, and its neighbours, of so many in all
+      integer, intent(in) :: contact, sides, count, neighbour(sides)
+      real(wp), intent(in) :: change
+      real(wp), intent(in) :: record(record_length, count)
+      real(wp), intent(inout) :: surroundings(surroundings_length, count)
+      real(wp), intent(in) :: bond, direction
+      type(break_tree_type), intent(inout) :: tree
+      !> Bound on the coordinates at which contacts break on the way back [m]
+      real(wp), intent(inout) :: behind
+
+      integer :: side
+      real(wp) :: origin, centre, limit
+
+      origin = record(row_origin, contact)
+      do side = 1, sides
+         associate (other => neighbour(side))
+            if (.not. record(row_stiffness, other) > 0.0_wp) cycle
+            surroundings(row_ahead, other) = surroundings(row_ahead, other) &
+               & + change * (origin - record(row_origin, other))
+            surroundings(row_free, other) = surroundings(row_free, other) - change
+            call bearing(record(:, other), surroundings(:, other), bond, centre, limit)
+            call tree%set(other, direction * centre + limit)
+            behind = max(behind, direction * centre - limit)
+         end associate
+      end do
+   end subroutine tell_all
 
    !> Find out where a pinned contact breaks.
    subroutine refresh(self, contact)
@@ -318,60 +385,23 @@ contains
 
       real(wp) :: centre, limit
 
-      call bearing(contact, size(self%neighbour, 1), self%parameters%count, self%record, &
-         & self%neighbour, self%bond, centre, limit)
+      call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, limit)
       call self%tree%set(contact, self%direction * centre + limit)
       self%behind = max(self%behind, self%direction * centre - limit)
    end subroutine refresh
 
-   !> Find out where the pinned ones of some contacts break.
-   pure subroutine refresh_all(contact, sides, count, record, neighbour, bond, direction, tree, &
-      & behind)
-      !> Contacts, as many as a contact has neighbours, of so many in all
-      integer, intent(in) :: sides, count, contact(sides)
-      real(wp), intent(in) :: record(record_length, count)
-      integer, intent(in) :: neighbour(sides, count)
-      real(wp), intent(in) :: bond, direction
-      type(break_tree_type), intent(inout) :: tree
-      !> Bound on the coordinates at which contacts break on the way back [m]
-      real(wp), intent(inout) :: behind
-
-      integer :: side
-      real(wp) :: centre, limit
-
-      do side = 1, sides
-         if (.not. record(row_stiffness, contact(side)) > 0.0_wp) cycle
-         call bearing(contact(side), sides, count, record, neighbour, bond, centre, limit)
-         call tree%set(contact(side), direction * centre + limit)
-         behind = max(behind, direction * centre - limit)
-      end do
-   end subroutine refresh_all
-
    !> Displacement at which a pinned contact bears no force, and how far from there it breaks.
-   pure subroutine bearing(contact, sides, count, record, neighbour, bond, centre, limit)
-      integer, intent(in) :: contact, sides, count
-      real(wp), intent(in) :: record(record_length, count)
-      integer, intent(in) :: neighbour(sides, count)
-      real(wp), intent(in) :: bond
+   pure subroutine bearing(record, surroundings, bond, centre, limit)
+      real(wp), intent(in) :: record(record_length), surroundings(surroundings_length), bond
       real(wp), intent(out) :: centre, limit
 
-      integer :: side, other
-      real(wp) :: origin, relative, ahead, free, is_pinned, softness
+      real(wp) :: relative, softness
 
-      origin = record(row_origin, contact)
-      relative = bond / record(row_stiffness, contact)
       ! f_i = k_i [(X - Y_i) (1 + G n_i/k_i) + G/k_i sum (Y_j - Y_i)], the sum over the pinned.
-      ahead = 0.0_wp
-      free = 0.0_wp
-      do side = 1, sides
-         other = neighbour(side, contact)
-         is_pinned = merge(1.0_wp, 0.0_wp, record(row_stiffness, other) > 0.0_wp)
-         ahead = ahead + is_pinned * (record(row_origin, other) - origin)
-         free = free + (1.0_wp - is_pinned)
-      end do
-      softness = 1.0_wp / (1.0_wp + relative * free)
-      centre = origin - relative * ahead * softness
-      limit = record(row_limit, contact) * softness
+      relative = bond / record(row_stiffness)
+      softness = 1.0_wp / (1.0_wp + relative * surroundings(row_free))
+      centre = record(row_origin) - relative * surroundings(row_ahead) * softness
+      limit = record(row_limit) * softness
    end subroutine bearing
 
    !> Move the origin of displacements.
@@ -383,7 +413,12 @@ contains
       !> Displacement of the slider from the new origin [m]
       real(wp), intent(in) :: displacement
 
+      integer :: contact
+
       call self%shift_records(shift)
+      do contact = 1, self%parameters%count
+         call self%look_around(contact)
+      end do
       call self%rebuild(displacement)
       self%behind = farthest_behind(self)
    end subroutine shift_origin
@@ -401,8 +436,8 @@ contains
       call self%tree%clear()
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
-            & self%record, self%neighbour, self%bond, centre, limit)
+         call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &
+            & limit)
          call self%tree%put(contact, self%direction * centre + limit)
       end do
       call self%tree%arrange()
@@ -424,8 +459,8 @@ contains
       call snapshot_set(self, displacement, values)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(contact, size(self%neighbour, 1), self%parameters%count, &
-            & self%record, self%neighbour, self%bond, centre, limit)
+         call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &
+            & limit)
          values(2, contact) = (displacement - centre) / limit
       end do
    end subroutine snapshot
@@ -439,6 +474,7 @@ contains
 
       call archive%section("contact lattice")
       call exchange_set(self, archive)
+      call archive%exchange("surroundings", self%surroundings)
       call archive%exchange("direction", self%direction)
       call archive%exchange("behind", self%behind)
    end subroutine exchange

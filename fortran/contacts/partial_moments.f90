@@ -36,10 +36,10 @@ module mesoslip_contacts_partial_moments
       real(wp), allocatable, private :: table(:, :, :)
    contains
       !> Moments above a threshold, to rounding
-      procedure :: above
+      procedure, non_overridable :: above
       !> Moments above a threshold by interpolation, to about 1e-12
-      procedure :: interpolate
-      procedure, private :: coordinate, density
+      procedure, non_overridable :: interpolate
+      procedure, non_overridable, private :: coordinate, density
    end type partial_moments_type
 
 contains
@@ -157,8 +157,8 @@ contains
       !> E[u^a; u > U] of each exponent, shape (orders)
       real(wp), intent(out), contiguous :: moment(:)
 
-      real(wp) :: place, t, s, weight(4)
-      integer :: cell, order
+      real(wp) :: place
+      integer :: cell
 
       if (threshold <= self%least) then
          moment = self%table(:, 1, 1)
@@ -167,16 +167,30 @@ contains
       else
          place = (self%coordinate(threshold) - self%first) / self%step
          cell = min(int(place), cells - 1)
-         t = place - cell
-         s = 1.0_wp - t
-         weight = [s**2 * (1.0_wp + 2.0_wp * t), s**2 * t, t**2 * (1.0_wp + 2.0_wp * s), -s * t**2]
-         do order = 1, size(moment)
-            moment(order) = weight(1) * self%table(order, 1, cell + 1) &
-               & + weight(2) * self%table(order, 2, cell + 1) &
-               & + weight(3) * self%table(order, 1, cell + 2) &
-               & + weight(4) * self%table(order, 2, cell + 2)
-         end do
+         call hermite(size(moment), cells + 1, self%table, cell, place - cell, moment)
       end if
    end subroutine interpolate
+
+   !> Moments within a cell of the table by Hermite's interpolation.
+   pure subroutine hermite(orders, knots, table, cell, t, moment)
+      integer, intent(in) :: orders, knots
+      real(wp), intent(in) :: table(orders, 2, knots)
+      !> The cell, from 0, and the place in it, 0 to 1
+      integer, intent(in) :: cell
+      real(wp), intent(in) :: t
+      real(wp), intent(out) :: moment(orders)
+
+      real(wp) :: s, weight(4)
+      integer :: order
+
+      s = 1.0_wp - t
+      weight = [s**2 * (1.0_wp + 2.0_wp * t), s**2 * t, t**2 * (1.0_wp + 2.0_wp * s), -s * t**2]
+      do order = 1, orders
+         moment(order) = weight(1) * table(order, 1, cell + 1) &
+            & + weight(2) * table(order, 2, cell + 1) &
+            & + weight(3) * table(order, 1, cell + 2) &
+            & + weight(4) * table(order, 2, cell + 2)
+      end do
+   end subroutine hermite
 
 end module mesoslip_contacts_partial_moments

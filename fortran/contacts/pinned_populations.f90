@@ -29,8 +29,8 @@ module mesoslip_contacts_pinned_populations
    integer, parameter :: moments_length = 5
    integer, parameter :: number = 1, stiff = 2, compliant = 3, lost = 4, massive = 5
 
-   !> Numbers kept for a population
-   integer, parameter :: population_length = 8 + moments_length
+   !> Numbers kept for a population, besides its moments
+   integer, parameter :: population_length = 8
    !> Displacement at which stretches are zero but for the force at attaching [m]
    integer, parameter :: row_origin = 1
    !> Force at attaching, signed
@@ -45,8 +45,6 @@ module mesoslip_contacts_pinned_populations
    integer, parameter :: row_ahead = 6, row_behind = 7
    !> When it attached [s]
    integer, parameter :: row_birth = 8
-   !> The moments come after these
-   integer, parameter :: row_moments = 8
 
    !> Relative width of the law of thresholds beyond which populations are not farther apart.
    real(wp), parameter :: widest_spread = 0.35_wp
@@ -54,6 +52,8 @@ module mesoslip_contacts_pinned_populations
    real(wp), parameter :: shortest_even = 0.02_wp
    !> Populations for which there is room at first
    integer, parameter :: first_places = 64
+   !> Populations that are looked at together for one that breaks
+   integer, parameter :: block = 8
    !> A gap that counts as none, over the length of a step.
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
@@ -61,11 +61,12 @@ module mesoslip_contacts_pinned_populations
    type :: trial_type
       !> The displacement [m], time [s] and direction
       real(wp) :: end = 0.0_wp, time = 0.0_wp, sense = 1.0_wp
-      !> The populations of which contacts break, the thresholds below which they will have broken,
-      !> what the moments will be, and twice the energy that is lost; shape (count, or more)
+      !> The populations of which contacts break, their forces at attaching along the direction,
+      !> the distances from there, the thresholds below which they will have broken, what the
+      !> moments will be, and twice the energy that is lost; shape (count, or more)
       integer :: count = 0
       integer, allocatable :: population(:)
-      real(wp), allocatable :: broken(:), moments(:, :), lost(:)
+      real(wp), allocatable :: force(:), distance(:), broken(:), moments(:, :), lost(:)
       !> Breaks, and their mass; work that need not be done for them [J]
       real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp
       !> Where the next population breaks [m]
@@ -102,6 +103,8 @@ module mesoslip_contacts_pinned_populations
       type(partial_moments_type), private :: moments(2)
       !> Populations, shape (places, population_length), as many are in use as there are
       real(wp), allocatable, private :: population(:, :)
+      !> Moments of their contacts that are left, shape (moments_length, places)
+      real(wp), allocatable, private :: left(:, :)
    contains
       !> Let thresholds change with age
       procedure, non_overridable :: let_age
@@ -125,7 +128,8 @@ module mesoslip_contacts_pinned_populations
       procedure, non_overridable :: elastic_energy
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
-      procedure, non_overridable, private :: add, bear, make_room, next_break
+      procedure, non_overridable, private :: add, bear, make_room, next_break, make_room_to_try, &
+         & list_breaking
    end type pinned_populations_type
 
 contains
@@ -146,6 +150,7 @@ contains
       self%step = resolution * min(parameters%law%width, widest_spread) * self%stretch
       if (parameters%coupling == coupling_scaled) self%step = 0.5_wp * self%step
       allocate (self%population(first_places, population_length), source=0.0_wp)
+      allocate (self%left(moments_length, first_places), source=0.0_wp)
 
       exponent = [0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp]
       one_over_stretch = -1.0_wp
@@ -205,10 +210,11 @@ contains
                   & broken_threshold(parameters%coupling, back, middle), 0.0_wp, &
                   & -self%ageing%initial_age, 0.0_wp)
             end do
-            total = sum(self%population(:self%count, row_moments + number))
-            associate (all => self%population(:self%count, :))
-               all(:, row_weight) = all(:, row_weight) * (parameters%count / total)
-               all(:, row_moments + 1:) = all(:, row_moments + 1:) * (parameters%count / total)
+            total = self%number_of_contacts()
+            associate (weight => self%population(:self%count, row_weight), &
+               & left => self%left(:, :self%count))
+               weight = weight * (parameters%count / total)
+               left = left * (parameters%count / total)
             end associate
          end if
       end associate
@@ -257,7 +263,7 @@ contains
          population(place, row_law) = real(law, wp)
          population(place, row_broken) = max(broken, self%moments(law)%least)
          population(place, row_birth) = birth
-         population(place, row_moments + 1:) = weight * moments
+         self%left(:, place) = weight * moments
          population(place, row_ahead) = max(displacement, self%next_break(place, 1.0_wp, time))
          population(place, row_behind) = min(displacement, self%next_break(place, -1.0_wp, time))
          self%ahead = min(self%ahead, population(place, row_ahead))
@@ -275,6 +281,9 @@ contains
       allocate (larger(2 * self%count, population_length), source=0.0_wp)
       larger(:self%count, :) = self%population
       call move_alloc(larger, self%population)
+      allocate (larger(moments_length, 2 * self%count), source=0.0_wp)
+      larger(:, :self%count) = self%left
+      call move_alloc(larger, self%left)
    end subroutine make_room
 
    !> Displacement at which contacts of a population break next in a direction.
@@ -329,12 +338,10 @@ contains
       self%stiffness = accumulator_type()
       self%offset = accumulator_type()
       do place = 1, self%count
-         associate (one => self%population(place, :))
-            call self%stiffness%add(self%parameters%stiffness * one(row_moments + stiff))
-            call self%offset%add(self%parameters%stiffness * one(row_moments + stiff) &
-               & * one(row_origin))
-            call self%offset%add(-self%parameters%static_force * one(row_moments + number) &
-               & * one(row_force))
+         associate (one => self%population(place, :), left => self%left(:, place))
+            call self%stiffness%add(self%parameters%stiffness * left(stiff))
+            call self%offset%add(self%parameters%stiffness * left(stiff) * one(row_origin))
+            call self%offset%add(-self%parameters%static_force * left(number) * one(row_force))
          end associate
       end do
       self%ahead = minval(self%population(:self%count, row_ahead))
@@ -353,71 +360,60 @@ contains
       real(wp), intent(out) :: late, onset
 
       real(wp) :: moments(moments_length), loss(moments_length), distance, force, broken, next
-      real(wp) :: most, edge, start, gap
+      real(wp) :: most, edge, start, breaks, mass, work
       integer :: place, row, trial, listed
-      logical :: breaks
 
       start = before%displacement
       row = merge(row_ahead, row_behind, sense > 0.0_wp)
-      next = huge(1.0_wp)
       late = 0.0_wp
       most = 0.0_wp
       onset = displacement
       edge = sense * start + tiny_gap * self%step
-      if (allocated(self%trial%population)) then
-         if (size(self%trial%population) < self%count) then
-            deallocate (self%trial%population, self%trial%broken, self%trial%moments, &
-               & self%trial%lost)
-         end if
-      end if
-      if (.not. allocated(self%trial%population)) then
-         associate (places => size(self%population, 1))
-            allocate (self%trial%population(places), self%trial%broken(places))
-            allocate (self%trial%moments(moments_length, places), self%trial%lost(places))
-         end associate
-      end if
+      call self%make_room_to_try()
       self%trial%end = displacement
       self%trial%time = time
       self%trial%sense = sense
-      self%trial%breaks = 0.0_wp
-      self%trial%mass = 0.0_wp
-      self%trial%work = 0.0_wp
-      ! Which ones break is as good as random: they are listed without a branch. Contacts whose
-      ! thresholds fall may break while the slider rests.
-      listed = 0
-      do place = 1, self%count
-         gap = sense * (self%population(place, row) - displacement)
-         breaks = gap < 0.0_wp .or. (self%some_fall .and. .not. gap > 0.0_wp)
-         self%trial%population(listed + 1) = place
-         listed = listed + merge(1, 0, breaks)
-         next = min(next, merge(huge(1.0_wp), sense * self%population(place, row), breaks))
-      end do
+      call self%list_breaking(displacement, sense, row, listed, next)
+
+      ! Thresholds of all first, then moments, then losses: those of one do not wait for those of
+      ! another.
       do trial = 1, listed
          place = self%trial%population(trial)
          force = sense * self%population(place, row_force)
          distance = sense * (displacement - self%population(place, row_origin)) / self%stretch
          if (self%ages) then
-            broken = max(self%population(place, row_broken), self%ageing%configured( &
-               & max(0.0_wp, distance + force), time - self%population(place, row_birth)))
+            broken = self%ageing%configured(max(0.0_wp, distance + force), &
+               & time - self%population(place, row_birth))
          else
-            broken = max(self%population(place, row_broken), &
-               & broken_threshold(self%parameters%coupling, force, distance))
+            broken = broken_threshold(self%parameters%coupling, force, distance)
          end if
-         call self%moments(int(self%population(place, row_law)))%interpolate(broken, moments)
-         moments = min(self%population(place, row_weight) * moments, &
-            & self%population(place, row_moments + 1:))
-         loss = self%population(place, row_moments + 1:) - moments
-         self%trial%population(trial) = place
-         self%trial%broken(trial) = broken
-         self%trial%moments(:, trial) = moments
+         self%trial%force(trial) = force
+         self%trial%distance(trial) = distance
+         self%trial%broken(trial) = max(self%population(place, row_broken), broken)
+      end do
+      do trial = 1, listed
+         place = self%trial%population(trial)
+         call self%moments(int(self%population(place, row_law)))%interpolate( &
+            & self%trial%broken(trial), moments)
+         self%trial%moments(:, trial) = min(self%population(place, row_weight) * moments, &
+            & self%left(:, place))
+      end do
+
+      breaks = 0.0_wp
+      mass = 0.0_wp
+      work = 0.0_wp
+      do trial = 1, listed
+         place = self%trial%population(trial)
+         force = self%trial%force(trial)
+         distance = self%trial%distance(trial)
+         loss = self%left(:, place) - self%trial%moments(:, trial)
+         if (self%ages) loss(lost) = loss(lost) + loss(number) &
+            & * more_lost(place, self%trial%broken(trial), distance + force)
          self%trial%lost(trial) = loss(lost)
-         if (self%ages) self%trial%lost(trial) = loss(lost) + loss(number) &
-            & * more_lost(place, broken, distance + force)
-         self%trial%breaks = self%trial%breaks + loss(number)
-         self%trial%mass = self%trial%mass + loss(massive)
-         self%trial%work = self%trial%work + 0.5_wp * (loss(stiff) * distance**2 &
-            & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 &
-            & - self%trial%lost(trial))
+         breaks = breaks + loss(number)
+         mass = mass + loss(massive)
+         work = work + 0.5_wp * (loss(stiff) * distance**2 &
+            & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 - loss(lost))
          if (sense * self%population(place, row) > edge) then
             late = late + loss(number)
             if (loss(number) > most) then
@@ -426,8 +422,10 @@ contains
             end if
          end if
       end do
+      self%trial%breaks = breaks
+      self%trial%mass = mass
+      self%trial%work = work * self%parameters%static_force * self%stretch
       self%trial%count = listed
-      self%trial%work = self%trial%work * self%parameters%static_force * self%stretch
       self%trial%next = sense * next
       if (self%trial%count == 0) then
          if (sense > 0.0_wp) self%ahead = self%trial%next
@@ -450,7 +448,7 @@ contains
          energy = 0.0_wp
          first = self%population(population, row_broken)
          if (.not. last > first) return
-         start_force = max(0.0_wp, force + sense &
+         start_force = max(0.0_wp, sense * self%population(population, row_force) + sense &
             & * (start - self%population(population, row_origin)) / self%stretch)
          start_broken = self%ageing%configured(start_force, &
             & before%time - self%population(population, row_birth))
@@ -463,6 +461,64 @@ contains
       end function more_lost
 
    end subroutine try
+
+   !> Make room for a trial of all populations.
+   subroutine make_room_to_try(self)
+      class(pinned_populations_type), intent(inout) :: self
+
+      integer :: places
+
+      places = size(self%population, 1)
+      if (allocated(self%trial%population)) then
+         if (size(self%trial%population) == places) return
+         deallocate (self%trial%population, self%trial%force, self%trial%distance, &
+            & self%trial%broken, self%trial%moments, self%trial%lost)
+      end if
+      allocate (self%trial%population(places), self%trial%force(places), &
+         & self%trial%distance(places), self%trial%broken(places))
+      allocate (self%trial%moments(moments_length, places), self%trial%lost(places))
+   end subroutine make_room_to_try
+
+   !> List the populations of which contacts break until the slider comes to a displacement.
+   subroutine list_breaking(self, displacement, sense, row, listed, next)
+      class(pinned_populations_type), intent(inout) :: self
+      !> Where the slider comes to [m], in which direction, and the row that is about this direction
+      real(wp), intent(in) :: displacement, sense
+      integer, intent(in) :: row
+      !> How many they are, and the coordinate along the direction where the next one breaks [m]
+      integer, intent(out) :: listed
+      real(wp), intent(out) :: next
+
+      real(wp) :: here, coordinate, least(4)
+      integer :: first, place
+      logical :: breaks
+
+      listed = 0
+      next = huge(1.0_wp)
+      here = sense * displacement
+      do first = 1, self%count, block
+         if (first + block - 1 <= self%count) then
+            ! Of most blocks no population breaks.
+            associate (place_of => self%population(first:first + block - 1, row))
+               least = min(sense * place_of(:4), sense * place_of(5:))
+            end associate
+            coordinate = min(min(least(1), least(2)), min(least(3), least(4)))
+            if (coordinate > here) then
+               next = min(next, coordinate)
+               cycle
+            end if
+         end if
+         ! In the others which ones do is as good as random: they are listed without a branch.
+         ! Contacts whose thresholds fall may break while the slider rests.
+         do place = first, min(first + block - 1, self%count)
+            coordinate = sense * self%population(place, row)
+            breaks = coordinate < here .or. (self%some_fall .and. .not. coordinate > here)
+            self%trial%population(listed + 1) = place
+            listed = listed + merge(1, 0, breaks)
+            next = min(next, merge(huge(1.0_wp), coordinate, breaks))
+         end do
+      end do
+   end subroutine list_breaking
 
    !> Whether it is known what breaks until the slider is at a displacement at a time.
    pure function has_tried(self, displacement, time)
@@ -494,28 +550,35 @@ contains
       !> Elastic energy lost by breaking [J]
       type(accumulator_type), intent(inout) :: break_loss
 
-      real(wp) :: loss(moments_length)
+      type(accumulator_type) :: stiffness, offset, energy
+      real(wp) :: loss(moments_length), ahead, behind
       integer :: trial, place
 
+      ! In variables of their own, which stay in registers: each break waits for the one before.
+      stiffness = self%stiffness
+      offset = self%offset
+      energy = break_loss
+      ahead = self%ahead
+      behind = self%behind
       if (self%trial%sense > 0.0_wp) then
-         self%ahead = self%trial%next
+         ahead = self%trial%next
       else
-         self%behind = self%trial%next
+         behind = self%trial%next
       end if
       associate (population => self%population, parameters => self%parameters)
          ! The last population takes the place of one that is removed: it has had its turn.
          do trial = self%trial%count, 1, -1
             place = self%trial%population(trial)
-            loss = population(place, row_moments + 1:) - self%trial%moments(:, trial)
-            call self%stiffness%add(-parameters%stiffness * loss(stiff))
-            call self%offset%add(parameters%static_force * loss(number) &
+            loss = self%left(:, place) - self%trial%moments(:, trial)
+            call stiffness%add(-parameters%stiffness * loss(stiff))
+            call offset%add(parameters%static_force * loss(number) &
                & * population(place, row_force) &
                & - parameters%stiffness * loss(stiff) * population(place, row_origin))
-            call break_loss%add(0.5_wp * parameters%static_force * self%stretch &
+            call energy%add(0.5_wp * parameters%static_force * self%stretch &
                & * self%trial%lost(trial))
-            population(place, row_moments + 1:) = self%trial%moments(:, trial)
+            self%left(:, place) = self%trial%moments(:, trial)
             population(place, row_broken) = self%trial%broken(trial)
-            if (population(place, row_moments + number) > 0.0_wp) then
+            if (self%left(number, place) > 0.0_wp) then
                if (self%trial%sense > 0.0_wp) then
                   population(place, row_ahead) = self%trial%end
                   population(place, row_behind) = self%next_break(place, -1.0_wp, self%trial%time)
@@ -523,14 +586,20 @@ contains
                   population(place, row_behind) = self%trial%end
                   population(place, row_ahead) = self%next_break(place, 1.0_wp, self%trial%time)
                end if
-               self%ahead = min(self%ahead, population(place, row_ahead))
-               self%behind = max(self%behind, population(place, row_behind))
+               ahead = min(ahead, population(place, row_ahead))
+               behind = max(behind, population(place, row_behind))
             else
                population(place, :) = population(self%count, :)
+               self%left(:, place) = self%left(:, self%count)
                self%count = self%count - 1
             end if
          end do
       end associate
+      self%stiffness = stiffness
+      self%offset = offset
+      break_loss = energy
+      self%ahead = ahead
+      self%behind = behind
       if (self%count == 0) then
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
@@ -559,7 +628,7 @@ contains
       !> Their number, in the mean of what it may be
       real(wp) :: total
 
-      total = sum(self%population(:self%count, row_moments + number))
+      total = sum(self%left(number, :self%count))
    end function number_of_contacts
 
    !> Elastic energy of the contacts.
@@ -577,10 +646,10 @@ contains
 
       do place = 1, self%count
          associate (force => self%population(place, row_force), &
-            & moments => self%population(place, row_moments + 1:))
+            & left => self%left(:, place))
             distance = (displacement - self%population(place, row_origin)) / self%stretch
-            call total%add(moments(stiff) * distance**2 + 2.0_wp * moments(number) * force &
-               & * distance + moments(compliant) * force**2)
+            call total%add(left(stiff) * distance**2 + 2.0_wp * left(number) * force &
+               & * distance + left(compliant) * force**2)
          end associate
       end do
       energy = 0.5_wp * self%parameters%static_force * self%stretch * total%total()
@@ -595,6 +664,7 @@ contains
 
       call archive%section("pinned populations")
       call archive%exchange("population", self%population)
+      call archive%exchange("left", self%left)
       call archive%exchange("count", self%count)
       call archive%exchange("ahead", self%ahead)
       call archive%exchange("behind", self%behind)

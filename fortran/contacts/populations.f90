@@ -62,7 +62,7 @@ module mesoslip_contacts_populations
       procedure :: rebuild
       !> Number of contacts that are pinned
       procedure :: pinned_count
-      procedure, private :: try, attach_due
+      procedure, non_overridable, private :: try, attach_due
    end type contact_populations_type
 
 contains

@@ -53,15 +53,16 @@ module mesoslip_contacts_queue
       integer :: free_chunk = 0
    contains
       !> Forget all contacts
-      procedure :: clear
+      procedure, non_overridable :: clear
       !> Put a contact in
-      procedure :: insert
+      procedure, non_overridable :: insert
       !> Take the first contact out
-      procedure :: pop
+      procedure, non_overridable :: pop
       !> The first contacts, and taking some of them out
-      procedure :: preview
-      procedure :: remove_previewed
-      procedure, private :: advance_front, take_overflow, bucket_of, append, find_first
+      procedure, non_overridable :: preview
+      procedure, non_overridable :: remove_previewed
+      procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
+         & find_first
    end type contact_queue_type
 
 contains

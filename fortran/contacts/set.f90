@@ -9,7 +9,7 @@ module mesoslip_contacts_set
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
    use mesoslip_contacts_avalanche_track, only: avalanche_track_type, new_avalanche_track, &
       & row_generation
-   use mesoslip_numerics_random, only: first_uniforms, uniform_pair
+   use mesoslip_numerics_random, only: uniform_pairs
    use mesoslip_interface_law, only: interface_law_type
    use mesoslip_schedule, only: most_events, schedule_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts, &
@@ -50,9 +50,10 @@ module mesoslip_contacts_set
       type(avalanche_track_type) :: track
       !> Number of contacts that are detached, and their first place in the ring
       integer :: waiting = 0, first_detached = 0
-      !> Contacts whose next thresholds are still to be drawn, and their renewals then
-      integer, private :: undrawn_count = 0, undrawn(draws_together) = 0
-      integer(i8), private :: undrawn_renewal(draws_together) = 0_i8
+      !> Contacts whose next thresholds are still to be drawn: their keys in draws, which count
+      !> contacts from 0, and their renewals then
+      integer, private :: undrawn_count = 0
+      integer(i8), private :: undrawn(draws_together) = 0_i8, undrawn_renewal(draws_together) = 0_i8
    contains
       procedure :: law => law_set
       procedure :: elastic_energy
@@ -120,36 +121,48 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
-      integer :: contact
-      real(wp) :: uniform(2), threshold, stiffness, limit, back, stretch
+      integer :: drawn, number, place, contact
+      integer(i8) :: name(draws_together), renewal(draws_together)
+      real(wp) :: first(draws_together), second(draws_together), threshold(draws_together)
+      real(wp) :: stiffness, limit, back, stretch
       type(carried_law_type) :: carried
 
       if (state == initial_steady) call new_carried_law(carried, self%parameters%law, &
          & self%parameters%coupling, self%parameters%back_force_ratio)
-      do contact = 1, self%parameters%count
-         call uniform_pair(self%parameters%seed, self%parameters%realization, &
-            & int(contact - 1, i8), 0_i8, 0_i8, uniform)
+      renewal = 0_i8
+      do drawn = 0, self%parameters%count - 1, draws_together
+         number = min(draws_together, self%parameters%count - drawn)
+         do place = 1, number
+            name(place) = int(drawn + place - 1, i8)
+         end do
+         call uniform_pairs(self%parameters%seed, self%parameters%realization, name(:number), &
+            & renewal(:number), first(:number), second(:number))
          if (state == initial_steady) then
-            threshold = carried%quantile(uniform(1))
+            do place = 1, number
+               threshold(place) = carried%quantile(first(place))
+            end do
          else
-            threshold = self%parameters%law%quantile(uniform(1))
+            call self%parameters%law%quantiles(first(:number), threshold(:number))
          end if
 
-         call born(self%parameters, threshold, stiffness, limit)
-         select case (state)
-         case (initial_steady)
-            back = self%parameters%back_force_ratio * self%parameters%static_force / stiffness
-            stretch = back + uniform(2) * (limit - back)
-         case (initial_uniform)
-            stretch = uniform(2) * limit
-         case default
-            stretch = 0.0_wp
-         end select
-         self%record(row_origin, contact) = -stretch
-         self%record(row_stiffness, contact) = stiffness
-         self%record(row_limit, contact) = limit
-         self%record(row_renewal, contact) = 0.0_wp
-         call self%draw_next(contact, 1.0_wp)
+         do place = 1, number
+            contact = drawn + place
+            call born(self%parameters, threshold(place), stiffness, limit)
+            select case (state)
+            case (initial_steady)
+               back = self%parameters%back_force_ratio * self%parameters%static_force / stiffness
+               stretch = back + second(place) * (limit - back)
+            case (initial_uniform)
+               stretch = second(place) * limit
+            case default
+               stretch = 0.0_wp
+            end select
+            self%record(row_origin, contact) = -stretch
+            self%record(row_stiffness, contact) = stiffness
+            self%record(row_limit, contact) = limit
+            self%record(row_renewal, contact) = 0.0_wp
+            call self%draw_next(contact, 1.0_wp)
+         end do
       end do
       call self%bear()
    end subroutine draw
@@ -262,7 +275,7 @@ contains
       ! No threshold is zero: this one is still to be drawn.
       self%record(row_next, contact) = 0.0_wp
       self%undrawn_count = self%undrawn_count + 1
-      self%undrawn(self%undrawn_count) = contact
+      self%undrawn(self%undrawn_count) = int(contact - 1, i8)
       self%undrawn_renewal(self%undrawn_count) = int(renewal, i8)
       if (self%undrawn_count == draws_together) call self%draw_undrawn()
    end subroutine draw_next
@@ -272,14 +285,14 @@ contains
       class(contact_set_type), intent(inout) :: self
 
       integer :: place
-      real(wp) :: uniform(draws_together), threshold(draws_together)
+      real(wp) :: first(draws_together), second(draws_together), threshold(draws_together)
 
       associate (count => self%undrawn_count)
-         call first_uniforms(self%parameters%seed, self%parameters%realization, &
-            & int(self%undrawn(:count) - 1, i8), self%undrawn_renewal(:count), uniform(:count))
-         call self%parameters%law%quantiles(uniform(:count), threshold(:count))
+         call uniform_pairs(self%parameters%seed, self%parameters%realization, &
+            & self%undrawn(:count), self%undrawn_renewal(:count), first(:count), second(:count))
+         call self%parameters%law%quantiles(first(:count), threshold(:count))
          do place = 1, count
-            self%record(row_next, self%undrawn(place)) = threshold(place)
+            self%record(row_next, self%undrawn(place) + 1_i8) = threshold(place)
          end do
          count = 0
       end associate

@@ -47,14 +47,14 @@ module mesoslip_contacts_threshold_law
       real(wp) :: shape = 1.0_wp
    contains
       !> Threshold that is exceeded with a given probability
-      procedure :: quantile
+      procedure, non_overridable :: quantile
       !> The same for several probabilities, to the same bits and in less time
       procedure, non_overridable :: quantiles
       !> Probability density
-      procedure :: density
+      procedure, non_overridable :: density
       !> Probability to exceed a threshold
-      procedure :: survival
-      procedure, private :: plain_survival
+      procedure, non_overridable :: survival
+      procedure, non_overridable, private :: plain_survival
    end type threshold_law_type
 
 contains
@@ -140,7 +140,8 @@ contains
 
    !> Thresholds that are exceeded with given probabilities.
    !>
-   !> Nearly all normal deviates are from the middle of the law, where no choice is to be made.
+   !> Nearly all normal deviates are from the middle of the law, where no choice is to be made: they
+   !> are found side by side, and those of the tails, which are listed, one by one.
    pure subroutine quantiles(self, probability, threshold)
       !> The law
       class(threshold_law_type), intent(in) :: self
@@ -149,7 +150,7 @@ contains
       !> Relative thresholds, shape that of probability
       real(wp), intent(out), contiguous :: threshold(:)
 
-      integer :: place
+      integer :: place, tail, tails, in_tail(size(probability) + 1)
       real(wp) :: centred
 
       if (self%kind /= law_gaussian) then
@@ -161,9 +162,15 @@ contains
          threshold(place) = max(1.0_wp - self%scale * middle_normal(centred), &
             & self%minimum + epsilon(1.0_wp) * max(self%minimum, 1.0_wp))
       end do
+      ! Listed without a branch, of which one in seven would be guessed wrong.
+      tails = 0
       do place = 1, size(probability)
+         in_tail(tails + 1) = place
          centred = self%acceptance * probability(place) - 0.5_wp
-         if (abs(centred) > middle) threshold(place) = self%quantile(probability(place))
+         tails = tails + merge(1, 0, abs(centred) > middle)
+      end do
+      do tail = 1, tails
+         threshold(in_tail(tail)) = self%quantile(probability(in_tail(tail)))
       end do
    end subroutine quantiles
 

@@ -18,9 +18,9 @@ module mesoslip_numerics_accumulator
       real(wp) :: low = 0.0_wp
    contains
       !> Add one term
-      procedure :: add
+      procedure, non_overridable :: add
       !> The total
-      procedure :: total
+      procedure, non_overridable :: total
    end type accumulator_type
 
 contains

@@ -31,17 +31,17 @@ module mesoslip_numerics_archive
       integer(i8), private :: place = 0
    contains
       !> Begin the entries of an object
-      procedure :: section
+      procedure, non_overridable :: section
       !> Put one value into the archive, or take it out
       generic :: exchange => exchange_real, exchange_integer, exchange_long, exchange_logical, &
          & exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube, &
          & exchange_integers, exchange_integer_matrix
       !> Make sure that all has been taken out
-      procedure :: finish
-      procedure, private :: exchange_real, exchange_integer, exchange_long, exchange_logical
-      procedure, private :: exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube
-      procedure, private :: exchange_integers, exchange_integer_matrix
-      procedure, private :: heading, exchange_words, reserve
+      procedure, non_overridable :: finish
+      procedure, non_overridable, private :: exchange_real, exchange_integer, exchange_long, &
+         & exchange_logical, exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube
+      procedure, non_overridable, private :: exchange_integers, exchange_integer_matrix
+      procedure, non_overridable, private :: heading, exchange_words, reserve
    end type archive_type
 
 contains

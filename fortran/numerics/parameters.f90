@@ -24,8 +24,8 @@ module mesoslip_numerics_parameters
       !> Take the number of a name
       generic :: take => take_real, take_integer, take_logical
       !> Make sure that each number was taken
-      procedure :: finish
-      procedure, private :: take_real, take_integer, take_logical
+      procedure, non_overridable :: finish
+      procedure, non_overridable, private :: take_real, take_integer, take_logical
    end type parameters_type
 
 contains

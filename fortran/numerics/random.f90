@@ -8,7 +8,7 @@ module mesoslip_numerics_random
    implicit none
    private
 
-   public :: first_uniforms, philox4x32, uniform_pair
+   public :: philox4x32, uniform_pair, uniform_pairs
 
    integer(i8), parameter :: mask = int(z'FFFFFFFF', i8)
    integer(i8), parameter :: multiplier_0 = int(z'D2511F53', i8)
@@ -16,6 +16,10 @@ module mesoslip_numerics_random
    integer(i8), parameter :: weyl_0 = int(z'9E3779B9', i8)
    integer(i8), parameter :: weyl_1 = int(z'BB67AE85', i8)
    integer, parameter :: rounds = 10
+
+   !> Contacts whose words are mixed side by side: one round waits for the one before, but not for
+   !> those of another contact. The words of two fill the registers.
+   integer, parameter :: abreast = 2
 
 contains
 
@@ -28,26 +32,14 @@ contains
       !> Four random 32-bit words, each in the low half of an element
       integer(i8), intent(out) :: word(0:3)
 
-      integer(i8) :: c0, c1, c2, c3, k0, k1, low_0, high_0, low_1, high_1
+      integer(i8) :: round_key(0:1, rounds)
       integer :: round
 
-      c0 = counter(0)
-      c1 = counter(1)
-      c2 = counter(2)
-      c3 = counter(3)
-      k0 = key(0)
-      k1 = key(1)
+      round_key = round_keys(key)
+      word = counter
       do round = 1, rounds
-         call multiply(multiplier_0, c0, high_0, low_0)
-         call multiply(multiplier_1, c2, high_1, low_1)
-         c0 = ieor(ieor(high_1, c1), k0)
-         c2 = ieor(ieor(high_0, c3), k1)
-         c1 = low_1
-         c3 = low_0
-         k0 = iand(k0 + weyl_0, mask)
-         k1 = iand(k1 + weyl_1, mask)
+         call mix(word(0), word(1), word(2), word(3), round_key(0, round), round_key(1, round))
       end do
-      word = [c0, c1, c2, c3]
    end subroutine philox4x32
 
    !> Two independent deviates, uniform on the open interval (0, 1), for one birth of one contact.
@@ -74,36 +66,79 @@ contains
       uniform(2) = unit_real(word(2), word(3))
    end subroutine uniform_pair
 
-   !> The first deviates of the pairs of several contacts.
-   pure subroutine first_uniforms(seed, realization, contact, renewal, uniform)
+   !> The pairs of several contacts at their first attempts, to the same bits and in less time.
+   pure subroutine uniform_pairs(seed, realization, contact, renewal, first, second)
       !> Seed of the run, and number of the realization
       integer(i8), intent(in) :: seed, realization
       !> Numbers of the contacts, and how often each has been born before
       integer(i8), intent(in), contiguous :: contact(:), renewal(:)
-      !> The deviates, shape that of contact
-      real(wp), intent(out), contiguous :: uniform(:)
+      !> The two deviates of each, shape that of contact
+      real(wp), intent(out), contiguous :: first(:), second(:)
 
-      integer :: place
-      real(wp) :: pair(2)
+      integer(i8), dimension(abreast) :: word_0, word_1, word_2, word_3
+      integer(i8) :: round_key(0:1, rounds)
+      integer :: place(abreast), start, lane, round
 
-      do place = 1, size(contact)
-         call uniform_pair(seed, realization, contact(place), renewal(place), 0_i8, pair)
-         uniform(place) = pair(1)
+      round_key = round_keys([iand(seed, mask), ishft(seed, -32)])
+      do start = 0, size(contact) - 1, abreast
+         do lane = 1, abreast
+            ! The last contact may come twice.
+            place(lane) = min(start + lane, size(contact))
+            word_0(lane) = contact(place(lane))
+            word_1(lane) = iand(renewal(place(lane)), mask)
+            word_2(lane) = ishft(renewal(place(lane)), -32)
+            word_3(lane) = realization
+         end do
+         do round = 1, rounds
+            call mix(word_0, word_1, word_2, word_3, round_key(0, round), round_key(1, round))
+         end do
+         do lane = 1, abreast
+            first(place(lane)) = unit_real(word_0(lane), word_1(lane))
+            second(place(lane)) = unit_real(word_2(lane), word_3(lane))
+         end do
       end do
-   end subroutine first_uniforms
+   end subroutine uniform_pairs
+
+   !> The keys of all rounds.
+   pure function round_keys(key) result(round_key)
+      integer(i8), intent(in) :: key(0:1)
+      integer(i8) :: round_key(0:1, rounds)
+
+      integer :: round
+
+      round_key(:, 1) = key
+      do round = 2, rounds
+         round_key(:, round) = iand(round_key(:, round - 1) + [weyl_0, weyl_1], mask)
+      end do
+   end function round_keys
+
+   !> A round of Philox: two products, halves of which are mixed with the other words and the key.
+   elemental subroutine mix(word_0, word_1, word_2, word_3, key_0, key_1)
+      integer(i8), intent(inout) :: word_0, word_1, word_2, word_3
+      integer(i8), intent(in) :: key_0, key_1
+
+      integer(i8) :: high_0, high_1, low_0, low_1
+
+      call multiply(multiplier_0, word_0, high_0, low_0)
+      call multiply(multiplier_1, word_2, high_1, low_1)
+      word_0 = ieor(ieor(high_1, word_1), key_0)
+      word_2 = ieor(ieor(high_0, word_3), key_1)
+      word_1 = low_1
+      word_3 = low_0
+   end subroutine mix
 
    !> The 64-bit product of two 32-bit words, in halves.
    elemental subroutine multiply(odd, word, high, low)
+      !> The words, the first one greater than 2**31
       integer(i8), intent(in) :: odd, word
       integer(i8), intent(out) :: high, low
 
-      ! As wide as it takes for the product not to overflow; it is one instruction all the same.
-      integer, parameter :: wide = selected_int_kind(30)
-      integer(wide) :: product
+      integer(i8) :: product
 
-      product = int(odd, wide) * int(word, wide)
-      low = int(iand(product, int(mask, wide)), i8)
-      high = int(shiftr(product, 32), i8)
+      ! Less 2**32, and the product cannot overflow; its low half stays, its high one lacks a word.
+      product = (odd - 2_i8**32) * word
+      low = iand(product, mask)
+      high = shifta(product, 32) + word
    end subroutine multiply
 
    !> 52 of 64 random bits as a real in the open interval (0, 1).

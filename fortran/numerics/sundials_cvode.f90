@@ -43,26 +43,26 @@ module mesoslip_numerics_sundials_cvode
       integer(c_long), private :: counts_before(3) = 0_c_long
    contains
       !> Set up an integration
-      procedure :: open
+      procedure, non_overridable :: open
       !> Whether it is set up
-      procedure :: is_open
+      procedure, non_overridable :: is_open
       !> Give the Jacobian as a function, for method_bdf
-      procedure :: set_jacobian
+      procedure, non_overridable :: set_jacobian
       !> Start anew from the state in the caller's array
-      procedure :: restart
+      procedure, non_overridable :: restart
       !> Make one step, not beyond a time
-      procedure :: step
+      procedure, non_overridable :: step
       !> Derivative of the interpolating polynomial of the last step
-      procedure :: derivative
+      procedure, non_overridable :: derivative
       !> Steps, evaluations of the rates and failed steps so far
-      procedure :: counts
+      procedure, non_overridable :: counts
       !> Have the integration stop where functions are zero
-      procedure :: find_roots
+      procedure, non_overridable :: find_roots
       !> Integrate up to a time, or to a root before it
-      procedure :: integrate
+      procedure, non_overridable :: integrate
       !> Free everything
-      procedure :: close
-      procedure, private :: expect
+      procedure, non_overridable :: close
+      procedure, non_overridable, private :: expect
    end type cvode_type
 
    interface

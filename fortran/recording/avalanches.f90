@@ -59,21 +59,21 @@ module mesoslip_recording_avalanches
       real(wp), private :: time = 0.0_wp, displacement = 0.0_wp, force = 0.0_wp
    contains
       !> Make room for what will be recorded
-      procedure :: open
+      procedure, non_overridable :: open
       !> Whether so much waits that it should be taken away
-      procedure :: is_full
+      procedure, non_overridable :: is_full
       !> Look at an advance of the slider, before the contacts respond
-      procedure :: see_advance
+      procedure, non_overridable :: see_advance
       !> Look at the response of the contacts
-      procedure :: see_response
+      procedure, non_overridable :: see_response
       !> Whether it has to see each advance, and what to make of those that it did not
-      procedure :: sees_each
-      procedure :: pass_over
+      procedure, non_overridable :: sees_each
+      procedure, non_overridable :: pass_over
       !> Close the present avalanche
-      procedure :: close
+      procedure, non_overridable :: close
       !> Put the state into an archive or take it out
-      procedure :: exchange
-      procedure, private :: begin, take_snapshot
+      procedure, non_overridable :: exchange
+      procedure, non_overridable, private :: begin, take_snapshot
    end type avalanche_recorder_type
 
 contains

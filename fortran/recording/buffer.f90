@@ -15,15 +15,15 @@ module mesoslip_recording_buffer
       integer :: count = 0
    contains
       !> Set up an empty table
-      procedure :: open
+      procedure, non_overridable :: open
       !> Make room for one more row
-      procedure :: reserve
+      procedure, non_overridable :: reserve
       !> Add a row
-      procedure :: add
+      procedure, non_overridable :: add
       !> Take the first rows away
-      procedure :: drain
+      procedure, non_overridable :: drain
       !> Put what waits into an archive or take it out
-      procedure :: exchange
+      procedure, non_overridable :: exchange
    end type buffer_type
 
 contains

@@ -122,29 +122,29 @@ module mesoslip_recording_recorder
       type(buffer_type), private :: minima
    contains
       !> Make room for what will be recorded
-      procedure :: open
+      procedure, non_overridable :: open
       !> Whether so much waits that it should be taken away
-      procedure :: is_full
+      procedure, non_overridable :: is_full
       !> Slips that are over
-      procedure :: slips_so_far
+      procedure, non_overridable :: slips_so_far
       !> Samples of slip traces that can be taken away
-      procedure :: final_slip_samples
+      procedure, non_overridable :: final_slip_samples
       !> Take samples of slip traces away
-      procedure :: drain_slip_trace
+      procedure, non_overridable :: drain_slip_trace
       !> Record the last advance of a slider
-      procedure :: record
+      procedure, non_overridable :: record
       !> What to look at in a motion that is recorded here and there only, and what to make of the
       !> rest
-      procedure :: watch
-      procedure :: pass_over
+      procedure, non_overridable :: watch
+      procedure, non_overridable :: pass_over
       !> Close a slip at the end of the run
-      procedure :: finish
+      procedure, non_overridable :: finish
       !> Put the state into an archive or take it out
-      procedure :: exchange
-      procedure, private :: change_stage, pass_maximum, see_minimum
-      procedure, private :: begin_fall, drop_fall, follow, close_slip, stop_trace
-      procedure, private :: add_minimum, height
-      procedure, private :: take_samples, take_slip_samples
+      procedure, non_overridable :: exchange
+      procedure, non_overridable, private :: change_stage, pass_maximum, see_minimum
+      procedure, non_overridable, private :: begin_fall, drop_fall, follow, close_slip, stop_trace
+      procedure, non_overridable, private :: add_minimum, height
+      procedure, non_overridable, private :: take_samples, take_slip_samples
    end type recorder_type
 
 contains

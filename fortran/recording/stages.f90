@@ -38,20 +38,20 @@ module mesoslip_recording_stages
       logical, private :: is_faster = .false.
    contains
       !> Make room
-      procedure :: open
+      procedure, non_overridable :: open
       !> Whether so much waits that it should be taken away
-      procedure :: is_full
+      procedure, non_overridable :: is_full
       !> A stage begins, and is over
-      procedure :: begin
-      procedure :: finish
+      procedure, non_overridable :: begin
+      procedure, non_overridable :: finish
       !> The drive takes another velocity within a stage
-      procedure :: mark
+      procedure, non_overridable :: mark
       !> What is of interest in a motion that is recorded here and there only
-      procedure :: narrow
+      procedure, non_overridable :: narrow
       !> Record the last advance of a slider
-      procedure :: record
+      procedure, non_overridable :: record
       !> Put the state into an archive or take it out
-      procedure :: exchange
+      procedure, non_overridable :: exchange
    end type stage_recorder_type
 
 contains

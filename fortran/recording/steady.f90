@@ -33,13 +33,13 @@ module mesoslip_recording_steady
       real(wp), allocatable, private :: mean(:)
    contains
       !> Say what to look for
-      procedure :: open
+      procedure, non_overridable :: open
       !> Begin with the first block
-      procedure :: begin
+      procedure, non_overridable :: begin
       !> A block is over
-      procedure :: see_block
+      procedure, non_overridable :: see_block
       !> Put the state into an archive or take it out
-      procedure :: exchange
+      procedure, non_overridable :: exchange
    end type steady_recorder_type
 
 contains

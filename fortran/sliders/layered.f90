@@ -114,7 +114,8 @@ module mesoslip_sliders_layered
       procedure :: energy
       procedure :: shift_origin
       procedure :: exchange
-      procedure, private :: expand, step_cvode, restart, take_back, add_work, see_drive
+      procedure, non_overridable, private :: expand, step_cvode, restart, take_back, add_work, &
+         & see_drive
       final :: close
    end type slider_layered_type
 

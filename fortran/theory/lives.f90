@@ -55,13 +55,13 @@ module mesoslip_theory_lives
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
    contains
       !> Breaks of newborns over displacement
-      procedure :: newborn_rates
+      procedure, non_overridable :: newborn_rates
       !> What is left of newborns
-      procedure :: newborn_state
+      procedure, non_overridable :: newborn_state
       !> Breaks of the first generation over displacement
-      procedure :: first_rates
+      procedure, non_overridable :: first_rates
       !> What is left of the first generation
-      procedure :: first_state
+      procedure, non_overridable :: first_state
    end type contact_lives_type
 
    abstract interface

@@ -5,7 +5,7 @@ program test_lattice
    use mesoslip_contacts_lattice, only: contact_lattice_type, interaction_type, &
       & new_contact_lattice
    use mesoslip_contacts_mechanics, only: coupling_equal, initial_uniform
-   use mesoslip_contacts_record, only: row_stiffness
+   use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_contacts_base, only: contact_parameters_type, extent_length
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: pose_type
@@ -169,14 +169,16 @@ contains
       type(contact_lattice_type) :: contacts
       real(wp) :: displacement
       integer :: step, extent(extent_length)
-      logical :: is_whole, bears
+      real(wp), parameter :: bond = 5.0_wp, shift = 0.3_wp
+      logical :: is_whole, bears, adds_up
 
-      call build(contacts, columns, rows, 5.0_wp, 1.0e-3_wp)
+      call build(contacts, columns, rows, bond, 1.0e-3_wp)
       call contacts%initialize(initial_uniform)
       call check(contacts%detached_count > 0.0_wp .and. contacts%breaks <= 0.0_wp, &
          & "what neighbours push over at the start is detached, and no break")
       is_whole = .true.
       bears = .true.
+      adds_up = .true.
       do step = 1, 400
          displacement = 1.5_wp * sin(0.1_wp * step)
          call contacts%respond(pose_type(), pose_type(time=1.0e-4_wp * step, &
@@ -184,11 +186,45 @@ contains
          is_whole = is_whole .and. nint(contacts%detached_count) &
             & == count(.not. contacts%record(row_stiffness, :) > 0.0_wp)
          bears = bears .and. bearing(contacts, displacement)
+         adds_up = adds_up .and. is_sum_of_bonds(contacts, displacement, columns, rows, bond)
+         if (step == 200) then
+            call contacts%shift_origin(shift, displacement - shift)
+            adds_up = adds_up &
+               & .and. is_sum_of_bonds(contacts, displacement - shift, columns, rows, bond)
+            call contacts%shift_origin(-shift, displacement)
+         end if
          call contacts%take_extent(extent)
       end do
       call check(is_whole .and. contacts%breaks > 10 * number, "contacts are conserved")
       call check(bears, "between events no contact is at its threshold")
+      call check(adds_up, "forces are those of the bonds to the neighbours as they are")
    end subroutine balances
+
+   !> Whether the force of each contact is k x + G times the sum of x less that of a neighbour.
+   function is_sum_of_bonds(contacts, displacement, columns, rows, bond)
+      type(contact_lattice_type), intent(in) :: contacts
+      real(wp), intent(in) :: displacement, bond
+      integer, intent(in) :: columns, rows
+      logical :: is_sum_of_bonds
+
+      real(wp) :: values(3, contacts%parameters%count), stretch(contacts%parameters%count), force
+      integer :: neighbour(4, contacts%parameters%count), place
+
+      call find_neighbours(lattice_square, columns, rows, neighbour)
+      call contacts%snapshot(displacement, values)
+      associate (record => contacts%record)
+         stretch = merge(displacement - record(row_origin, :), 0.0_wp, &
+            & record(row_stiffness, :) > 0.0_wp)
+         is_sum_of_bonds = .true.
+         do place = 1, size(stretch)
+            if (.not. record(row_stiffness, place) > 0.0_wp) cycle
+            force = record(row_stiffness, place) * stretch(place) &
+               & + bond * sum(stretch(place) - stretch(neighbour(:, place)))
+            force = force / (record(row_stiffness, place) * record(row_limit, place))
+            is_sum_of_bonds = is_sum_of_bonds .and. abs(force - values(2, place)) < 1.0e-12_wp
+         end do
+      end associate
+   end function is_sum_of_bonds
 
    !> Whether no contact is at its threshold or beyond.
    function bearing(contacts, displacement)

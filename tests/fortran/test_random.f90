@@ -1,13 +1,13 @@
 !> Philox 4x32-10 against the known answers published with Random123, and the keying of draws.
 program test_random
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_random, only: first_uniforms, philox4x32, uniform_pair
+   use mesoslip_numerics_random, only: philox4x32, uniform_pair, uniform_pairs
    use testing, only: check, check_close, finish
    implicit none
 
    integer(i8), parameter :: ones = int(z'FFFFFFFF', i8)
    integer, parameter :: draws = 100000
-   real(wp) :: pair(2), other(2), several(2), total, squares
+   real(wp) :: pair(2), other(2), total, squares
    integer :: draw
 
    call known_answer([0_i8, 0_i8, 0_i8, 0_i8], [0_i8, 0_i8], &
@@ -30,10 +30,7 @@ program test_random
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 1_i8, other)
    call check(all(abs(pair - other) > 0.0_wp), "attempts are told apart")
 
-   call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 0_i8, pair)
-   call uniform_pair(7_i8, 2_i8, 9_i8, 4_i8 + 2_i8**33, 0_i8, other)
-   call first_uniforms(7_i8, 2_i8, [5_i8, 9_i8], [3_i8, 4_i8 + 2_i8**33], several)
-   call check(all(abs(several - [pair(1), other(1)]) <= 0.0_wp), "draws of several contacts")
+   call several_are_as_single_ones()
 
    total = 0.0_wp
    squares = 0.0_wp
@@ -58,5 +55,36 @@ contains
       call philox4x32(counter, key, word)
       call check(all(word == expected), "known answer: " // name)
    end subroutine known_answer
+
+   !> Pairs of many contacts are those that each has alone, however many they are.
+   subroutine several_are_as_single_ones()
+      integer, parameter :: most = 70
+      integer(i8), parameter :: seed = 7_i8 + 2_i8**40, realization = 2_i8**32 - 1_i8
+      integer(i8) :: contact(most), renewal(most)
+      real(wp) :: first(most), second(most), pair(2)
+      integer :: length, place
+      logical :: agree
+
+      do place = 1, most
+         contact(place) = iand(int(place, i8)**6, ones)
+         renewal(place) = int(place, i8) * (2_i8**40 + 12345_i8)
+      end do
+      agree = .true.
+      do length = 1, most
+         first = -1.0_wp
+         second = -1.0_wp
+         call uniform_pairs(seed, realization, contact(:length), renewal(:length), &
+            & first(:length), second(:length))
+         do place = 1, length
+            call uniform_pair(seed, realization, contact(place), renewal(place), 0_i8, pair)
+            agree = agree .and. all(abs(pair - [first(place), second(place)]) <= 0.0_wp)
+         end do
+         agree = agree .and. all(first(length + 1:) < 0.0_wp) &
+            & .and. all(second(length + 1:) < 0.0_wp)
+      end do
+      call check(agree, "pairs of 1 to 70 contacts are those of each alone")
+      call uniform_pairs(seed, realization, contact(:0), renewal(:0), first(:0), second(:0))
+      call check(all(first(2:) > 0.0_wp), "no contact, no draw")
+   end subroutine several_are_as_single_ones
 
 end program test_random

@@ -54,7 +54,9 @@ contains
    subroutine several()
       integer, parameter :: number = 1001
       real(wp) :: probability(number), threshold(number)
-      integer :: place, kind
+      real(wp), allocatable :: asked(:)
+      integer :: place, kind, length
+      logical :: agree
 
       probability = [(real(place, wp) / (number + 1), place=1, number)]**3
       do kind = 1, size(laws)
@@ -62,6 +64,16 @@ contains
          call law%quantiles(probability, threshold)
          call check(all(abs(threshold - law%quantile(probability)) <= 0.0_wp), &
             & "quantiles of several probabilities: " // names(kind))
+         ! From the tail at small probabilities through the middle to the other tail.
+         agree = .true.
+         do length = 1, 70
+            threshold = -1.0_wp
+            asked = probability([(14 * place, place=1, length)])
+            call law%quantiles(asked, threshold(:length))
+            agree = agree .and. all(abs(threshold(:length) - law%quantile(asked)) <= 0.0_wp)
+            agree = agree .and. all(threshold(length + 1:) < 0.0_wp)
+         end do
+         call check(agree, "quantiles of 1 to 70 probabilities: " // names(kind))
       end do
    end subroutine several
 

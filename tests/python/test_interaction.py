@@ -212,8 +212,9 @@ def test_a_shifted_lattice_gives_a_shifted_result(klein, kind, shift, slider):
     here.advance(1)
     start.advance(1)
     state = saved(start)
-    record = reals(state, "record")
-    record[:] = moved(record.T, *shift).T
+    for name in ("record", "surroundings"):
+        values = reals(state, name)
+        values[:] = moved(values.T, *shift).T
     there = taken_up(config, state, start)
     for one in (here, there):
         while not one.finished:

@@ -41,6 +41,8 @@ class Control:
         Where a range of decades is about if the value at the start is zero, in SI.
     choices
         What it may be, if it is no number.
+    told
+        What choices are called on the page, if not as in a file.
     beside
         Keys that a choice needs, and what they are if they are not given.
     """
@@ -52,6 +54,7 @@ class Control:
     range: tuple[float, float] = (0.0, math.inf)
     usual: float = 1.0
     choices: tuple[str, ...] = ()
+    told: Mapping[str, str] = field(default_factory=dict)
     beside: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     @property
@@ -134,7 +137,13 @@ CONTROLS = (
     Control("drive.velocity", "drive velocity", "Drive and run", 3),
     Control("run.duration", "duration", "Drive and run", 1),
     Control("run.seed", "seed", "Drive and run", range=(1, 100)),
-    Control("run.engine", "contacts are", "Drive and run", choices=("eq", "me")),
+    Control(
+        "run.engine",
+        "contacts are",
+        "Drive and run",
+        choices=("eq", "me"),
+        told={"eq": "N, one by one", "me": "N → ∞, the master equation"},
+    ),
     Control(
         "slider.kind",
         "kind",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import webbrowser
 from collections.abc import Awaitable, Callable
+from importlib.resources import files
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -36,9 +37,7 @@ POLICY = (
     "frame-ancestors 'none'; form-action 'none'; base-uri 'none'"
 )
 TEMPLATE = Environment(autoescape=False).from_string(
-    """{% extends base %}
-{% block preamble %}<style>body { font-family: sans-serif; margin: 8px }</style>{% endblock %}
-"""
+    files("mesoslip.explorer").joinpath("page.html").read_text("utf-8")
 )
 
 

@@ -46,9 +46,13 @@ class ControlView:
         self._field: Select | TextInput
         self._slider: Slider | None = None
         if self._scale is None:
-            options: list[Any] = [one for one in control.choices if one != NONE or self._may_lack]
+            options: list[Any] = [
+                (one, control.told.get(one, one))
+                for one in control.choices
+                if one != NONE or self._may_lack
+            ]
             self._field = Select(
-                options=[(one, control.told.get(one, one)) for one in options],
+                options=options,
                 name=control.key,
                 width=WIDTH,
                 margin=0,

@@ -39,17 +39,15 @@ REST = 0.15
 REFUSED = -1
 
 # The browser saves what the server has put into a source, under the name that it has been given.
-SAVE = CustomJS(
-    code="""
-    const content = cb_obj.data.content
-    if (content.length == 0) return
-    const link = document.createElement("a")
-    link.href = URL.createObjectURL(new Blob([content], {type: "application/octet-stream"}))
-    link.download = cb_obj.tags[0]
-    link.click()
-    setTimeout(() => URL.revokeObjectURL(link.href), 60000)
-    """
-)
+SAVE = """
+const content = cb_obj.data.content
+if (content.length == 0) return
+const link = document.createElement("a")
+link.href = URL.createObjectURL(new Blob([content], {type: "application/octet-stream"}))
+link.download = cb_obj.tags[0]
+link.click()
+setTimeout(() => URL.revokeObjectURL(link.href), 60000)
+"""
 COPY = """
 navigator.clipboard.writeText(command.value).then(() => {
   const before = button.label
@@ -61,7 +59,7 @@ COMMAND = """
 .bk-input { height: 26px; min-height: 26px; padding: 0 6px; font-family: monospace; color: #222; }
 """
 # The page has room for what is there: places are those of the style sheet.
-ARRANGE = CustomJS(code="document.querySelector('main').className = cb_obj.tags.join(' ')")
+ARRANGE = "document.querySelector('main').className = cb_obj.tags.join(' ')"
 
 
 class Page:
@@ -90,7 +88,7 @@ class Page:
             name="command", sizing_mode="stretch_width", disabled=True, stylesheets=[COMMAND]
         )
         self._files = ColumnDataSource({"content": []}, name="files", tags=[""])
-        self._files.js_on_change("data", SAVE)
+        self._files.js_on_change("data", CustomJS(code=SAVE))
         self._limit = Toggle(label="beside N → ∞", name="limit", width=120)
         self._limit.on_change("active", lambda _a, _o, _n: self._update())
         self._limit_message = Div(visible=False, styles=RED, name="limit:message")
@@ -133,7 +131,7 @@ class Page:
         copy.js_on_click(CustomJS(args={"command": self._command, "button": copy}, code=COPY))
         # What has no place on the page is a part of it all the same.
         arrangement = ColumnDataSource(name="arrangement", tags=[])
-        arrangement.js_on_change("tags", ARRANGE)
+        arrangement.js_on_change("tags", CustomJS(code=ARRANGE))
         self._arrangement = arrangement
         held = {"files": self._files, "arrangement": arrangement}
         self._status.js_on_change("tags", CustomJS(args=held, code=""))
@@ -251,7 +249,15 @@ class Page:
 
     def _publish(self, show: Callable[[int, Any], None], turn: int, shown: object) -> None:
         """Have the page show something of a turn."""
-        self._document.add_next_tick_callback(partial(self._show, show, turn, shown))
+        if self._is_closed:
+            return
+        try:
+            self._document.add_next_tick_callback(partial(self._show, show, turn, shown))
+        except AttributeError:
+            # The document of a closed tab is taken apart before the page is told.
+            context = self._document.session_context
+            if context is not None and not context.destroyed:
+                raise
 
     def _show(self, show: Callable[[int, Any], None], turn: int, shown: object) -> None:
         # A picture of the change before this one is shown, but none that is older than what is.

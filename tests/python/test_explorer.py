@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shlex
 import threading
 import time
@@ -13,10 +14,11 @@ from kinds import KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.explorer.controls import CONTROLS, STEPS, values
-from mesoslip.explorer.following import Worker, explored, follow
-from mesoslip.explorer.pictures import motion, theory
+from mesoslip.explorer.following import Pace, Worker, explored, follow
+from mesoslip.explorer.pictures import Theories, motion, theory
 from mesoslip.explorer.session import Session
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.runner import Results, run_realizations
 from mesoslip.simulation.stop import StopFlag
 
 KLEIN = str(ROOT / "runs" / "klein.toml")
@@ -258,6 +260,93 @@ def test_a_run_is_cut_off_by_the_next_one():
     assert not worker.is_alive
 
 
+def test_the_first_picture_comes_though_the_next_change_is_there():
+    """So that the picture follows a knob that is being turned."""
+    stop, seen = StopFlag(), []
+    stop.set()
+    follow(explored(Config.load(KLEIN, ["run.duration=1000 s"])), stop, seen.append)
+    assert len(seen) == 1
+    assert not seen[0].complete
+
+
+def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
+    told, done = [], threading.Event()
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_value))
+    worker = Worker("test")
+    worker.submit(lambda _: 1 / 0)
+    while not told:
+        time.sleep(0.01)
+    worker.submit(lambda _: done.set())
+    assert done.wait(30)
+    assert isinstance(told[0], ZeroDivisionError)
+    worker.close()
+
+
+def test_a_worker_that_rests_does_the_newest_only():
+    done, finished = [], threading.Event()
+    worker = Worker("test", delay=0.5)
+    for number in range(5):
+        worker.submit(lambda _, number=number: done.append(number))
+    worker.submit(lambda _: finished.set())
+    assert finished.wait(30)
+    assert done == []
+    worker.close()
+
+
+def test_a_picture_waits_for_the_one_before_it():
+    pace = Pace()
+    pace.wait()
+    pace.sent()
+    threading.Timer(0.1, pace.drawn).start()
+    start = time.monotonic()
+    pace.wait()
+    assert 0.05 < time.monotonic() - start
+    # A tab in the background draws nothing, and stops nothing.
+    pace.sent()
+    pace.wait()
+
+
+def test_theory_is_computed_once():
+    """Also of configurations that it cannot tell apart; the curve alone comes first."""
+    theories, config = Theories(), Config.load(KLEIN)
+    assert theories.known(config) is None
+    first, last = theories.compute(config)
+    assert "steady sliding" not in first.told
+    assert "steady sliding" in last.told
+    assert theories.known(config) is last
+    assert theories.known(Config.load(KLEIN, ["run.seed=7", "run.duration=3 s"])) is last
+    assert theories.known(Config.load(KLEIN, ["slider.stiffness=98 N/m"])) is None
+    assert theory(config).told == last.told
+
+
+def test_a_slip_has_both_forces_in_one_unit():
+    """Though one of them is a thousand times smaller than the unit of the other."""
+    config = explored(Config.load(KLEIN, ["run.duration=2.5 s", "contacts.static_force=1.05 mN"]))
+    tree = []
+    follow(config, StopFlag(), lambda results: tree.append(results))
+    shown = motion(tree[-1])
+    assert shown.slip_force.y_label == shown.slip_contact_force.y_label
+
+
+def test_a_long_run_says_how_long_it_takes():
+    config = explored(
+        Config.load(
+            KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=1 s"]
+        )
+    )
+    seen, stop = [], StopFlag()
+
+    def show(results):
+        seen.append(motion(results))
+        stop.set()
+
+    follow(config, stop, show)
+    (drawn,) = seen
+    assert drawn.progress.endswith("to go")
+    # And shows what there is, not a picture that is all grey.
+    assert drawn.force.x[-1] == pytest.approx(0.2 * drawn.end, rel=0.05)
+
+
 def test_values_are_those_that_have_a_meaning(klein):
     there = values(klein(slider={"kind": "prescribed"}))
     assert "slider.mass" not in there
@@ -300,5 +389,54 @@ def test_the_page_is_of_every_control():
         assert document.get_model_by_name("contacts.delay:message").visible
         slider.value = STEPS - 1
         assert not document.get_model_by_name("contacts.delay:message").visible
+    finally:
+        page.close()
+
+
+def test_changes_leave_nothing_behind():
+    """After many changes there is one run, and as many objects as after a few."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer.view import Page
+
+    small = ["run.duration=0.5 s", "contacts.count=400", "output.slip_interval=100 us"]
+    page = Page(document, Config.load(KLEIN, small), KLEIN)
+    drawn = document.get_model_by_name("status")
+    acknowledged = document.get_model_by_name("drawn")
+
+    def wait_for_picture():
+        """Do what the server and the browser do."""
+        end = time.monotonic() + 60
+        while drawn.tags[0] < page._turn or drawn.tags[1] < 1:
+            assert time.monotonic() < end
+            for callback in document.session_callbacks:
+                document.remove_next_tick_callback(callback)
+                callback.callback()
+            acknowledged.tags = [acknowledged.tags[0] + 1]
+            time.sleep(0.001)
+
+    def change(number):
+        document.get_model_by_name("contacts.delay").value = f"{1 + number} ms"
+        wait_for_picture()
+
+    def counted():
+        page._workers["theory"].cancel()
+        gc.collect()
+        objects = gc.get_objects()
+        kept = sum(isinstance(one, (Results, Realization)) for one in objects)
+        return kept, len(objects), threading.active_count()
+
+    try:
+        page._update()
+        for number in range(10):
+            change(number)
+        few = counted()
+        for number in range(10, 50):
+            change(number)
+        many = counted()
+        # The run that is shown, with its one realization.
+        assert few[0] == many[0] <= 2
+        # Less than ten an added change.
+        assert many[1] - few[1] < 400
+        assert many[2] == few[2]
     finally:
         page.close()

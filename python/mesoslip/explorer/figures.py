@@ -11,6 +11,7 @@ from bokeh.document import Document
 from bokeh.layouts import row
 from bokeh.models import ColumnDataSource, CustomJS, LinearColorMapper, Range1d
 from bokeh.models.annotations import BoxAnnotation, ColorBar, Span
+from bokeh.models.formatters import BasicTickFormatter
 from bokeh.models.ui import UIElement
 from bokeh.models.widgets import Div, Slider, Toggle
 from bokeh.plotting import figure
@@ -36,7 +37,7 @@ class Plot:
     """A picture of lines, each with a source of its own."""
 
     def __init__(
-        self, name: str, title: str, colors: dict[str, str], height: int = 190, **style: Any
+        self, name: str, title: str, colors: dict[str, str], height: int = 175, **style: Any
     ) -> None:
         self.figure = figure(
             name=name,
@@ -52,6 +53,8 @@ class Plot:
         self.figure.toolbar.logo = None
         self.figure.toolbar.autohide = True
         self.figure.axis.axis_label_text_font_style = "normal"
+        # Numbers of contacts are written out.
+        self.figure.yaxis.formatter = BasicTickFormatter(power_limit_high=6)
         self.sources = {}
         for label, color in colors.items():
             source = ColumnDataSource({"x": [], "y": []}, name=f"{name}:{label}")
@@ -75,6 +78,8 @@ class Plot:
         for label, drawn in lines.items():
             self.sources[label.replace("_", " ")].data = {"x": drawn.x, "y": drawn.y}
         named = next((one for one in lines.values() if not one.is_empty), None)
+        for legend in self.figure.legend:
+            set_changed(legend, visible=named is not None)
         if named is not None:
             set_changed(self.figure.xaxis[0], axis_label=named.x_label)
             set_changed(self.figure.yaxis[0], axis_label=named.y_label)
@@ -110,7 +115,7 @@ class MotionView:
         self.told = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
         self.now = Span(location=0, dimension="height", line_color="gray", visible=False)
         self.force = Plot(
-            f"{prefix}force", "Spring force", {"force": color}, 230, x_range=self._range
+            f"{prefix}force", "Spring force", {"force": color}, 210, x_range=self._range
         )
         self.force.figure.add_layout(self.now)
         self._done = BoxAnnotation(left=0, fill_color="#888888", fill_alpha=0.12, visible=False)
@@ -125,6 +130,7 @@ class MotionView:
             f"{prefix}slip",
             "The largest slip",
             {"spring force": color, "contact force": "#999999"},
+            190,
         )
         self.plots = (self.force, self.velocity, self.detached, self.slip)
         acknowledged = ColumnDataSource(name=f"{prefix}drawn", tags=[0])
@@ -147,6 +153,8 @@ class MotionView:
         self.velocity.show(velocity=shown.velocity)
         self.detached.show(detached=shown.detached)
         self.slip.show(spring_force=shown.slip_force, contact_force=shown.slip_contact_force)
+        heading = "No slip" if shown.slip_force.is_empty else "The largest slip"
+        set_changed(self.slip.figure.title, text=heading)
         set_changed(self._range, start=0.0, end=shown.end, reset_start=0.0, reset_end=shown.end)
         reached = shown.force.x[-1] if len(shown.force.x) else 0.0
         set_changed(self._done, left=float(reached), visible=shown.part_done < 1)
@@ -164,6 +172,7 @@ class TheoryView:
             "curve",
             "F(X) of slow sliding, and the spring",
             {"force": FIRST, "slope -K": SECOND},
+            190,
             x_range=Range1d(start=0, end=1),
             y_range=Range1d(start=0, end=1),
         )
@@ -174,6 +183,10 @@ class TheoryView:
 
     def show(self, shown: Theory) -> None:
         """Draw the curve, and the line of slope -K through X_c."""
+        heading = "No F(X)" if shown.curve.is_empty else "F(X) of slow sliding, and the spring"
+        set_changed(self.plot.figure.title, text=heading)
+        for legend in self.plot.figure.legend:
+            set_changed(legend, visible=not shown.curve.is_empty)
         self.plot.sources["force"].data = {"x": shown.curve.x, "y": shown.curve.y}
         self.plot.sources["slope -K"].data = {"x": shown.spring.x, "y": shown.spring.y}
         found = [] if shown.critical is None else [shown.critical]

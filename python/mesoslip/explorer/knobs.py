@@ -21,8 +21,10 @@ FLAT = """
 label, .bk-input-group > label { white-space: nowrap; overflow: visible; }
 """
 CHANGED: dict[str, str | None] = {"background-color": "#fff3cd", "border-radius": "4px"}
-UNCHANGED: dict[str, str | None] = {}
+# A style that is only left out stays as it was in the browser.
+UNCHANGED: dict[str, str | None] = {"background-color": "transparent", "border-radius": "4px"}
 RED: dict[str, str | None] = {"color": "#b00020"}
+PLAIN: dict[str, str | None] = {"color": "inherit"}
 
 
 def set_changed(model: Any, **properties: Any) -> None:
@@ -42,7 +44,9 @@ class ControlView:
         # What the page shows: a change to that is no wish of a person.
         self._text, self._position = "", 0.0
         self._scale = None if control.choices else control.scale(_number(session, control.key))
-        self.message = Div(visible=False, styles=RED, name=f"{control.key}:message", width=WIDTH)
+        self.message = Div(
+            visible=False, styles=RED, name=f"{control.key}:message", width=WIDTH - 10
+        )
         self._field: Select | TextInput
         self._slider: Slider | None = None
         if self._scale is None:

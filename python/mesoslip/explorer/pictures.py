@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 
 # Parts of a line of each of which the extremes are drawn.
 PARTS = 500
+# Least part of the time axis that is drawn of a run that goes on.
+LEAST_PART = 0.2
 # Points of the force curve that are drawn, its length in mean breaking stretches, its precision: a
 # picture needs no more, and a person does not wait for it.
 CURVE_POINTS = 800
@@ -102,7 +104,7 @@ class Motion:
     slip_force, slip_contact_force
         The largest slip in close-up: spring force and contact force.
     end
-        End of the run in the unit of the time axis.
+        End of the time axis, in its unit: that of the run, or nearer if little of it is done.
     regime
         Which motion it is, in words.
     numbers
@@ -111,6 +113,8 @@ class Motion:
         Snapshots, if contacts are on a lattice.
     part_done
         Part of the run that is done.
+    progress
+        The same in words, with the time that the rest takes.
     """
 
     force: Line
@@ -123,6 +127,7 @@ class Motion:
     numbers: tuple[tuple[str, str], ...]
     lattice: Lattice | None
     part_done: float
+    progress: str
 
 
 @dataclass(frozen=True)
@@ -156,7 +161,10 @@ def motion(results: Results) -> Motion:
     tree = build_tree(results)
     extent = Extent(0, parts=PARTS)
     times = times_of(tree)
-    end = max(config.expected_duration, float(times[-1]) if len(times) else 0.0)
+    reached = float(times[-1]) if len(times) else 0.0
+    end = max(config.expected_duration, reached)
+    if 0 < reached < LEAST_PART * end:
+        end = reached / LEAST_PART
     along = scale_for(end, "s")
     force, velocity, detached = (
         _line(tree, name, extent, extent.window(tree) if len(times) else (0.0, 0.0), along)
@@ -184,7 +192,22 @@ def motion(results: Results) -> Motion:
         tuple(numbers),
         _lattice(tree, along),
         1.0 if results.complete else realization.part_done,
+        _progress(results),
     )
+
+
+def _progress(results: Results) -> str:
+    """How much of a run is done, and how long the rest takes."""
+    if results.complete:
+        return "done"
+    part = results.realizations[0].part_done
+    if part <= 0:
+        return "0 % of the run"
+    left = results.wall_seconds * (1 - part) / part
+    if left < 1:
+        return f"{100 * part:.2g} % of the run"
+    unit = scale_for(left, "s")
+    return f"{100 * part:.2g} % of the run, about {left / unit.size:.2g} {unit.name} to go"
 
 
 def _line(

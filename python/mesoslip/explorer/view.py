@@ -26,7 +26,7 @@ from mesoslip.errors import ConfigError, MesoslipError
 from mesoslip.explorer.controls import BY_KEY
 from mesoslip.explorer.figures import FIRST, SECOND, LatticeView, MotionView, TheoryView
 from mesoslip.explorer.following import Worker, explored, follow
-from mesoslip.explorer.knobs import RED, ControlView, set_changed
+from mesoslip.explorer.knobs import PLAIN, RED, ControlView, set_changed
 from mesoslip.explorer.pictures import Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
 from mesoslip.output.files import write_results
@@ -60,6 +60,10 @@ COMMAND = """
 """
 # The page has room for what is there: places are those of the style sheet.
 ARRANGE = "document.querySelector('main').className = cb_obj.tags.join(' ')"
+
+# What is said when the program does not answer any more, and taken back when it does.
+LOST = "document.body.classList.add('lost')"
+FOUND = "document.body.classList.remove('lost')"
 
 
 class Page:
@@ -102,7 +106,12 @@ class Page:
         groups: dict[str, list[str]] = {}
         for key, control in BY_KEY.items():
             groups.setdefault(control.group, []).append(f"{key}:control")
-        document.template_variables.update(heading=start.title or source, knobs=groups)
+        heading = start.title or source
+        if start.run.realizations > 1:
+            heading += f" (the first of {start.run.realizations} realizations)"
+        document.template_variables.update(heading=heading, knobs=groups)
+        document.js_on_event("connection_lost", CustomJS(code=LOST))
+        document.js_on_event("client_reconnected", CustomJS(code=FOUND))
         document.on_event("document_ready", lambda _event: self._update())
         document.on_session_destroyed(lambda _context: self.close())
         self._show_controls()
@@ -192,7 +201,7 @@ class Page:
             try:
                 self._start("limit", config.replace({"run.engine": "me"}))
             except ConfigError as error:
-                told = "; ".join(one.message for one in error.problems)
+                told = "N → ∞: " + "; ".join(one.message for one in error.problems)
         set_changed(self._limit_message, text=html.escape(told), visible=bool(told))
         self._arrange(beside=is_wanted and not told)
 
@@ -266,7 +275,7 @@ class Page:
                 show(turn, shown)
 
     def _tell(self, text: str) -> None:
-        set_changed(self._status, text=html.escape(text), styles={})
+        set_changed(self._status, text=html.escape(text), styles=PLAIN)
 
     def _refuse(self, told: str) -> None:
         """Tell why what is wanted is not run."""
@@ -286,7 +295,7 @@ class Page:
         if turn < self._turn:
             return
         self._results = results
-        self._tell("done" if drawn.part_done >= 1 else f"{100 * drawn.part_done:.0f} % of the run")
+        self._tell(drawn.progress)
         # What a test, or who measures, waits for.
         self._status.tags = [turn, drawn.part_done]
 

@@ -320,12 +320,25 @@ def test_theory_is_computed_once():
 
 
 def test_a_slip_has_both_forces_in_one_unit():
-    """Though one of them is a thousand times smaller than the unit of the other."""
-    config = explored(Config.load(KLEIN, ["run.duration=2.5 s", "contacts.static_force=1.05 mN"]))
-    tree = []
-    follow(config, StopFlag(), lambda results: tree.append(results))
-    shown = motion(tree[-1])
-    assert shown.slip_force.y_label == shown.slip_contact_force.y_label
+    """Though the spring force is above 1 mN, and the contact force is not."""
+    # Klein's case with all forces and masses larger: its forces are 17.709 and 17.691 µN.
+    larger = 1e3 / 17.7
+    changes = {
+        "slider.mass": 1.47e-3,
+        "slider.stiffness": 97,
+        "contacts.static_force": 18e-6,
+        "contacts.stiffness": 2000,
+        "contacts.film_density": 956,
+    }
+    config = Config.load(
+        KLEIN, ["run.duration=2.5 s", *(f"{key}={larger * one}" for key, one in changes.items())]
+    )
+    seen = []
+    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    spring, contact = seen[-1].slip_force, seen[-1].slip_contact_force
+    assert spring.y_label == contact.y_label == "force (mN)"
+    assert np.max(contact.y) < 1 < np.max(spring.y)
+    assert np.max(contact.y) == pytest.approx(np.max(spring.y), rel=0.01)
 
 
 def test_a_long_run_says_how_long_it_takes():

@@ -70,6 +70,8 @@ class OnlyHere(AuthProvider):
             raise HTTPError(403)
         handler.set_header("Content-Security-Policy", POLICY)
         handler.set_header("X-Content-Type-Options", "nosniff")
+        # A browser that keeps the page for its way back keeps its runs going, too.
+        handler.set_header("Cache-Control", "no-store")
         return "here"
 
 

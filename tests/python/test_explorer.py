@@ -52,6 +52,16 @@ def test_each_position_of_a_slider_has_a_value(control, start):
         assert scale.low <= start <= scale.high
 
 
+def brought_by(key):
+    """The control, and its choice, with which another one comes."""
+    return next(
+        (control.key, choice)
+        for control in CONTROLS
+        for choice, keys in control.beside.items()
+        if key in keys
+    )
+
+
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
 def test_each_control_changes_the_configuration_as_the_command_line_does(session, control):
     before = session.text(control.key)
@@ -59,10 +69,8 @@ def test_each_control_changes_the_configuration_as_the_command_line_does(session
         text = next(one for one in control.choices[::-1] if one != before)
     else:
         text = control.text(control.scale(session.values.get(control.key)).value(0.7 * STEPS))
-    if control.key.startswith("interaction.") and control.key != "interaction.lattice":
-        assert session.change("interaction.lattice", "square")
-    if control.key == "slider.layers":
-        assert session.change("slider.kind", "layered")
+    if not session.text(control.key):
+        assert session.change(*brought_by(control.key))
     assert session.change(control.key, text), session.problems
     assert session.is_changed(control.key)
     words = shlex.split(session.command)
@@ -123,6 +131,20 @@ def test_a_lattice_counts_its_contacts_and_goes_again(session):
     assert session.change("interaction.rows", "7")
     assert session.config.contacts.count == 70
     assert session.change("interaction.lattice", "none")
+    assert session.changes == {}
+    assert session.config == session.start
+
+
+def test_contacts_begin_to_age_and_cease_to(session):
+    """With what a law needs, and without what another one needed."""
+    assert session.change("contacts.ageing.law", "log")
+    assert session.config.contacts.coupling == "equal"
+    assert session.change("contacts.ageing.growth", "0.1")
+    assert session.change("contacts.ageing.time", "3 ms")
+    assert session.change("contacts.ageing.law", "relax")
+    assert "contacts.ageing.growth" not in session.shown
+    assert session.config.contacts.ageing.time == pytest.approx(3e-3)
+    assert session.change("contacts.ageing.law", "none")
     assert session.changes == {}
     assert session.config == session.start
 

@@ -149,6 +149,18 @@ def test_contacts_begin_to_age_and_cease_to(session):
     assert session.config == session.start
 
 
+def test_what_the_kernel_refuses_is_told_too(session):
+    """Such as a law of which no threshold is above the back force."""
+    for key, text in (
+        ("contacts.ageing.law", "relax"),
+        ("contacts.ageing.young_relative_width", "0.01"),
+        ("contacts.back_force_ratio", "0.9"),
+    ):
+        session.change(key, text)
+    assert list(session.problems) == ["contacts.back_force_ratio"]
+    assert session.change("contacts.back_force_ratio", "0.1")
+
+
 def test_a_kind_takes_the_keys_with_it_that_only_it_has(session):
     assert session.change("slider.damping_ratio", "0.5")
     assert session.change("slider.kind", "layered")

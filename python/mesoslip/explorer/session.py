@@ -7,7 +7,7 @@ import shlex
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import text_of
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError, MesoslipError, Problem
 from mesoslip.explorer.controls import BY_KEY, COUNTED, FOR_TABLES, NONE, values
 
 
@@ -143,6 +143,8 @@ class Session:
                 self.problems[key] = "; ".join(
                     part for part in (self.problems.get(key), told) if part
                 )
+        except MesoslipError as error:
+            self.problems[last] = str(error)
         else:
             self.values = values(self.config)
             # What is written otherwise, as 500 us for 0.5 ms, is not changed.

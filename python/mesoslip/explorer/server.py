@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import webbrowser
 from collections.abc import Awaitable, Callable
@@ -117,6 +118,10 @@ def serve(
 
 def make_server(config: Config, source: str, port: int) -> Server:
     """A server of the page that is not started; see `serve`."""
+    # What is there stays: the collector of garbage, which runs after each change, leaves it alone.
+    gc.collect()
+    gc.freeze()
+
     # What the library has to say is for its own developers.
     logging.getLogger("bokeh").setLevel(logging.CRITICAL)
     logging.getLogger("tornado").setLevel(logging.CRITICAL)

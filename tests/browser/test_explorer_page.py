@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import random
 import statistics
 import time
@@ -14,15 +15,19 @@ import numpy as np
 import pytest
 from conftest import PATIENCE, ROOT, Browser, Server, eventually, is_here
 from mesoslip import Config
-from mesoslip.explorer.controls import CONTROLS, STEPS
+from mesoslip.explorer.controls import BY_KEY, CONTROLS, STEPS
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 REFUSED = 403
+# What the page has room for.
+CLASSES = "return document.querySelector('main').className.split(' ')"
 # Random changes, and the median time in which they are to be drawn [s].
 CHANGES = 200
 MEDIAN = 0.5
-# What the memory of the program may grow by while it is used.
-GROWTH = 1.25
+# What the memory of the program may grow by while it is used, after the first half of the changes.
+GROWTH = 1.1
 
 
 def ask(address: str, path: str = "/", **headers: str) -> int:
@@ -47,7 +52,9 @@ def test_loads_and_draws_without_asking_anyone(server, browser):
     force = browser.data("force:force")
     assert 17.0 < max(force) < 18.0
     assert browser.value("force", "below[0].axis_label") == "time (s)"
-    assert len(browser.data("curve:force")) > 100
+    # Theory comes after the picture: first the curve, then what is known of steady sliding.
+    assert eventually(lambda: len(browser.data("curve:force")) > 100)
+    assert eventually(lambda: "steady sliding" in browser.value("theory", "text"))
     assert "stick-slip" in browser.value("regime", "text")
 
 
@@ -56,8 +63,7 @@ def test_a_value_is_typed(server, browser):
     browser.wait_until_done()
     before = browser.data("force:force")
     field = browser.element("contacts.static_force", "input")
-    field.send_keys(Keys.CONTROL, "a")
-    field.send_keys("9 uN", Keys.ENTER)
+    field.send_keys(Keys.CONTROL, "a", Keys.NULL, "9 uN", Keys.ENTER)
     browser.wait("return Bokeh.documents[0].get_model_by_name('command').value.includes('9 uN')")
     browser.wait_until_done()
     assert max(browser.data("force:force")) == pytest.approx(max(before) / 2, rel=0.02)
@@ -76,15 +82,82 @@ def test_a_slider_is_moved_by_keys(server, browser):
     assert browser.errors() == []
 
 
+def test_the_picture_follows_a_knob_that_is_being_turned(server, browser):
+    """Before it comes to rest, and in the end it is of where the knob is."""
+    browser.open(server.address)
+    browser.wait_until_done()
+    browser.driver.execute_script(
+        """
+        window.seen = []
+        const find = (name) => Bokeh.documents[0].get_model_by_name(name)
+        for (const name of ["regime", "slider.stiffness:slider"])
+          find(name).properties[name == "regime" ? "tags" : "value"].change.connect(() =>
+            window.seen.push(name))
+        """
+    )
+    handle = browser.element("slider.stiffness:slider", ".noUi-handle")
+    hand = ActionChains(browser.driver, duration=100).click_and_hold(handle)
+    for _ in range(20):
+        hand.move_by_offset(2, 0)
+    hand.release().perform()
+    browser.wait_until_done()
+    seen = browser.driver.execute_script("return window.seen")
+    last = len(seen) - 1 - seen[::-1].index("slider.stiffness:slider")
+    assert seen[:last].count("regime") >= 2
+    assert "regime" in seen[last:]
+    text = browser.value("slider.stiffness", "value")
+    assert f"slider.stiffness={text}" in browser.value("command", "value")
+    place = browser.value("slider.stiffness:slider", "value")
+    scale = BY_KEY["slider.stiffness"].scale(97.0)
+    assert BY_KEY["slider.stiffness"].text(scale.value(place)) == text
+    assert browser.errors() == []
+
+
+def test_what_was_marked_is_not_any_more(server, browser):
+    """After all changes are taken back: neither a knob that was changed nor an error."""
+    browser.open(server.address)
+    browser.wait_until_done()
+    color = "return getComputedStyle(Bokeh.index.find_one({}).el)[arguments[0]]"
+    find = "Bokeh.documents[0].get_model_by_name('{}')"
+
+    def looks(name, what):
+        script = color.format(find.format(name))
+        return browser.driver.execute_script(script, what)
+
+    before = looks("contacts.delay:control", "backgroundColor"), looks("status", "color")
+    assert browser.change("contacts.delay", "1 kg")[1] == "refused"
+    marked = looks("contacts.delay:control", "backgroundColor"), looks("status", "color")
+    assert marked[0] != before[0]
+    assert marked[1] != before[1]
+    browser.element("reset", "button").click()
+    browser.wait_until_done()
+    assert looks("contacts.delay:control", "backgroundColor") == before[0]
+    assert looks("status", "color") == before[1]
+
+
+def test_a_program_that_has_ended_is_told(browser):
+    server = Server("runs/klein.toml")
+    browser.open(server.address)
+    assert not browser.driver.find_element(By.CLASS_NAME, "lost-only").is_displayed()
+    server.stop()
+    assert eventually(browser.driver.find_element(By.CLASS_NAME, "lost-only").is_displayed)
+    browser.driver.get_log("browser")
+
+
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
 def test_each_control_draws_a_new_picture(server, browser, control):
     """Each by itself on a page of its own; what it changes to can be run."""
     browser.open(server.address)
     before = browser.value("command", "value")
-    if control.key.startswith("interaction.") and control.key != "interaction.lattice":
-        assert browser.change("interaction.lattice", "square")[1] == "drawn"
-    if control.key == "slider.layers":
-        assert browser.change("slider.kind", "layered")[1] == "drawn"
+    if not browser.value(f"{control.key}:control", "visible"):
+        # The control, and its choice, with which it comes.
+        first, choice = next(
+            (one.key, choice)
+            for one in CONTROLS
+            for choice, keys in one.beside.items()
+            if control.key in keys
+        )
+        assert browser.change(first, choice)[1] == "drawn"
     if control.choices:
         now = browser.value(control.key, "value")
         other = next(one for one in control.choices if one != now)
@@ -117,7 +190,7 @@ def test_infinitely_many_contacts_beside(server, browser):
     browser.open(server.address)
     browser.change("run.duration", "3 s")
     assert browser.change("limit", True, "active")[1] == "drawn"
-    browser.wait("return Bokeh.documents[0].get_model_by_name('limit:motion').visible")
+    assert "beside" in browser.driver.execute_script(CLASSES)
     browser.wait(
         "return Bokeh.documents[0].get_model_by_name('limit:force:force').data.y.length > 100"
     )
@@ -128,7 +201,7 @@ def test_infinitely_many_contacts_beside(server, browser):
     )
     assert browser.change("interaction.lattice", "square")[1] == "drawn"
     assert "no neighbours" in browser.value("limit:message", "text")
-    assert not browser.value("limit:motion", "visible")
+    assert "beside" not in browser.driver.execute_script(CLASSES)
 
 
 def test_a_lattice_moves(server, browser):
@@ -151,23 +224,27 @@ def test_a_lattice_moves(server, browser):
     assert browser.errors() == []
 
 
-def test_two_tabs_have_changes_of_their_own(server, browser):
-    browser.open(server.address)
-    first = browser.driver.current_window_handle
-    assert browser.change("contacts.delay", "1 ms")[1] == "drawn"
-    threads = server.threads()
-    browser.driver.switch_to.new_window("tab")
-    browser.open(server.address)
-    assert browser.value("contacts.delay", "value") == "500 µs"
-    assert browser.change("slider.stiffness", "200 N/m")[1] == "drawn"
-    assert server.threads() > threads
-    browser.driver.close()
-    browser.driver.switch_to.window(first)
-    assert browser.value("contacts.delay", "value") == "1 ms"
-    assert "stiffness" not in browser.value("command", "value")
-    assert browser.change("slider.mass", "1 g")[1] == "drawn"
-    # A closed tab leaves no thread behind.
-    assert eventually(lambda: server.threads() <= threads, 60)
+def test_two_tabs_have_changes_of_their_own(browser):
+    server = Server("runs/klein.toml")
+    try:
+        browser.open(server.address)
+        one = server.threads()
+        first = browser.driver.current_window_handle
+        assert browser.change("contacts.delay", "1 ms")[1] == "drawn"
+        browser.driver.switch_to.new_window("tab")
+        browser.open(server.address)
+        assert browser.value("contacts.delay", "value") == "500 µs"
+        assert browser.change("slider.stiffness", "200 N/m")[1] == "drawn"
+        assert server.threads() >= one + 3
+        browser.driver.close()
+        browser.driver.switch_to.window(first)
+        assert browser.value("contacts.delay", "value") == "1 ms"
+        assert "stiffness" not in browser.value("command", "value")
+        assert browser.change("slider.mass", "1 g")[1] == "drawn"
+        # A closed tab leaves no thread behind.
+        assert eventually(lambda: server.threads() <= one, 60)
+    finally:
+        server.stop()
 
 
 def test_a_tab_that_is_closed_ends_its_run(browser, tmp_path):
@@ -186,6 +263,22 @@ def test_a_tab_that_is_closed_ends_its_run(browser, tmp_path):
         browser.driver.close()
         browser.driver.switch_to.window(first)
         assert eventually(lambda: server.threads() <= busy - 3, 60)
+    finally:
+        server.stop()
+
+
+def test_pages_that_were_left_leave_nothing(browser):
+    """The browser does not keep them for its way back."""
+    server = Server("runs/klein.toml")
+    memory = []
+    try:
+        for _ in range(6):
+            browser.open(server.address)
+            browser.wait_until_done()
+            browser.driver.get("about:blank")
+            assert eventually(lambda: server.threads() == 1, 60)
+            memory.append(server.memory())
+        assert memory[-1] < 1.15 * memory[0], memory
     finally:
         server.stop()
 
@@ -273,7 +366,9 @@ def test_many_changes_at_random():
     server, browser = Server("runs/klein.toml"), Browser()
     try:
         browser.open(server.address)
-        drawn, refused, memory = [], 0, []
+        browser.wait_until_done()
+        first = browser.value("command", "value")
+        drawn, refused, memory, before = [], 0, [], server.computing_time()
         for number in range(CHANGES):
             keys = browser.driver.execute_script(
                 """
@@ -287,7 +382,7 @@ def test_many_changes_at_random():
             if control.choices:
                 options = browser.value(control.key, "options")
                 now = browser.value(control.key, "value")
-                value = chance.choice([one for one in options if one != now])
+                value = chance.choice([one for one, _ in options if one != now])
                 seconds, became = browser.change(control.key, value)
             else:
                 name = f"{control.key}:slider"
@@ -302,7 +397,14 @@ def test_many_changes_at_random():
                 browser.element("reset", "button").click()
                 browser.wait("return Bokeh.documents[0].get_model_by_name('status').tags[1] >= 0")
             assert browser.errors() == []
-            if number % 10 == 9:
+            if number % 25 == 24:
+                # Runs differ in size: memory is compared with the same one shown.
+                browser.element("reset", "button").click()
+                browser.wait(
+                    "return Bokeh.documents[0].get_model_by_name('command').value == arguments[0]",
+                    first,
+                )
+                browser.wait_until_done()
                 memory.append(server.memory())
         told = {
             "drawn": len(drawn),
@@ -311,10 +413,11 @@ def test_many_changes_at_random():
             "90 %": float(np.percentile(drawn, 90)),
             "longest": max(drawn),
             "memory": [round(one / 1e6) for one in memory],
+            "server's computing time": (server.computing_time() - before) / CHANGES,
+            "load": os.getloadavg()[0],
         }
         print(json.dumps(told))
-        half = len(memory) // 2
-        assert statistics.median(memory[half:]) < GROWTH * statistics.median(memory[2:half])
+        assert max(memory[4:]) < GROWTH * max(memory[:4]), told
         assert told["median"] < MEDIAN, told
     finally:
         browser.driver.quit()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shlex
 import threading
 import time
@@ -13,10 +14,11 @@ from kinds import KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.explorer.controls import CONTROLS, STEPS, values
-from mesoslip.explorer.following import Worker, explored, follow
-from mesoslip.explorer.pictures import motion, theory
+from mesoslip.explorer.following import Pace, Worker, explored, follow
+from mesoslip.explorer.pictures import Theories, motion, theory
 from mesoslip.explorer.session import Session
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.runner import Results, run_realizations
 from mesoslip.simulation.stop import StopFlag
 
 KLEIN = str(ROOT / "runs" / "klein.toml")
@@ -50,6 +52,16 @@ def test_each_position_of_a_slider_has_a_value(control, start):
         assert scale.low <= start <= scale.high
 
 
+def brought_by(key):
+    """The control, and its choice, with which another one comes."""
+    return next(
+        (control.key, choice)
+        for control in CONTROLS
+        for choice, keys in control.beside.items()
+        if key in keys
+    )
+
+
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
 def test_each_control_changes_the_configuration_as_the_command_line_does(session, control):
     before = session.text(control.key)
@@ -57,10 +69,8 @@ def test_each_control_changes_the_configuration_as_the_command_line_does(session
         text = next(one for one in control.choices[::-1] if one != before)
     else:
         text = control.text(control.scale(session.values.get(control.key)).value(0.7 * STEPS))
-    if control.key.startswith("interaction.") and control.key != "interaction.lattice":
-        assert session.change("interaction.lattice", "square")
-    if control.key == "slider.layers":
-        assert session.change("slider.kind", "layered")
+    if not session.text(control.key):
+        assert session.change(*brought_by(control.key))
     assert session.change(control.key, text), session.problems
     assert session.is_changed(control.key)
     words = shlex.split(session.command)
@@ -123,6 +133,32 @@ def test_a_lattice_counts_its_contacts_and_goes_again(session):
     assert session.change("interaction.lattice", "none")
     assert session.changes == {}
     assert session.config == session.start
+
+
+def test_contacts_begin_to_age_and_cease_to(session):
+    """With what a law needs, and without what another one needed."""
+    assert session.change("contacts.ageing.law", "log")
+    assert session.config.contacts.coupling == "equal"
+    assert session.change("contacts.ageing.growth", "0.1")
+    assert session.change("contacts.ageing.time", "3 ms")
+    assert session.change("contacts.ageing.law", "relax")
+    assert "contacts.ageing.growth" not in session.shown
+    assert session.config.contacts.ageing.time == pytest.approx(3e-3)
+    assert session.change("contacts.ageing.law", "none")
+    assert session.changes == {}
+    assert session.config == session.start
+
+
+def test_what_the_kernel_refuses_is_told_too(session):
+    """Such as a law of which no threshold is above the back force."""
+    for key, text in (
+        ("contacts.ageing.law", "relax"),
+        ("contacts.ageing.young_relative_width", "0.01"),
+        ("contacts.back_force_ratio", "0.9"),
+    ):
+        session.change(key, text)
+    assert list(session.problems) == ["contacts.back_force_ratio"]
+    assert session.change("contacts.back_force_ratio", "0.1")
 
 
 def test_a_kind_takes_the_keys_with_it_that_only_it_has(session):
@@ -258,6 +294,106 @@ def test_a_run_is_cut_off_by_the_next_one():
     assert not worker.is_alive
 
 
+def test_the_first_picture_comes_though_the_next_change_is_there():
+    """So that the picture follows a knob that is being turned."""
+    stop, seen = StopFlag(), []
+    stop.set()
+    follow(explored(Config.load(KLEIN, ["run.duration=1000 s"])), stop, seen.append)
+    assert len(seen) == 1
+    assert not seen[0].complete
+
+
+def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
+    told, done = [], threading.Event()
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_value))
+    worker = Worker("test")
+    worker.submit(lambda _: 1 / 0)
+    while not told:
+        time.sleep(0.01)
+    worker.submit(lambda _: done.set())
+    assert done.wait(30)
+    assert isinstance(told[0], ZeroDivisionError)
+    worker.close()
+
+
+def test_a_worker_that_rests_does_the_newest_only():
+    done, finished = [], threading.Event()
+    worker = Worker("test", delay=0.5)
+    for number in range(5):
+        worker.submit(lambda _, number=number: done.append(number))
+    worker.submit(lambda _: finished.set())
+    assert finished.wait(30)
+    assert done == []
+    worker.close()
+
+
+def test_a_picture_waits_for_the_one_before_it():
+    pace = Pace()
+    pace.wait()
+    pace.sent()
+    threading.Timer(0.1, pace.drawn).start()
+    start = time.monotonic()
+    pace.wait()
+    assert 0.05 < time.monotonic() - start
+    # A tab in the background draws nothing, and stops nothing.
+    pace.sent()
+    pace.wait()
+
+
+def test_theory_is_computed_once():
+    """Also of configurations that it cannot tell apart; the curve alone comes first."""
+    theories, config = Theories(), Config.load(KLEIN)
+    assert theories.known(config) is None
+    first, last = theories.compute(config)
+    assert "steady sliding" not in first.told
+    assert "steady sliding" in last.told
+    assert theories.known(config) is last
+    assert theories.known(Config.load(KLEIN, ["run.seed=7", "run.duration=3 s"])) is last
+    assert theories.known(Config.load(KLEIN, ["slider.stiffness=98 N/m"])) is None
+    assert theory(config).told == last.told
+
+
+def test_a_slip_has_both_forces_in_one_unit():
+    """Though the spring force is above 1 mN, and the contact force is not."""
+    # Klein's case with all forces and masses larger: its forces are 17.709 and 17.691 µN.
+    larger = 1e3 / 17.7
+    changes = {
+        "slider.mass": 1.47e-3,
+        "slider.stiffness": 97,
+        "contacts.static_force": 18e-6,
+        "contacts.stiffness": 2000,
+        "contacts.film_density": 956,
+    }
+    config = Config.load(
+        KLEIN, ["run.duration=2.5 s", *(f"{key}={larger * one}" for key, one in changes.items())]
+    )
+    seen = []
+    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    spring, contact = seen[-1].slip_force, seen[-1].slip_contact_force
+    assert spring.y_label == contact.y_label == "force (mN)"
+    assert np.max(contact.y) < 1 < np.max(spring.y)
+    assert np.max(contact.y) == pytest.approx(np.max(spring.y), rel=0.01)
+
+
+def test_a_long_run_says_how_long_it_takes():
+    config = explored(
+        Config.load(
+            KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=1 s"]
+        )
+    )
+    seen, stop = [], StopFlag()
+
+    def show(results):
+        seen.append(motion(results))
+        stop.set()
+
+    follow(config, stop, show)
+    (drawn,) = seen
+    assert drawn.progress.endswith("to go")
+    # And shows what there is, not a picture that is all grey.
+    assert drawn.force.x[-1] == pytest.approx(0.2 * drawn.end, rel=0.05)
+
+
 def test_values_are_those_that_have_a_meaning(klein):
     there = values(klein(slider={"kind": "prescribed"}))
     assert "slider.mass" not in there
@@ -300,5 +436,54 @@ def test_the_page_is_of_every_control():
         assert document.get_model_by_name("contacts.delay:message").visible
         slider.value = STEPS - 1
         assert not document.get_model_by_name("contacts.delay:message").visible
+    finally:
+        page.close()
+
+
+def test_changes_leave_nothing_behind():
+    """After many changes there is one run, and as many objects as after a few."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer.view import Page
+
+    small = ["run.duration=0.5 s", "contacts.count=400", "output.slip_interval=100 us"]
+    page = Page(document, Config.load(KLEIN, small), KLEIN)
+    drawn = document.get_model_by_name("status")
+    acknowledged = document.get_model_by_name("drawn")
+
+    def wait_for_picture():
+        """Do what the server and the browser do."""
+        end = time.monotonic() + 60
+        while drawn.tags[0] < page._turn or drawn.tags[1] < 1:
+            assert time.monotonic() < end
+            for callback in document.session_callbacks:
+                document.remove_next_tick_callback(callback)
+                callback.callback()
+            acknowledged.tags = [acknowledged.tags[0] + 1]
+            time.sleep(0.001)
+
+    def change(number):
+        document.get_model_by_name("contacts.delay").value = f"{1 + number} ms"
+        wait_for_picture()
+
+    def counted():
+        page._workers["theory"].cancel()
+        gc.collect()
+        objects = gc.get_objects()
+        kept = sum(isinstance(one, (Results, Realization)) for one in objects)
+        return kept, len(objects), threading.active_count()
+
+    try:
+        page._update()
+        for number in range(10):
+            change(number)
+        few = counted()
+        for number in range(10, 50):
+            change(number)
+        many = counted()
+        # The run that is shown, with its one realization.
+        assert few[0] == many[0] <= 2
+        # Less than ten an added change.
+        assert many[1] - few[1] < 400
+        assert many[2] == few[2]
     finally:
         page.close()

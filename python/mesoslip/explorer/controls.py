@@ -41,6 +41,8 @@ class Control:
         Where a range of decades is about if the value at the start is zero, in SI.
     choices
         What it may be, if it is no number.
+    told
+        What choices are called on the page, if not as in a file.
     beside
         Keys that a choice needs, and what they are if they are not given.
     """
@@ -52,6 +54,7 @@ class Control:
     range: tuple[float, float] = (0.0, math.inf)
     usual: float = 1.0
     choices: tuple[str, ...] = ()
+    told: Mapping[str, str] = field(default_factory=dict)
     beside: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     @property
@@ -134,7 +137,13 @@ CONTROLS = (
     Control("drive.velocity", "drive velocity", "Drive and run", 3),
     Control("run.duration", "duration", "Drive and run", 1),
     Control("run.seed", "seed", "Drive and run", range=(1, 100)),
-    Control("run.engine", "contacts are", "Drive and run", choices=("eq", "me")),
+    Control(
+        "run.engine",
+        "contacts are",
+        "Drive and run",
+        choices=("eq", "me"),
+        told={"eq": "N, one by one", "me": "N → ∞, the master equation"},
+    ),
     Control(
         "slider.kind",
         "kind",
@@ -159,6 +168,32 @@ CONTROLS = (
         "contacts.threshold.relative_width", "width Δf_s/f_s", "Thresholds", 2, (1e-3, 1), 0.01
     ),
     Control(
+        "contacts.ageing.law",
+        "law",
+        "Ageing",
+        choices=(NONE, "log", "relax"),
+        told={"log": "thresholds grow as a logarithm", "relax": "thresholds relax"},
+        beside={
+            "log": {
+                "contacts.ageing.time": "1 ms",
+                "contacts.ageing.growth": "0.05",
+                "contacts.coupling": "equal",
+            },
+            "relax": {
+                "contacts.ageing.time": "1 ms",
+                "contacts.ageing.young_force_ratio": "0.5",
+                "contacts.ageing.young_relative_width": "0.1",
+                "contacts.coupling": "equal",
+            },
+        },
+    ),
+    Control("contacts.ageing.time", "time τ_a", "Ageing", 3, usual=1e-3),
+    Control("contacts.ageing.growth", "growth β", "Ageing", 1.5, usual=0.05),
+    Control("contacts.ageing.young_force_ratio", "young force over old", "Ageing", range=(0.05, 1)),
+    Control(
+        "contacts.ageing.young_relative_width", "width of the young", "Ageing", 1, (1e-3, 1), 0.1
+    ),
+    Control(
         "interaction.lattice",
         "lattice",
         "Interaction",
@@ -172,7 +207,7 @@ CONTROLS = (
 BY_KEY = {control.key: control for control in CONTROLS}
 
 # Controls that stand for a table as a whole: they are there without it.
-FOR_TABLES = ("interaction.lattice",)
+FOR_TABLES = ("contacts.ageing.law", "interaction.lattice")
 # What a lattice counts is not changed beside it.
 COUNTED = ("interaction.columns", "interaction.rows", "contacts.count")
 

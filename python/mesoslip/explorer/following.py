@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
+import os
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -21,6 +25,9 @@ SEGMENT_SECONDS = 0.03
 FIRST_LOOK = 0.1
 LATER = 2.0
 
+# How long a picture waits for the one before it to be drawn [s].
+LONGEST_WAIT = 1.0
+
 # Samples of a trace, and of the finer traces of slips, at most.
 MOST_SAMPLES = 20_000
 MOST_FINE_SAMPLES = 100_000
@@ -32,14 +39,45 @@ SNAPSHOT_BYTES = 50_000_000
 BYTES_PER_CONTACT = 24
 
 
+class Pace:
+    """Lets a run send a picture when the one before it was drawn, so that none queue up."""
+
+    def __init__(self) -> None:
+        self._drawn = threading.Event()
+        self._drawn.set()
+
+    def sent(self) -> None:
+        """A picture is on its way."""
+        self._drawn.clear()
+
+    def drawn(self) -> None:
+        """It was drawn."""
+        self._drawn.set()
+
+    def wait(self) -> None:
+        """Wait until the last picture was drawn; not for long, as a tab in the background draws
+        none.
+        """
+        self._drawn.wait(LONGEST_WAIT)
+
+
 class Worker:
     """A thread that does the newest of the jobs that it is given.
 
-    A job is told to stop by the next one; of those that were not begun only the newest is done.
+    A job is told to stop by the next one; of those that were not begun only the newest is done. A
+    job that fails does not end the thread.
+
+    Parameters
+    ----------
+    name
+        Name of the thread.
+    delay
+        How long a job waits for one that is newer [s].
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, delay: float = 0.0) -> None:
         self._condition = threading.Condition()
+        self._delay = delay
         self._next: Job | None = None
         self._stop = StopFlag()
         self._is_closed = False
@@ -76,14 +114,41 @@ class Worker:
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: self._next is not None or self._is_closed)
+                newest = self._next
+                # As long as newer ones keep coming, none is begun.
+                while self._delay and not self._is_closed:
+                    self._condition.wait(self._delay)
+                    if self._next is newest:
+                        break
+                    newest = self._next
                 if self._is_closed:
                     return
                 job, self._next = self._next, None
                 self._stop = stop = StopFlag()
-            assert job is not None
-            job(stop)
-            # Nothing of it stays until the next one.
-            del job
+            if job is not None:
+                try:
+                    job(stop)
+                except Exception:
+                    # Told where the program was started, as for any thread.
+                    threading.excepthook(
+                        threading.ExceptHookArgs((*sys.exc_info(), threading.current_thread()))
+                    )
+            # Nothing of them stays until the next one.
+            job = newest = None
+            _give_back_memory()
+
+
+def _give_back_memory() -> None:
+    """Free what is left of runs, and give it back to the system where the C library has a way to.
+
+    Trees of data refer to themselves, so that they wait for the collector of garbage. The C library
+    keeps what it gets back otherwise, for each thread: after many runs as much as the largest of
+    them took, several times.
+    """
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+    if trim is not None:
+        trim(0)
 
 
 def explored(config: Config) -> Config:
@@ -112,12 +177,15 @@ def explored(config: Config) -> Config:
 def follow(config: Config, stop: StopFlag, show: Callable[[Results], None]) -> None:
     """Run the first realization of a configuration, and show what there is now and then.
 
+    The first picture comes in any case, so that a knob that is being turned is followed by the
+    picture, and not only when it rests.
+
     Parameters
     ----------
     config
         What to run.
     stop
-        Set by who does not want to see the rest.
+        Set by who does not want to see more than the first picture.
     show
         Called with the results so far, soon after the start, later less often, and at the end.
 
@@ -130,15 +198,15 @@ def follow(config: Config, stop: StopFlag, show: Callable[[Results], None]) -> N
     start = time.perf_counter()
     due, work = FIRST_LOOK, FIRST_WORK
     try:
-        while not (realization.finished or stop.is_set()):
+        is_shown = False
+        while not (realization.finished or (is_shown and stop.is_set())):
             before = time.perf_counter()
             realization.advance(work=work)
             now = time.perf_counter()
             work *= min(4.0, max(0.1, SEGMENT_SECONDS / max(now - before, 1e-9)))
-            if stop.is_set():
-                break
             if realization.finished or now - start >= due:
                 show(Results(config, [realization], realization.finished, now - start))
+                is_shown = True
                 due = LATER * (time.perf_counter() - start)
     finally:
         realization.close()

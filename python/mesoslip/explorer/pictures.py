@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +37,8 @@ Array = NDArray[np.float64]
 
 # Parts of a line of each of which the extremes are drawn.
 PARTS = 500
+# Least part of the time axis that is drawn of a run that goes on.
+LEAST_PART = 0.2
 # Points of the force curve that are drawn, its length in mean breaking stretches, its precision: a
 # picture needs no more, and a person does not wait for it.
 CURVE_POINTS = 800
@@ -42,6 +46,8 @@ CURVE_LENGTH = 6.0
 CURVE_TOLERANCE = 1e-6
 # Work that the stability of steady sliding may take.
 MOST_WORK = 10_000
+# Configurations of which it is kept what theory says.
+MOST_THEORIES = 50
 # Largest picture of the lattice, in contacts along a side.
 MOST_PLACES = 300
 
@@ -98,7 +104,7 @@ class Motion:
     slip_force, slip_contact_force
         The largest slip in close-up: spring force and contact force.
     end
-        End of the run in the unit of the time axis.
+        End of the time axis, in its unit: that of the run, or nearer if little of it is done.
     regime
         Which motion it is, in words.
     numbers
@@ -107,6 +113,8 @@ class Motion:
         Snapshots, if contacts are on a lattice.
     part_done
         Part of the run that is done.
+    progress
+        The same in words, with the time that the rest takes.
     """
 
     force: Line
@@ -119,6 +127,7 @@ class Motion:
     numbers: tuple[tuple[str, str], ...]
     lattice: Lattice | None
     part_done: float
+    progress: str
 
 
 @dataclass(frozen=True)
@@ -152,7 +161,10 @@ def motion(results: Results) -> Motion:
     tree = build_tree(results)
     extent = Extent(0, parts=PARTS)
     times = times_of(tree)
-    end = max(config.expected_duration, float(times[-1]) if len(times) else 0.0)
+    reached = float(times[-1]) if len(times) else 0.0
+    end = max(config.expected_duration, reached)
+    if 0 < reached < LEAST_PART * end:
+        end = reached / LEAST_PART
     along = scale_for(end, "s")
     force, velocity, detached = (
         _line(tree, name, extent, extent.window(tree) if len(times) else (0.0, 0.0), along)
@@ -180,7 +192,22 @@ def motion(results: Results) -> Motion:
         tuple(numbers),
         _lattice(tree, along),
         1.0 if results.complete else realization.part_done,
+        _progress(results),
     )
+
+
+def _progress(results: Results) -> str:
+    """How much of a run is done, and how long the rest takes."""
+    if results.complete:
+        return "done"
+    part = results.realizations[0].part_done
+    if part <= 0:
+        return "0 % of the run"
+    left = results.wall_seconds * (1 - part) / part
+    if left < 1:
+        return f"{100 * part:.2g} % of the run"
+    unit = scale_for(left, "s")
+    return f"{100 * part:.2g} % of the run, about {left / unit.size:.2g} {unit.name} to go"
 
 
 def _line(
@@ -189,20 +216,14 @@ def _line(
     extent: Extent,
     window: tuple[float, float],
     along: Scale,
-    origin: float = 0.0,
 ) -> Line:
-    """A variable against the time since an origin."""
+    """A variable against time."""
     if "time" not in tree.coords or tree.sizes["time"] == 0:
         return NOTHING
     times, values = line(tree, ("time", name), extent, window)
-    finite = values[np.isfinite(values)]
-    scale = scale_for(float(np.max(np.abs(finite), initial=0.0)), UNITS[name])
-    label = "time" if origin == 0 else f"time after {with_unit(origin, 's', 5)}"
+    scale = scale_for(_largest(values), UNITS[name])
     return Line(
-        (times - origin) / along.size,
-        values / scale.size,
-        along.label(label),
-        scale.label(NAMES[name]),
+        times / along.size, values / scale.size, along.label("time"), scale.label(NAMES[name])
     )
 
 
@@ -218,11 +239,22 @@ def _close_up(tree: xr.DataTree) -> tuple[Line, Line]:
         return NOTHING, NOTHING
     along = scale_for(window[1] - window[0], "s")
     extent = Extent(0, *window, parts=PARTS)
+    lines = [
+        line(tree, ("time", name), extent, window) for name in (force_of(tree), "contact_force")
+    ]
+    # Two lines on one axis are in one unit.
+    scale = scale_for(max(_largest(values) for _, values in lines), "N")
+    labels = along.label(f"time after {with_unit(window[0], 's', 5)}"), scale.label("force")
     spring, contact = (
-        _line(tree, name, extent, window, along, window[0])
-        for name in (force_of(tree), "contact_force")
+        Line((times - window[0]) / along.size, values / scale.size, *labels)
+        for times, values in lines
     )
     return spring, contact
+
+
+def _largest(values: Array) -> float:
+    """Largest size of those that are finite."""
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
@@ -241,21 +273,59 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
     return Lattice(times, times / along.size, loads, largest[:-1])
 
 
+class Theories:
+    """What theory says of the configurations that were looked at last, so that it is not computed
+    again when a knob goes back, or one is turned that it does not depend on.
+    """
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[str, Theory] = OrderedDict()
+
+    def known(self, config: Config) -> Theory | None:
+        """What theory says of a configuration, if it was computed before."""
+        return self._known.get(_depends_on(config))
+
+    def compute(self, config: Config) -> Iterator[Theory]:
+        """What theory says of a configuration: first the curve alone, which comes soon."""
+        shown = curve_alone(config)
+        yield shown
+        shown = with_steady_sliding(config, shown)
+        self._known[_depends_on(config)] = shown
+        while len(self._known) > MOST_THEORIES:
+            self._known.popitem(last=False)
+        yield shown
+
+
+def _depends_on(config: Config) -> str:
+    """What theory depends on, as text."""
+    return config.model_dump_json(exclude={"title": True, "run": True, "output": True})
+
+
 def theory(config: Config) -> Theory:
     """What theory says of a configuration."""
-    sliding = steady_sliding(config, MOST_WORK)
-    told = [] if sliding is None or sliding.told is None else [sliding.told]
-    numbers = []
-    if sliding is not None:
-        numbers.append(("steady force", with_unit(sliding.force, "N", 4)))
+    return with_steady_sliding(config, curve_alone(config))
+
+
+def curve_alone(config: Config) -> Theory:
+    """The force curve and what follows from it, without steady sliding."""
     try:
         curve = ForceCurve(_quick(config))
-        drawn, spring, critical, more, verdict = _curve(config, curve)
+        drawn, spring, critical, numbers, verdict = _curve(config, curve)
     except MesoslipError as error:
-        return Theory(NOTHING, NOTHING, None, "; ".join([str(error), *told]), tuple(numbers))
+        return Theory(NOTHING, NOTHING, None, str(error), ())
     if config.interaction is not None and config.interaction.strength > 0:
         verdict = f"without interaction, which the curve cannot have: {verdict}"
-    return Theory(drawn, spring, critical, "; ".join([verdict, *told]), (*more, *numbers))
+    return Theory(drawn, spring, critical, verdict, numbers)
+
+
+def with_steady_sliding(config: Config, curve: Theory) -> Theory:
+    """What is known of the curve, and of the stability of steady sliding."""
+    sliding = steady_sliding(config, MOST_WORK)
+    if sliding is None:
+        return curve
+    told = [curve.told, *([] if sliding.told is None else [sliding.told])]
+    numbers = (*curve.numbers, ("steady force", with_unit(sliding.force, "N", 4)))
+    return replace(curve, told="; ".join(told), numbers=numbers)
 
 
 def _quick(config: Config) -> Config:
@@ -274,7 +344,7 @@ def _curve(
     x = np.unique(np.clip([*np.linspace(0, end, CURVE_POINTS), *marked], samples[0], end))
     force = curve.force(x)
     across, along = scale_for(end, "m"), scale_for(float(np.nanmax(np.abs(force))), "N")
-    labels = across.label("displacement"), along.label("force of the contacts")
+    labels = across.label("displacement"), along.label("force")
     drawn = Line(x / across.size, force / along.size, *labels)
     numbers = [("K*", with_unit(curve.K_star[0], "N/m", 4))]
     stiffness = config.spring_stiffness

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import webbrowser
 from collections.abc import Awaitable, Callable
+from importlib.resources import files
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -36,9 +38,7 @@ POLICY = (
     "frame-ancestors 'none'; form-action 'none'; base-uri 'none'"
 )
 TEMPLATE = Environment(autoescape=False).from_string(
-    """{% extends base %}
-{% block preamble %}<style>body { font-family: sans-serif; margin: 8px }</style>{% endblock %}
-"""
+    files("mesoslip.explorer").joinpath("page.html").read_text("utf-8")
 )
 
 
@@ -71,6 +71,8 @@ class OnlyHere(AuthProvider):
             raise HTTPError(403)
         handler.set_header("Content-Security-Policy", POLICY)
         handler.set_header("X-Content-Type-Options", "nosniff")
+        # A browser that keeps the page for its way back keeps its runs going, too.
+        handler.set_header("Cache-Control", "no-store")
         return "here"
 
 
@@ -116,6 +118,10 @@ def serve(
 
 def make_server(config: Config, source: str, port: int) -> Server:
     """A server of the page that is not started; see `serve`."""
+    # What is there stays: the collector of garbage, which runs after each change, leaves it alone.
+    gc.collect()
+    gc.freeze()
+
     # What the library has to say is for its own developers.
     logging.getLogger("bokeh").setLevel(logging.CRITICAL)
     logging.getLogger("tornado").setLevel(logging.CRITICAL)

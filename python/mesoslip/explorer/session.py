@@ -7,7 +7,7 @@ import shlex
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import text_of
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError, MesoslipError, Problem
 from mesoslip.explorer.controls import BY_KEY, COUNTED, FOR_TABLES, NONE, values
 
 
@@ -102,11 +102,11 @@ class Session:
         needed = BY_KEY[key].beside
         mine = {one for keys in needed.values() for one in keys}
         known = self._at_start
-        if key in FOR_TABLES and key not in self.changes and known[key] == NONE:
-            # The table is gone with all that stands in it.
-            for one in mine:
+        if key in FOR_TABLES:
+            # What stands in a table goes with it, and with the choice that it belongs to.
+            for one in mine.difference(needed.get(text, {})):
                 self.changes.pop(one, None)
-        elif key not in FOR_TABLES:
+        else:
             kept = SLIDERS[text].model_fields if text in SLIDERS else {}
             for one in list(self.changes):
                 table, _, name = one.partition(".")
@@ -114,7 +114,8 @@ class Session:
                     del self.changes[one]
         if key in self.changes:
             for one, value in needed.get(text, {}).items():
-                is_given = known.get(key) != NONE if key in FOR_TABLES else one in known
+                # What goes with a table is given only if the table is.
+                is_given = one in known and (key not in FOR_TABLES or known[key] != NONE)
                 if not is_given:
                     self.changes.setdefault(one, value)
 
@@ -142,6 +143,8 @@ class Session:
                 self.problems[key] = "; ".join(
                     part for part in (self.problems.get(key), told) if part
                 )
+        except MesoslipError as error:
+            self.problems[last] = str(error)
         else:
             self.values = values(self.config)
             # What is written otherwise, as 500 us for 0.5 ms, is not changed.

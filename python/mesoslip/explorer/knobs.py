@@ -1,0 +1,123 @@
+"""The knobs of the page: a field, a slider, and what is wrong with a value."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+from bokeh.layouts import column, row
+from bokeh.models.ui import UIElement
+from bokeh.models.widgets import Div, Select, Slider, TextInput
+
+from mesoslip.explorer.controls import NONE, STEPS, Control
+from mesoslip.explorer.session import Session
+
+# Widths of a knob, and of its field [px].
+WIDTH, FIELD_WIDTH = 260, 104
+# Low fields, with a title that may be longer than the field.
+FLAT = """
+.bk-input { height: 26px; min-height: 26px; padding: 0 6px; }
+label, .bk-input-group > label { white-space: nowrap; overflow: visible; }
+"""
+CHANGED: dict[str, str | None] = {"background-color": "#fff3cd", "border-radius": "4px"}
+# A style that is only left out stays as it was in the browser.
+UNCHANGED: dict[str, str | None] = {"background-color": "transparent", "border-radius": "4px"}
+RED: dict[str, str | None] = {"color": "#b00020"}
+PLAIN: dict[str, str | None] = {"color": "inherit"}
+
+
+def set_changed(model: Any, **properties: Any) -> None:
+    """Set properties of a model that are not so already, as each of them is sent to
+    the browser, which then draws it anew.
+    """
+    for name, value in properties.items():
+        if getattr(model, name) != value:
+            setattr(model, name, value)
+
+
+class ControlView:
+    """A control on the page: a slider or a choice, the value as text, and what is wrong with it."""
+
+    def __init__(self, control: Control, session: Session, change: Callable[[str, str], None]):
+        self.control, self._session, self._change = control, session, change
+        # What the page shows: a change to that is no wish of a person.
+        self._text, self._position = "", 0.0
+        self._scale = None if control.choices else control.scale(_number(session, control.key))
+        self.message = Div(
+            visible=False, styles=RED, name=f"{control.key}:message", width=WIDTH - 10
+        )
+        self._field: Select | TextInput
+        self._slider: Slider | None = None
+        if self._scale is None:
+            options: list[Any] = [
+                (one, control.told.get(one, one))
+                for one in control.choices
+                if one != NONE or self._may_lack
+            ]
+            self._field = Select(
+                options=options,
+                name=control.key,
+                width=WIDTH,
+                margin=0,
+                stylesheets=[FLAT],
+            )
+            parts: list[UIElement] = [self._field]
+        else:
+            self._field = TextInput(
+                name=control.key, width=FIELD_WIDTH, margin=0, stylesheets=[FLAT]
+            )
+            self._slider = Slider(
+                start=0,
+                end=STEPS,
+                step=1,
+                value=0,
+                show_value=False,
+                title="",
+                name=f"{control.key}:slider",
+                width=WIDTH - FIELD_WIDTH - 22,
+                # Beside the field, which has a title above it.
+                margin=(22, 8, 0, 14),
+            )
+            self._slider.on_change("value", self._moved)
+            parts = [row(self._field, self._slider)]
+        self._field.on_change("value", self._typed)
+        self.layout = column(*parts, self.message, name=f"{control.key}:control", width=WIDTH)
+        self.show()
+
+    @property
+    def _may_lack(self) -> bool:
+        return self._session.start_text(self.control.key) == NONE
+
+    def _moved(self, _attribute: str, _old: Any, position: float) -> None:
+        if position != self._position and self._scale is not None:
+            self._change(self.control.key, self.control.text(self._scale.value(position)))
+
+    def _typed(self, _attribute: str, _old: Any, text: str) -> None:
+        if text != self._text:
+            self._change(self.control.key, text)
+
+    def show(self) -> None:
+        """Show the value, whether it is changed, and what is wrong with it."""
+        session, key = self._session, self.control.key
+        is_changed = session.is_changed(key)
+        before = session.start_text(key) or "not given"
+        self._text = session.text(key)
+        set_changed(self._field, title=self.control.label + (f" ● was {before}" * is_changed))
+        set_changed(self._field, value=self._text)
+        set_changed(self.layout, styles=CHANGED if is_changed else UNCHANGED)
+        value = _number(session, key)
+        if self._slider is not None and self._scale is not None and key not in session.problems:
+            self._position = self._slider.value
+            # Where a hand has put it, it stays: the text is rounded, and further on already.
+            is_there = self.control.text(self._scale.value(self._position)) == self._text
+            if isinstance(value, int | float) and not is_there:
+                self._position = self._scale.position(float(value))
+            set_changed(self._slider, value=self._position)
+        told = session.problems.get(key, "")
+        set_changed(self.message, text=html.escape(told), visible=bool(told))
+        set_changed(self.layout, visible=key in session.shown)
+
+
+def _number(session: Session, key: str) -> object:
+    return session.values.get(key)

@@ -296,6 +296,13 @@ def test_most_thresholds_are_above_the_back_force():
         )
     )
     assert "only 0.465 of the thresholds are above the back force" in message
+    young = {"law": "relax", "time": 1e-3, "young_force_ratio": 0.5, "young_relative_width": 0.01}
+    (message,) = problems(
+        klein_tables(
+            contacts__coupling="equal", contacts__ageing=young, contacts__back_force_ratio=0.9
+        )
+    )
+    assert "back_force_ratio: only 0 of the thresholds of young contacts" in message
 
 
 def test_everything_wrong_is_told_at_once():

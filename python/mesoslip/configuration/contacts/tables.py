@@ -81,7 +81,9 @@ class Threshold(Table):
 
     def probability_above(self, threshold: float) -> float:
         """Probability that a draw of the law is above a relative threshold."""
-        return ThresholdLaw(self.law, self.relative_width, threshold).acceptance
+        # A law cut off there would not exist if there were none.
+        law = ThresholdLaw(self.law, self.relative_width)
+        return law.acceptance * float(law.survival(threshold))
 
 
 class Ageing(Table):

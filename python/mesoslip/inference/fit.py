@@ -150,7 +150,7 @@ def fit(
         predicted.append(summarizer(one))
     agreement = compare(summarizer.features, estimate.summaries, np.array(predicted), observed)
     information = informed_by(
-        summarizer.features, estimate.parameters, estimate.summaries, observed, rng
+        summarizer.features, estimate.parameters, estimate.summaries, observed
     )
     return Fitted(
         plan,

@@ -462,6 +462,35 @@ def test_a_trace_may_count_from_a_time_on():
     assert np.isfinite(made.summaries[:, :3]).all()
 
 
+def test_a_trace_of_several_stages_may_start_at_any_time():
+    """Simulations follow the stages from the first sample on."""
+    stages = [
+        {"duration": 2.0, "velocity": 1e-7},
+        {"duration": 0.5, "velocity": 0.0},
+        {"duration": 1.5, "velocity": 2e-7},
+    ]
+    drive = {"run__duration": None, "drive": {"stage": stages}}
+    tree = experiment(**drive)
+    later = tree.copy()
+    later.dataset = tree.to_dataset().assign_coords(time=tree["time"] + 100.0)
+    tables = klein_tables(**SMALL | drive)
+    tables["fit"] = fit_tables()["fit"]
+    plan = Plan.from_dict(tables)
+    simulator, force = prepare(later, plan)
+    np.testing.assert_array_equal(force, tree["spring_force"].values[0])
+    np.testing.assert_allclose(simulator.summarizer.time, tree["time"], atol=1e-9)
+    made = simulator.force(3, plan.prior.unit(np.array([18e-6, 1e-3])))
+    first = np.searchsorted(tree["time"], 0.95 * mesoslip.slips(tree)["start_time"].values[0])
+    assert np.max(np.abs(made - force)[:first]) < 6 * NOISE
+    # In the hold the force changes by ringing and noise only; before and after, by the drive.
+    held = (tree["time"].values > 2.2) & (tree["time"].values < 2.5)
+    assert np.ptp(made[held]) < 15 * NOISE
+    with pytest.raises(
+        FileError, match=r"takes 5 s, and the run of the configuration ends after 4"
+    ):
+        prepare(experiment(run__duration=5.0), plan)
+
+
 def test_a_trace_without_noise_is_given_some():
     tables = fit_tables()
     del tables["fit"]["noise"]

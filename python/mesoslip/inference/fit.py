@@ -189,6 +189,11 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
             + (f" after {plan.after:g} s" if skipped else "")
             + f"; a fit needs at least {LEAST_SAMPLES}"
         )
+    if plan.config.drive.parts and plan.config.duration < (len(force) - 1.5) * interval:
+        raise FileError(
+            f"the trace takes {(len(force) - 1) * interval:g} s, and the run of the configuration "
+            f"ends after {plan.config.duration:g} s: give [drive] the stages of the whole trace"
+        )
     changes: dict[str, Any] = {
         "run": {"engine": "eq", "realizations": 1},
         "output": {"interval": interval},

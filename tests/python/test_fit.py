@@ -75,7 +75,7 @@ class Linear:
         self.summaries = np.concatenate([self.summaries, self.simulate(points)])
 
 
-def linear_problem(seed, total=300):
+def linear_problem(seed, total=400):
     """The truth, the estimate, and mean and standard deviations of the exact posterior."""
     rng = np.random.default_rng(seed)
     matrix = rng.standard_normal((12, 2))
@@ -135,6 +135,38 @@ def test_draws_are_of_the_density():
     # A half-normal one.
     assert np.mean(draws[:, 1]) == pytest.approx(0.2 * np.sqrt(2 / np.pi), rel=0.06)
     assert np.max(r_hat(chains)) < 1.02
+
+
+def test_statistics_of_a_simulation_come_from_all_others(monkeypatch):
+    """Against regressions that leave it out."""
+    rng = np.random.default_rng(6)
+    scores, parameters = rng.standard_normal((30, 8)), rng.random((30, 2))
+    parameters[:, 0] += scores[:, 0]
+    monkeypatch.setattr(likelihood, "RIDGES", np.array([0.1]))
+    left_out = likelihood._ridge(scores, parameters)[2]
+    # The penalty grows with the number of simulations.
+    monkeypatch.setattr(likelihood, "RIDGES", np.array([0.1 * 30 / 29]))
+    for one in (0, 7, 29):
+        weights, offset, _ = likelihood._ridge(
+            np.delete(scores, one, axis=0), np.delete(parameters, one, axis=0)
+        )
+        np.testing.assert_allclose(left_out[one], scores[one] @ weights + offset)
+
+
+def test_statistics_of_a_trace_scatter_as_those_of_simulations():
+    """Of few simulations with many summaries, where what they are predicted by matters most."""
+    ratios = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        matrix = rng.standard_normal((60, 2))
+        made = Linear(matrix, 4.0, seed)
+        parameters, others = rng.random((120, 2)), rng.random((400, 2))
+        projection, statistics = likelihood.project(
+            made.simulate(parameters), parameters, np.zeros(60)
+        )
+        new = projection(made.simulate(others)) - others
+        ratios.append(np.var(new, axis=0) / np.var(statistics - parameters, axis=0))
+    assert np.mean(ratios) == pytest.approx(1, abs=0.04)
 
 
 def test_the_likelihood_learns_means_widths_and_tails():
@@ -428,6 +460,35 @@ def test_a_trace_may_count_from_a_time_on():
     made = Simulations(simulator, simulator.summarizer(force), expected=4, workers=1)
     made.add(np.full((2, 2), 0.5))
     assert np.isfinite(made.summaries[:, :3]).all()
+
+
+def test_a_trace_of_several_stages_may_start_at_any_time():
+    """Simulations follow the stages from the first sample on."""
+    stages = [
+        {"duration": 2.0, "velocity": 1e-7},
+        {"duration": 0.5, "velocity": 0.0},
+        {"duration": 1.5, "velocity": 2e-7},
+    ]
+    drive = {"run__duration": None, "drive": {"stage": stages}}
+    tree = experiment(**drive)
+    later = tree.copy()
+    later.dataset = tree.to_dataset().assign_coords(time=tree["time"] + 100.0)
+    tables = klein_tables(**SMALL | drive)
+    tables["fit"] = fit_tables()["fit"]
+    plan = Plan.from_dict(tables)
+    simulator, force = prepare(later, plan)
+    np.testing.assert_array_equal(force, tree["spring_force"].values[0])
+    np.testing.assert_allclose(simulator.summarizer.time, tree["time"], atol=1e-9)
+    made = simulator.force(3, plan.prior.unit(np.array([18e-6, 1e-3])))
+    first = np.searchsorted(tree["time"], 0.95 * mesoslip.slips(tree)["start_time"].values[0])
+    assert np.max(np.abs(made - force)[:first]) < 6 * NOISE
+    # In the hold the force changes by ringing and noise only; before and after, by the drive.
+    held = (tree["time"].values > 2.2) & (tree["time"].values < 2.5)
+    assert np.ptp(made[held]) < 15 * NOISE
+    with pytest.raises(
+        FileError, match=r"takes 5 s, and the run of the configuration ends after 4"
+    ):
+        prepare(experiment(run__duration=5.0), plan)
 
 
 def test_a_trace_without_noise_is_given_some():

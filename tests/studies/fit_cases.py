@@ -75,30 +75,41 @@ def smooth() -> Any:
 
 
 def rate_and_state() -> Any:
-    """Stick-slip of a slider on a rate-and-state interface with Dieterich's ageing law.
+    """Stick-slip of Klein's slider on a rate-and-state interface with Dieterich's ageing law.
 
-    Quasi-dynamic, as earthquake cycles are simulated: drag in the place of inertia.
+    Spring, inertia and damping as in the model; mu = mu_0 + a ln(v/v_0) + b ln(v_0 age/L), and
+    the stiffness well below (b - a)/L times the normal force, where sliding is unstable.
     """
     from scipy.integrate import solve_ivp
 
-    stiffness, drive, normal, drag = 97.0, 1e-7, 30e-6, 0.2
+    mass, stiffness, drive, normal = 1.47e-3, 97.0, 1e-7, 30e-6
+    damping = 0.2 * np.sqrt(stiffness / mass)
     a, b, length, reference = 0.01, 0.03, 1.5e-9, 0.6
 
+    def friction(log_velocity: float, log_age: float) -> float:
+        direct = a * (log_velocity - np.log(drive))
+        return normal * (reference + direct + b * (log_age + np.log(drive / length)))
+
     def rates(_: float, state: np.ndarray) -> list[float]:
-        log_velocity, log_age = state
+        spring, log_velocity, log_age = state
         velocity = np.exp(log_velocity)
+        force = spring - friction(log_velocity, log_age) - mass * damping * velocity
         ageing = np.exp(-log_age) - velocity / length
-        growth = stiffness * (drive - velocity) - normal * b * ageing
-        return [growth / (normal * a + drag * velocity), ageing]
+        return [stiffness * (drive - velocity), force / (mass * velocity), ageing]
 
     time_ = np.arange(12001) * 1e-3
-    start = [np.log(1e-14), np.log(1.0)]
-    solved = solve_ivp(rates, (0, 12), start, "LSODA", time_, rtol=1e-8, atol=1e-9)
-    velocity = np.exp(solved.y[0])
-    friction = reference + a * np.log(velocity / drive)
-    friction += b * (solved.y[1] + np.log(drive / length))
-    force = normal * friction + drag * velocity
-    return with_force(time_, force - force[0])
+    # The spring is relaxed at first. Below a creep far slower than the drive it is only loaded.
+    log_velocity, log_age = np.log(1e-14), 0.0
+    creeping = friction(log_velocity, log_age)
+    force = stiffness * drive * time_
+    is_moving = force > creeping
+    since = time_[is_moving] - creeping / (stiffness * drive)
+    start = [creeping, log_velocity, log_age]
+    solved = solve_ivp(
+        rates, (0, since[-1]), start, "Radau", since, rtol=1e-6, atol=[1e-12, 1e-7, 1e-7]
+    )
+    force[is_moving] = solved.y[0]
+    return with_force(time_, force)
 
 
 CASES: dict[str, tuple[Callable[[], Any], dict[str, Any], dict[str, Any]]] = {

@@ -171,7 +171,6 @@ def informed_by(
     parameters: Array,
     summaries: Array,
     observed: Array,
-    rng: np.random.Generator,
 ) -> dict[str, Array]:
     """What each group of summaries alone tells of each parameter.
 
@@ -183,8 +182,6 @@ def informed_by(
         Of simulations near the posterior.
     observed
         Summaries of the trace.
-    rng
-        Random numbers.
 
     Returns
     -------
@@ -198,7 +195,7 @@ def informed_by(
         masked = np.where(inside, observed, np.nan)
         if not np.isfinite(masked).any():
             continue
-        statistics = project(summaries, parameters, masked, rng)[1]
+        statistics = project(summaries, parameters, masked)[1]
         left = np.var(statistics - parameters, axis=0) / np.var(parameters, axis=0)
         result[group] = np.clip(1 - left, 0, 1)
     return result

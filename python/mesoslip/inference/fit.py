@@ -150,7 +150,7 @@ def fit(
         predicted.append(summarizer(one))
     agreement = compare(summarizer.features, estimate.summaries, np.array(predicted), observed)
     information = informed_by(
-        summarizer.features, estimate.parameters, estimate.summaries, observed, rng
+        summarizer.features, estimate.parameters, estimate.summaries, observed
     )
     return Fitted(
         plan,
@@ -188,6 +188,11 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
             f"the trace has {max(len(force) - skipped, 0)} samples"
             + (f" after {plan.after:g} s" if skipped else "")
             + f"; a fit needs at least {LEAST_SAMPLES}"
+        )
+    if plan.config.drive.parts and plan.config.duration < (len(force) - 1.5) * interval:
+        raise FileError(
+            f"the trace takes {(len(force) - 1) * interval:g} s, and the run of the configuration "
+            f"ends after {plan.config.duration:g} s: give [drive] the stages of the whole trace"
         )
     changes: dict[str, Any] = {
         "run": {"engine": "eq", "realizations": 1},

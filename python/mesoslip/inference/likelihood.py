@@ -8,9 +8,9 @@ In two steps, each a regression on simulations near the parameters that matter:
 2. **Synthetic likelihood** (Wood 2010, Nature 466, 1102). The statistics of a trace are normal with
    a mean that is a polynomial of the parameters, and a covariance that grows or shrinks with them.
 
-What a simulation's own statistics are predicted by is fitted without it (cross-fitting), so the
-covariance is not too small; the uncertainty of the polynomial is part of the covariance; and what
-the polynomial cannot follow is, as a part of the residuals, too.
+A simulation's own statistics are predicted by a regression of all others, and those of the trace by
+one of all simulations, so both scatter alike. The uncertainty of the polynomial is part of the
+covariance; and what the polynomial cannot follow is, as a part of the residuals, too.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-FOLDS = 5
 # Summaries beyond this many spreads of the simulations are cut off there.
 LARGEST_SCORE = 6.0
-RIDGES = np.geomspace(1e-4, 1e4, 33)
+RIDGES = np.geomspace(1e-6, 1e2, 33)
+# Influence of a simulation on its own statistics, beyond which nothing is left without it.
+LARGEST_LEVERAGE = 1 - 1e-6
 # Simulations for each coefficient before the polynomial is given one more degree.
 SIMULATIONS_PER_TERM = 8
 # Degrees of freedom of tails that are tried, beside normal ones.
@@ -83,9 +84,7 @@ def usable(summaries: Array, observed: Array) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(observed) & most)
 
 
-def project(
-    summaries: Array, parameters: Array, observed: Array, rng: np.random.Generator
-) -> tuple[Projection, Array]:
+def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Projection, Array]:
     """Learn statistics from simulations.
 
     Parameters
@@ -96,14 +95,12 @@ def project(
         Shape (simulations, parameters).
     observed
         Summaries of the trace.
-    rng
-        For the folds.
 
     Returns
     -------
     projection, statistics
-        The statistics, averaged over the folds; and those of each simulation, shape (simulations,
-        parameters), by the folds that do not have it.
+        The statistics; and those of each simulation, shape (simulations, parameters), by the
+        regression of all others.
     """
     used = usable(summaries, observed)
     values = summaries[:, used]
@@ -119,37 +116,35 @@ def project(
     has_squares = count > 4 * centre.size
     empty = Projection(used, centre, spread, np.empty(0), np.empty(0), has_squares)
     scores = _with_squares(empty.scores(summaries), has_squares)
-    fold = rng.permutation(count) % FOLDS
-    statistics = np.empty_like(parameters)
-    weights, offsets = [], []
-    for one in range(FOLDS):
-        inside = fold != one
-        weight, offset = _ridge(scores[inside], parameters[inside])
-        statistics[~inside] = scores[~inside] @ weight + offset
-        weights.append(weight)
-        offsets.append(offset)
-    projection = Projection(
-        used, centre, spread, np.mean(weights, axis=0), np.mean(offsets, axis=0), has_squares
-    )
-    return projection, statistics
+    weights, offset, statistics = _ridge(scores, parameters)
+    return Projection(used, centre, spread, weights, offset, has_squares), statistics
 
 
-def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array]:
-    """Ridge regression; the penalty of each parameter by generalized cross-validation."""
+def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array, Array]:
+    """Ridge regression; the penalty of each parameter by leaving out one simulation at a time.
+
+    Returns
+    -------
+    weights, offset, left_out
+        Of the regression; and what it predicts of each simulation when it is not in it.
+    """
     middle, mean = scores.mean(axis=0), parameters.mean(axis=0)
     left, sizes, right = np.linalg.svd(scores - middle, full_matrices=False)
     along = left.T @ (parameters - mean)
-    total = np.sum((parameters - mean) ** 2, axis=0)
     count = len(scores)
     weights = np.empty((scores.shape[1], parameters.shape[1]))
-    shrunk = sizes**2 / (sizes**2 + count * RIDGES[:, None] * 1e-2)
-    freedom = 1 + shrunk.sum(axis=1)
+    left_out = np.empty_like(parameters)
+    shrunk = sizes**2 / (sizes**2 + count * RIDGES[:, None])
+    # Influence of each simulation on what is predicted of itself, shape (simulations, ridges).
+    leverage = np.minimum(1 / count + left**2 @ shrunk.T, LARGEST_LEVERAGE)
     for place in range(parameters.shape[1]):
-        kept = (1 - (1 - shrunk) ** 2) @ along[:, place] ** 2
-        error = (total[place] - kept) / np.maximum(1 - freedom / count, 1e-3) ** 2
-        best = shrunk[int(np.argmin(error))]
-        weights[:, place] = right.T @ (best / np.maximum(sizes, 1e-300) * along[:, place])
-    return weights, mean - middle @ weights
+        predicted = mean[place] + left @ (shrunk * along[:, place]).T
+        without = predicted - parameters[:, [place]]
+        without = without / (1 - leverage) + parameters[:, [place]]
+        best = int(np.argmin(np.sum((without - parameters[:, [place]]) ** 2, axis=0)))
+        left_out[:, place] = without[:, best]
+        weights[:, place] = right.T @ (shrunk[best] / np.maximum(sizes, 1e-300) * along[:, place])
+    return weights, mean - middle @ weights, left_out
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,7 @@ def fit_region(
     order = np.argsort(~valid, kind="stable")
     parameters, summaries = parameters[order], summaries[order]
     count = int(valid.sum())
-    projection, statistics = project(summaries[:count], parameters[:count], observed, rng)
+    projection, statistics = project(summaries[:count], parameters[:count], observed)
     surrogate = learn(statistics, parameters[:count], parameters)
     target = projection(observed)
 

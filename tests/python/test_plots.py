@@ -275,7 +275,7 @@ def test_several_outputs_say_how_they_differ(runs):
     ("given", "options", "told"),
     [
         (["several"], {"realization": 3}, "no realization 3; the last one is 2"),
-        (["plain"], {"start": 3.0}, "from 3 s to inf s: the run goes from 0 s to 2.2 s"),
+        (["plain"], {"start": 3.0}, "from 3 s on: the run goes from 0 s to 2.2 s"),
         (["plain"], {"start": 2.0, "end": 1.0}, "2 s is not before 1 s"),
         (["plain"], {"x": "force"}, "choose of time, displacement, drive"),
         (["plain"], {"view": "layers"}, "output.layers = true"),

@@ -55,18 +55,15 @@ def slips(
             f"{_known(row['contacts_broken'], 1.0, '8.0f')}"
         )
     typer.echo(f"{len(rows)} slip{'s' if len(rows) != 1 else ''}")
-    if len(rows) == 1:
-        return
     for name, (scale, unit) in SHOWN.items():
         if name in statistics:
             mean, deviation, least, greatest = (
                 scale * statistics[name][what]
                 for what in ("mean", "standard_deviation", "minimum", "maximum")
             )
-            typer.echo(
-                f"{name:16} mean {mean:.5g}, standard deviation {deviation:.2g}, "
-                f"from {least:.5g} to {greatest:.5g} {unit}".rstrip()
-            )
+            spread = f", standard deviation {deviation:.2g}, from {least:.5g} to {greatest:.5g}"
+            told = f"{name:16} mean {mean:.5g}{spread if least < greatest else ''} {unit}"
+            typer.echo(told.rstrip())
 
 
 def avalanches(

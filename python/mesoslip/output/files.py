@@ -506,7 +506,8 @@ def is_of_another(path: Path, config: Config) -> bool:
     try:
         with netCDF4.Dataset(path) as file:
             return bool(file.getncattr("configuration") != config.to_toml())
-    except (OSError, AttributeError):
+    # There is none, it is another kind of file, or its name is none that the library takes.
+    except (OSError, AttributeError, UnicodeError):
         return False
 
 

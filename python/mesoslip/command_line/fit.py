@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +15,6 @@ from mesoslip.command_line.signals import stopped_by_signals
 
 # Units in which parameters are shown, by their SI unit: scales from the greatest to the least.
 SCALES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
-# Digits of a number at least.
-LEAST_DIGITS = 3
 # What prefixes go with.
 PREFIXED = {"N", "N/m", "s", "m", "m/s", "Pa"}
 
@@ -111,7 +109,7 @@ def _show(rows: list[Any], told: Mapping[Any, Any]) -> None:
     )
     for row in rows:
         scale, unit = _scale(row.percentiles[2], row.unit)
-        digits = _digits(row.percentiles)
+        digits = row.digits
         low, lower, middle, upper, high = (f"{one / scale:.{digits}g}" for one in row.percentiles)
         typer.echo(
             f"{row.key:{width}} {middle:>9}  {lower + ' - ' + upper:>19}  {low + ' - ' + high:>19} "
@@ -121,15 +119,6 @@ def _show(rows: list[Any], told: Mapping[Any, Any]) -> None:
         f"noise {1e6 * told['noise']:.3g} uN; {told['simulation_count']} simulations; agreement of "
         f"the model with the trace p = {told['agreement_probability']:.2g}"
     )
-
-
-def _digits(percentiles: Sequence[float]) -> int:
-    """Digits that tell the ends of an interval apart."""
-    low, high = percentiles[0], percentiles[-1]
-    size = max(abs(low), abs(high))
-    if size == 0 or high <= low:
-        return LEAST_DIGITS
-    return max(LEAST_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
 
 
 def _scale(value: float, unit: str) -> tuple[float, str]:

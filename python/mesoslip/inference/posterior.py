@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,10 @@ VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
 
 
+# Digits of values in a table at the least.
+LEAST_DIGITS = 3
+
+
 @dataclass(frozen=True)
 class Row:
     """A parameter in the table of a fit, in SI."""
@@ -39,6 +44,15 @@ class Row:
     shrinkage: float
     verdict: str
     informed_by: str
+
+    @property
+    def digits(self) -> int:
+        """Digits that tell the ends of the 90 % interval apart."""
+        low, high = self.percentiles[0], self.percentiles[-1]
+        size = max(abs(low), abs(high))
+        if size == 0 or high <= low:
+            return LEAST_DIGITS
+        return max(LEAST_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
 
 
 def build_tree(fitted: Fitted) -> xr.DataTree:

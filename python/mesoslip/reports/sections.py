@@ -467,7 +467,7 @@ def parameters(subjects: Sequence[Subject]) -> Section | None:
         rows = []
         for row in posterior.table(subject.tree):
             low, lower, middle, upper, high = (
-                with_unit(value, row.unit, 4) for value in row.percentiles
+                with_unit(value, row.unit, row.digits) for value in row.percentiles
             )
             intervals = (f"{lower} to {upper}", f"{low} to {high}")
             rows.append((row.key, middle, *intervals, row.verdict, row.informed_by))

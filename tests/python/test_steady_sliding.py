@@ -194,6 +194,11 @@ def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
         sliding = SteadySliding(config.replace({"slider.stiffness": factor * most}))
         assert sliding.is_stable_out_of_step == is_stable
     assert stable_stiffness(klein(contacts__delay=0.0)) is None
+    # So long a delay feeds oscillations of the stiffest spring.
+    long = klein(contacts__delay=1e-2)
+    stiffest = long.replace({"slider.stiffness": 16 * long.contacts.stiffness})
+    assert not SteadySliding(stiffest).is_stable
+    assert stable_stiffness(long) is None
     file = tmp_path / "klein.toml"
     file.write_text(config.to_toml())
     told = command("curve", file)[1]

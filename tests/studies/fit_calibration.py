@@ -24,23 +24,12 @@ from mesoslip.inference.plan import Plan
 from mesoslip.inference.rounds import close_in
 from mesoslip.inference.simulations import Simulations
 
+ROOT = Path(__file__).parents[2]
 NOISE = 5e-8
 TABLES = {
+    "base": str(ROOT / "runs" / "klein.toml"),
     "run": {"duration": 6.0},
-    "drive": {"velocity": 1e-7},
-    "slider": {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2},
-    "contacts": {
-        "count": 800,
-        "area": 1e-10,
-        "film_thickness": 3.5e-9,
-        "film_density": 956.0,
-        "static_force": 18e-6,
-        "stiffness": 2000.0,
-        "drag_rate": 2e11,
-        "delay": 5e-4,
-        "back_force_ratio": 0.1,
-        "threshold": {"law": "gaussian", "relative_width": 0.01},
-    },
+    "contacts": {"count": 800},
     "output": {"interval": 2e-3},
     "fit": {
         "noise": NOISE,

@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 PERCENTILES = (5.0, 25.0, 50.0, 75.0, 95.0)
 VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
-
-
 # Digits of values in a table at the least.
 LEAST_DIGITS = 3
 

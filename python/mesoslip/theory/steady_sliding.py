@@ -646,8 +646,7 @@ def stability_boundary(
     """
 
     def is_stable(logarithm: float) -> bool:
-        sliding = SteadySliding(config.replace({key: math.exp(logarithm)}))
-        return sliding.is_stable_out_of_step if out_of_step else sliding.is_stable
+        return _is_stable(config, key, math.exp(logarithm), out_of_step=out_of_step)
 
     from scipy import optimize
 
@@ -659,6 +658,11 @@ def stability_boundary(
         lambda place: 1.0 if is_stable(place) == begins else -1.0, first, last, xtol=tolerance
     )
     return math.exp(found)
+
+
+def _is_stable(config: Config, key: str, value: float, *, out_of_step: bool) -> bool:
+    sliding = SteadySliding(config.replace({key: value}))
+    return sliding.is_stable_out_of_step if out_of_step else sliding.is_stable
 
 
 def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | None:
@@ -679,13 +683,16 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     float or None
         None if sliding is stable with all of these springs, or unstable with the stiffest one.
     """
-    high = STIFFEST * config.contacts.stiffness
-    while high > SOFTEST * config.contacts.stiffness:
-        low = high / 2
-        found = stability_boundary(config, "slider.stiffness", low, high, out_of_step=out_of_step)
-        if found is not None:
-            return found
-        high = low
+    key, stiffest = "slider.stiffness", STIFFEST * config.contacts.stiffness
+    stiffness = stiffest
+    while stiffness > SOFTEST * config.contacts.stiffness:
+        if not _is_stable(config, key, stiffness, out_of_step=out_of_step):
+            if stiffness == stiffest:
+                return None
+            return stability_boundary(
+                config, key, stiffness, 2 * stiffness, out_of_step=out_of_step
+            )
+        stiffness /= 2
     return None
 
 

@@ -115,9 +115,9 @@ $(DOCUMENTATION): $(ENVIRONMENT)
 	@touch $@
 
 # The Fortran tests, without Python, in three profiles.
-build/release/build.ninja: PROFILE := --buildtype=release
-build/debug/build.ninja: PROFILE := --buildtype=debug -Db_lto=false -Dchecks=true
-build/sanitize/build.ninja: PROFILE := --buildtype=debug -Db_lto=false -Db_sanitize=address,undefined \
+build/release/build.ninja: PROFILE := --buildtype=release -Db_lto=true
+build/debug/build.ninja: PROFILE := --buildtype=debug -Dchecks=true
+build/sanitize/build.ninja: PROFILE := --buildtype=debug -Db_sanitize=address,undefined \
   -Db_lundef=false
 build/%/build.ninja: Makefile | $(ENVIRONMENT)
 	@mkdir -p $(@D)

@@ -15,7 +15,7 @@ DOCUMENTATION := $(VENV)/.documentation
 
 # .git/logs/HEAD, as outputs tell the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
-  $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* python/meson.build python/f2cmap) \
+  $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* fortran/*/*/* python/meson.build python/f2cmap) \
   $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
   $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
 
@@ -37,7 +37,7 @@ help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
 	@printf '\nWhat uses what, from left to right (docs/architecture.md tells what to touch to add something):\n'
-	@printf 'fortran/\tnumerics, contacts and sliders, recording, simulation.f90, boundary.f90; theory\n' | expand -t 16
+	@printf 'fortran/\tnumerics, contacts and sliders, recording, loop, boundary.f90; theory\n' | expand -t 16
 	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign, reports and explorer, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build

@@ -32,7 +32,7 @@ subroutine set_contacts(handle, kind, length, names, values, seed, realization, 
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Kind of the contacts, and what they are made of, each number by its name
@@ -63,7 +63,7 @@ subroutine set_slider(handle, kind, length, names, values, status, message)
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    use mesoslip_sliders, only: make_slider
    implicit none
    integer(8), intent(in) :: handle(2)
@@ -92,7 +92,7 @@ subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stag
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of parts; when each ends [s], velocities of the drive at its start and its end [m/s],
@@ -122,7 +122,7 @@ subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, s
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of slips, 0 for any
@@ -156,7 +156,7 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_recorder, only: recorder_parameters_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Interval of the trace, and of the finer traces, 0 for none [s]
@@ -192,7 +192,7 @@ subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, sn
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Least sizes of avalanches in the catalogue and with a snapshot, 0 for none
@@ -228,7 +228,7 @@ subroutine start_simulation(handle, initial, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Code of the initial state of the contacts
@@ -249,7 +249,7 @@ subroutine advance_simulation(handle, most_advances, most_work, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Largest number of advances; work in units of an advance of a rigid slider
@@ -272,7 +272,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Why the run is over, 0 if it is not
@@ -319,7 +319,7 @@ subroutine ask_energy(handle, energy, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Work of the drive; energy of the slider and its spring, of the contacts; losses by damping, by
@@ -342,7 +342,7 @@ subroutine ask_contacts(handle, count, values, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of contacts
@@ -373,7 +373,7 @@ subroutine count_rows(handle, table, columns, rows, status, message)
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_buffer, only: buffer_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Name of the table
@@ -407,7 +407,7 @@ subroutine drain_rows(handle, table, columns, rows, values, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Name of the table
@@ -431,7 +431,7 @@ subroutine save_simulation(handle, length, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of words of the archive
@@ -453,7 +453,7 @@ subroutine fetch_state(handle, length, words, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of words of the archive
@@ -475,7 +475,7 @@ subroutine restore_simulation(handle, length, words, status, message)
    !f2py threadsafe
    use mesoslip_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> The archive

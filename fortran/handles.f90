@@ -6,7 +6,7 @@ module mesoslip_handles
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_ok
    use mesoslip_numerics_kinds, only: i8
-   use mesoslip_simulation, only: simulation_type
+   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    private
 

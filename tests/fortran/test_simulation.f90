@@ -14,7 +14,7 @@ program test_simulation
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_schedule, only: most_events
-   use mesoslip_simulation, only: ending_drive, energy_length, simulation_type
+   use mesoslip_loop_simulation, only: ending_drive, energy_length, simulation_type
    use mesoslip_sliders, only: make_slider
    use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
    use testing, only: check, check_close, finish

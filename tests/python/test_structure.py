@@ -26,12 +26,12 @@ MAY_USE: dict[str, set[str]] = {
         *("contacts", "sliders"),
     },
     "theory": {"numerics", "contacts"},
-    "simulation": {
+    "loop": {
         *("numerics", "interface_law", "schedule", "watch"),
         *("contacts", "sliders", "recording"),
     },
-    "handles": {"numerics", "simulation"},
-    "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "simulation", "handles"},
+    "handles": {"numerics", "loop"},
+    "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "loop", "handles"},
 }
 # The lists of kinds stand beside their folders: what is in a folder does not know them.
 KINDS = {"mesoslip_contacts", "mesoslip_sliders"}

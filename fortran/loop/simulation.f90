@@ -1,5 +1,5 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
-module mesoslip_simulation
+module mesoslip_loop_simulation
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_archive, only: archive_type
@@ -701,4 +701,4 @@ contains
       if (allocated(archive%failure)) error = archive%failure
    end subroutine restore
 
-end module mesoslip_simulation
+end module mesoslip_loop_simulation

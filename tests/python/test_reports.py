@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables
 from kinds import KINDS, configuration
-from mesoslip.configuration.units import with_unit
+from mesoslip.quantities import with_unit
 
 MOST_BYTES = 3_000_000
 # Elements of HTML that have no end.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from mesoslip import ConfigError, SteadySliding
-from mesoslip.configuration.units import with_unit
+from mesoslip.quantities import with_unit
 from mesoslip.theory.steady_sliding import stability_boundary, stable_stiffness
 from scipy import special
 

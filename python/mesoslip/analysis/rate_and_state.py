@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment, Stage
-from mesoslip.configuration.units import percent
 from mesoslip.errors import RunError
 from mesoslip.output.variables import Group, Meaning
+from mesoslip.quantities import percent
 from mesoslip.theory.rate_and_state import LAWS, Loading, RateAndState, spring_slider
 
 Array = NDArray[np.float64]

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.units import percent
 from mesoslip.output.layout import RunResults, config_of, group_of
 from mesoslip.output.variables import Group, Meaning
+from mesoslip.quantities import percent
 from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:

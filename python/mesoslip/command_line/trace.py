@@ -68,8 +68,8 @@ def trace(
 ) -> None:
     """Read a measured trace, find its slips, and write an output like that of a run."""
     from mesoslip import api
-    from mesoslip.configuration.units import with_unit
     from mesoslip.output import files
+    from mesoslip.quantities import with_unit
 
     path = output or Path("out") / f"{table.stem}.nc"
     files.check_output(path, [table, *([] if config is None else [config])])

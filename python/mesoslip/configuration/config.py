@@ -33,8 +33,8 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
 from mesoslip.configuration.tables import Curve, Output, Run
-from mesoslip.configuration.units import with_unit
 from mesoslip.errors import ConfigError
+from mesoslip.quantities import with_unit
 
 
 class Config(Table):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
-from mesoslip.configuration.units import with_unit
+from mesoslip.quantities import with_unit
 
 # Characters of the longest value that is shown.
 LONGEST = 60

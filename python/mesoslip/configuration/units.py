@@ -184,83 +184,6 @@ def _named_by_pint(name: str) -> Unit | None:
     return Unit(Decimal(one.magnitude), dimension)
 
 
-# Powers of ten and their letters, in steps of a thousand.
-LETTERS = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-# Units of long times [s], and the time from which each is used.
-LONG_TIMES = (
-    (3 * 365.25 * 86400.0, 365.25 * 86400.0, "a"),
-    (3 * 86400.0, 86400.0, "d"),
-    (3 * 3600.0, 3600.0, "h"),
-    (600.0, 60.0, "min"),
-)
-# Units whose first factor takes a prefix.
-PREFIXED = {"m", "s", "N", "Pa", "J", "m/s", "N/m", "N/s"}
-
-
-class Scale(NamedTuple):
-    """A unit in which numbers are shown: its name, and its size in SI."""
-
-    name: str
-    size: float
-
-    def label(self, what: str) -> str:
-        """What is shown, with the unit in parentheses if it has one."""
-        return f"{what} ({self.name})" if self.name else what
-
-
-def scale_for(greatest: float, unit: str) -> Scale:
-    """The unit in which a quantity of a size is best read.
-
-    Parameters
-    ----------
-    greatest
-        Greatest size that is to be shown, in SI; numbers up to that are below some thousand then.
-    unit
-        The SI unit, such as "N" or "m/s"; "1" for plain numbers.
-
-    Returns
-    -------
-    Scale
-        With a prefix of the SI, such as "µN"; long times in minutes to years ("a").
-    """
-    if unit == "1":
-        return Scale("", 1.0)
-    greatest = abs(greatest)
-    if unit == "kg":
-        letter, size = _prefix(1e3 * greatest)
-        return Scale(f"{letter}g", 1e-3 * size) if size < 1e3 else Scale("kg", 1.0)
-    if unit == "s":
-        for least, size, name in LONG_TIMES:
-            if least <= greatest < math.inf:
-                return Scale(name, size)
-        greatest = min(greatest, 999.0)
-    if unit not in PREFIXED:
-        return Scale(unit, 1.0)
-    letter, size = _prefix(greatest)
-    return Scale(letter + unit, size)
-
-
-def _prefix(size: float) -> tuple[str, float]:
-    """The prefix with which a number is between 1 and 1000, as far as there is one; its size."""
-    if not 0 < size < math.inf:
-        return "", 1.0
-    # A little below, so that 999.99999 is not 1000.
-    power = 3 * math.floor(math.log10(size * (1 + 1e-9)) / 3)
-    power = min(max(power, min(LETTERS)), max(LETTERS))
-    return LETTERS[power], 10.0**power
-
-
-def with_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A number in SI as a text in the unit that suits it, such as "18 µN"."""
-    scale = scale_for(value, unit)
-    if scale.name in {name for *_, name in LONG_TIMES}:
-        number = value / scale.size
-        # 4000 s are not 66.67 minutes.
-        if float(f"{number:.{digits}g}") != number:
-            return f"{value:.{digits}g} s"
-    return f"{value / scale.size:.{digits}g} {scale.name}".rstrip()
-
-
 def cf_units(unit: str) -> str:
     """A unit as files have it, by the conventions of CF: "N m-1" for "N/m"."""
     above, _, below = unit.replace("^", "").partition("/")
@@ -282,10 +205,3 @@ def from_cf_units(units: str) -> str:
         factor = name if size in {"", "1"} else f"{name}^{size}"
         (below if power.startswith("-") else above).append(factor)
     return "/".join([" ".join(above) or "1", *below])
-
-
-def percent(share: float) -> str:
-    """A share as a text such as "2.1 %" or "174 %"."""
-    number = 100 * share
-    # Two digits of what is more would have an exponent.
-    return f"{number:.0f} %" if abs(number) >= 99.5 else f"{number:.2g} %"

@@ -12,7 +12,7 @@ from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_law import LAWS
-from mesoslip.configuration.units import with_unit
+from mesoslip.quantities import with_unit
 
 # Positions of a slider on the page.
 STEPS = 200

@@ -16,10 +16,10 @@ from bokeh.models.ui import UIElement
 from bokeh.models.widgets import Div, Slider, Toggle
 from bokeh.plotting import figure
 
-from mesoslip.configuration.units import with_unit
 from mesoslip.explorer.following import Pace
 from mesoslip.explorer.knobs import set_changed
 from mesoslip.explorer.pictures import Lattice, Line, Motion, Theory
+from mesoslip.quantities import with_unit
 
 # Time between two snapshots of a moving lattice [ms].
 FRAME_MILLISECONDS = 120

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.regime import judgements, regimes
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.units import Scale, scale_for, with_unit
 from mesoslip.errors import MesoslipError
 from mesoslip.output.layout import build_tree, group_of
 from mesoslip.plots.run import (
@@ -26,6 +25,7 @@ from mesoslip.plots.run import (
     slip_window,
     times_of,
 )
+from mesoslip.quantities import Scale, scale_for, with_unit
 from mesoslip.simulation.runner import Results
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.steady_sliding import steady_sliding

@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from mesoslip.analysis.slips import slips
-from mesoslip.configuration.units import Scale, from_cf_units, scale_for
+from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.layout import group_of, is_measured
 from mesoslip.output.variables import TRACE
@@ -30,6 +30,7 @@ from mesoslip.plots.style import (
     styled,
     titles,
 )
+from mesoslip.quantities import Scale, scale_for
 
 Array = NDArray[np.float64]
 

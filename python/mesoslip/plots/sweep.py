@@ -16,9 +16,10 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from mesoslip.configuration.units import Scale, from_cf_units, scale_for
+from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import FileError
 from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.quantities import Scale, scale_for
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.units import Scale, scale_for, with_unit
 from mesoslip.plots.style import COLORS, Canvas, canvas, legend_above, plain, styled, titles
+from mesoslip.quantities import Scale, scale_for, with_unit
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from mesoslip.analysis import slips as slip_catalogue
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.units import from_cf_units, scale_for, with_unit
+from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import FileError
 from mesoslip.inference import posterior
 from mesoslip.output import variables
@@ -31,6 +31,7 @@ from mesoslip.plots import draw, run
 from mesoslip.plots import sweep as sweep_plots
 from mesoslip.plots.run import Extent
 from mesoslip.plots.style import COLORS
+from mesoslip.quantities import scale_for, with_unit
 from mesoslip.reports.content import (
     PARTS,
     Block,

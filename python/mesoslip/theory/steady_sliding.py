@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.configuration.threshold_law import ThresholdLaw
-from mesoslip.configuration.units import with_unit
 from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.quantities import with_unit
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config

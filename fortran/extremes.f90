@@ -1,4 +1,4 @@
-!> The greatest and the least force so far, with when and where they were.
+!> Maximum and minimum of a force, with their times and displacements.
 module mesoslip_extremes
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
@@ -7,14 +7,14 @@ module mesoslip_extremes
 
    public :: extremes_type
 
-   !> Greatest and least of a force since it was last emptied.
+   !> Maximum and minimum of a force.
    type :: extremes_type
       !> The forces [N]
-      real(wp) :: greatest = -huge(1.0_wp), least = huge(1.0_wp)
+      real(wp) :: max_force = -huge(1.0_wp), min_force = huge(1.0_wp)
       !> Their times [s]
-      real(wp) :: greatest_time = 0.0_wp, least_time = 0.0_wp
+      real(wp) :: max_time = 0.0_wp, min_time = 0.0_wp
       !> Displacement of the slider then, in all [m]
-      real(wp) :: greatest_displacement = 0.0_wp, least_displacement = 0.0_wp
+      real(wp) :: max_displacement = 0.0_wp, min_displacement = 0.0_wp
    contains
       !> Take a force into account
       procedure, non_overridable :: note
@@ -31,15 +31,15 @@ contains
       !> Force [N], its time [s], displacement of the slider then [m]
       real(wp), intent(in) :: force, time, displacement
 
-      if (force > self%greatest) then
-         self%greatest = force
-         self%greatest_time = time
-         self%greatest_displacement = displacement
+      if (force > self%max_force) then
+         self%max_force = force
+         self%max_time = time
+         self%max_displacement = displacement
       end if
-      if (force < self%least) then
-         self%least = force
-         self%least_time = time
-         self%least_displacement = displacement
+      if (force < self%min_force) then
+         self%min_force = force
+         self%min_time = time
+         self%min_displacement = displacement
       end if
    end subroutine note
 
@@ -50,12 +50,12 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call archive%exchange("greatest", self%greatest)
-      call archive%exchange("least", self%least)
-      call archive%exchange("greatest_time", self%greatest_time)
-      call archive%exchange("least_time", self%least_time)
-      call archive%exchange("greatest_displacement", self%greatest_displacement)
-      call archive%exchange("least_displacement", self%least_displacement)
+      call archive%exchange("max_force", self%max_force)
+      call archive%exchange("min_force", self%min_force)
+      call archive%exchange("max_time", self%max_time)
+      call archive%exchange("min_time", self%min_time)
+      call archive%exchange("max_displacement", self%max_displacement)
+      call archive%exchange("min_displacement", self%min_displacement)
    end subroutine exchange
 
 end module mesoslip_extremes

@@ -31,7 +31,7 @@ module mesoslip_interface_law
       !> Time [s], displacement [m], velocity [m/s], acceleration [m/s2]
       real(wp) :: time = 0.0_wp, displacement = 0.0_wp, velocity = 0.0_wp, acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero, +1 or -1
-      real(wp) :: sense = 1.0_wp
+      real(wp) :: direction = 1.0_wp
    end type pose_type
 
 end module mesoslip_interface_law

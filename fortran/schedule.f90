@@ -13,10 +13,10 @@ module mesoslip_schedule
    implicit none
    private
 
-   public :: schedule_type, most_events
+   public :: schedule_type, max_events
 
    !> Breaks, and attachments, in the longest schedule
-   integer, parameter :: most_events = 64
+   integer, parameter :: max_events = 64
 
    !> Events to come, and those that came.
    type :: schedule_type
@@ -44,17 +44,17 @@ module mesoslip_schedule
 
       !> Of each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
       !> of the contact when it is detached [N s/m]
-      real(wp) :: break_coordinate(most_events) = 0.0_wp, break_stiffness(most_events) = 0.0_wp, &
-         & break_origin(most_events) = 0.0_wp, break_drag(most_events) = 0.0_wp
+      real(wp) :: break_coordinate(max_events) = 0.0_wp, break_stiffness(max_events) = 0.0_wp, &
+         & break_origin(max_events) = 0.0_wp, break_drag(max_events) = 0.0_wp
       !> When and where it came [s, m]
-      real(wp) :: break_time(most_events) = 0.0_wp, break_displacement(most_events) = 0.0_wp
+      real(wp) :: break_time(max_events) = 0.0_wp, break_displacement(max_events) = 0.0_wp
       !> Of each attachment: its time [s], with that of the first one that is not in the schedule;
       !> stiffness [N/m], stretch at first and at breaking [m] and drag until then [N s/m]
-      real(wp) :: attach_time(most_events + 1) = 0.0_wp, attach_stiffness(most_events) = 0.0_wp, &
-         & attach_stretch(most_events) = 0.0_wp, attach_limit(most_events) = 0.0_wp, &
-         & attach_drag(most_events) = 0.0_wp
+      real(wp) :: attach_time(max_events + 1) = 0.0_wp, attach_stiffness(max_events) = 0.0_wp, &
+         & attach_stretch(max_events) = 0.0_wp, attach_limit(max_events) = 0.0_wp, &
+         & attach_drag(max_events) = 0.0_wp
       !> Where it came [m]
-      real(wp) :: attach_displacement(most_events) = 0.0_wp
+      real(wp) :: attach_displacement(max_events) = 0.0_wp
    contains
       !> Contact force until the next event, and where and when that is
       procedure, non_overridable :: law

@@ -739,7 +739,7 @@ contains
       integer :: contact
       real(wp) :: back_force
 
-      back_force = pose%sense * self%parameters%back_force_ratio * self%parameters%static_force
+      back_force = pose%direction * self%parameters%back_force_ratio * self%parameters%static_force
       do while (self%next_attachment <= pose%time)
          call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
          self%life(life_birth, contact) = pose%time

@@ -10,7 +10,7 @@ module mesoslip_contacts_ensemble
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_set, only: contact_set_type, drag_of, exchange_set, law_set
-   use mesoslip_schedule, only: most_events, schedule_type
+   use mesoslip_schedule, only: max_events, schedule_type
    use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate, behind_coordinate
    use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
@@ -31,7 +31,7 @@ module mesoslip_contacts_ensemble
 
       type(contact_queue_type), private :: queue
       !> Contacts of the breaks in the schedule
-      integer, private :: listed(most_events) = 0
+      integer, private :: listed(max_events) = 0
    contains
       procedure :: initialize
       procedure :: offer
@@ -152,8 +152,8 @@ contains
       integer :: number, event
 
       schedule%is_over = .true.
-      if (self%track%columns > 0 .or. pose%sense * self%direction < 0.0_wp) return
-      call self%queue%preview(self%record, min(most, most_events), self%listed, &
+      if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
+      call self%queue%preview(self%record, min(most, max_events), self%listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return
       do event = 1, number
@@ -166,7 +166,7 @@ contains
       schedule%moments = 0
       schedule%direction = self%direction
       schedule%behind = self%behind
-      call self%list_attachments(min(most, most_events, 2 * number + 4), pose%sense, schedule)
+      call self%list_attachments(min(most, max_events, 2 * number + 4), pose%direction, schedule)
       schedule%is_over = .false.
    end subroutine plan
 
@@ -179,7 +179,7 @@ contains
       !> Where the slider is
       type(pose_type), intent(in) :: pose
 
-      integer :: event, contact(most_events)
+      integer :: event, contact(max_events)
 
       call self%let_go_listed(self%listed(:schedule%broken), schedule)
       if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
@@ -202,7 +202,7 @@ contains
       integer :: contact
       real(wp) :: origin, limit, back_force
 
-      back_force = pose%sense * self%parameters%back_force_ratio * self%parameters%static_force
+      back_force = pose%direction * self%parameters%back_force_ratio * self%parameters%static_force
       do while (self%next_attachment <= pose%time)
          call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
          origin = self%record(row_origin, contact)

@@ -187,7 +187,7 @@ contains
 
       breaks = self%breaks
       do
-         call self%cascade(after%displacement, after%time, after%sense)
+         call self%cascade(after%displacement, after%time, after%direction)
          if (self%next_attachment > after%time) exit
          if (self%breaks - breaks > most_lives * self%parameters%count) then
             call raise(self%failure, status_stalled, "a cascade of contacts that break and " // &
@@ -195,7 +195,7 @@ contains
                & "interaction (interaction.strength) would end it")
             exit
          end if
-         call self%attach_due(after%displacement, after%time, after%sense)
+         call self%attach_due(after%displacement, after%time, after%direction)
       end do
       self%detached_count = real(self%waiting, wp)
    end subroutine respond

@@ -178,7 +178,7 @@ contains
       logical :: breaks, rests, creeps
       type(expected_births_type) :: births
 
-      sense = pose%sense
+      sense = pose%direction
       if (.not. abs(pose%velocity) > 0.0_wp .and. abs(pose%acceleration) > 0.0_wp) then
          sense = sign(1.0_wp, pose%acceleration)
       end if
@@ -406,7 +406,7 @@ contains
       end if
       if (self%pinned%some_fall .and. .not. reaches) then
          ! Where thresholds fall contacts may break at rest.
-         if (.not. abs(way) > 0.0_wp) sense = after%sense
+         if (.not. abs(way) > 0.0_wp) sense = after%direction
          if (sense > 0.0_wp) then
             reaches = after%displacement >= self%pinned%ahead
          else
@@ -458,7 +458,7 @@ contains
 
       call self%birth_gain%add(births * self%pinned%newborn_energy)
       origin = moment / births
-      force = after%sense * self%parameters%back_force_ratio
+      force = after%direction * self%parameters%back_force_ratio
       way = after%displacement - origin
       gain = gain - births * way * (force * self%parameters%static_force &
          & + 0.5_wp * self%pinned%newborn_stiffness * way)

@@ -11,7 +11,7 @@ module mesoslip_contacts_set
       & row_generation
    use mesoslip_numerics_random, only: uniform_pairs
    use mesoslip_interface_law, only: interface_law_type
-   use mesoslip_schedule, only: most_events, schedule_type
+   use mesoslip_schedule, only: max_events, schedule_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts, &
       & extent_length
    use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
@@ -310,7 +310,7 @@ contains
       type(schedule_type), intent(inout) :: schedule
 
       integer :: number, event, place, contact
-      real(wp) :: threshold(most_events), back_force
+      real(wp) :: threshold(max_events), back_force
 
       number = 0
       schedule%attach_time(1) = huge(1.0_wp)

@@ -4,8 +4,8 @@ module mesoslip_loop_simulation
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_schedule, only: most_events, schedule_type
-   use mesoslip_watch, only: watch_type
+   use mesoslip_schedule, only: max_events, schedule_type
+   use mesoslip_step_filter, only: step_filter_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_avalanches, only: avalanche_recorder_type
    use mesoslip_contacts_base, only: contacts_type
@@ -75,7 +75,7 @@ module mesoslip_loop_simulation
       !> Why the run is over, an ending_ code
       integer :: ending = ending_none
       !> Breaks, and attachments, in a schedule; 0 for none. The numbers do not depend on it
-      integer :: longest_schedule = most_events
+      integer :: longest_schedule = max_events
 
       !> Whether the run has been started
       logical :: is_started = .false.
@@ -141,7 +141,7 @@ contains
       call self%contacts%initialize(initial)
       call self%slider%drive(self%start_velocity(1), self%acceleration())
       call self%slider%start(self%contacts%law())
-      self%slider%sense = self%slider%drive_sense
+      self%slider%direction = self%slider%drive_direction
       call self%contacts%respond(self%slider%pose(), self%slider%pose())
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
@@ -235,7 +235,7 @@ contains
       !> Advances after which to stop
       integer(i8), intent(in) :: last
 
-      type(watch_type) :: watch
+      type(step_filter_type) :: filter
       type(pose_type) :: before
       type(interface_law_type) :: law
       logical :: turns
@@ -246,14 +246,14 @@ contains
       self%schedule%farthest_force = farthest_stretches * self%contacts%parameters%static_force
       before = self%slider%pose()
       do
-         watch = self%recorder%watch(self%slider)
-         call self%stages%narrow(watch, self%slider)
-         watch%most_steps = last - self%advances
-         call self%slider%run_ahead(self%schedule, watch)
-         self%advances = self%advances + watch%steps
-         call self%recorder%pass_over(watch)
-         turns = self%slider%sense * self%schedule%direction < 0.0_wp
-         if (watch%is_caught) then
+         filter = self%recorder%step_filter(self%slider)
+         call self%stages%narrow(filter, self%slider)
+         filter%max_steps = last - self%advances
+         call self%slider%run_ahead(self%schedule, filter)
+         self%advances = self%advances + filter%steps
+         call self%recorder%skip_steps(filter)
+         turns = self%slider%direction * self%schedule%direction < 0.0_wp
+         if (filter%is_selected) then
             call self%recorder%record(self%slider, real(self%schedule%detached, wp), &
                & self%contacts%breaks + self%schedule%broken)
             call self%stages%record(self%slider)
@@ -387,12 +387,12 @@ contains
       class(simulation_type), intent(inout) :: self
       integer, intent(in) :: part
 
-      real(wp) :: velocity, sense
+      real(wp) :: velocity, direction
       logical :: is_new
 
       is_new = self%stage_of_part(part) /= self%stage_of_part(self%part)
       velocity = self%slider%drive_velocity_at(self%slider%time)
-      sense = self%slider%drive_sense
+      direction = self%slider%drive_direction
       if (is_new) call self%stages%finish(self%slider)
       self%part = part
       call self%slider%drive(self%start_velocity(part), self%acceleration())
@@ -404,7 +404,7 @@ contains
       call self%look_for_steady()
       is_new = is_new .and. abs(self%start_velocity(part) - velocity) &
          & > tiny_part * max(abs(velocity), abs(self%start_velocity(part)))
-      if (is_new .or. abs(self%slider%drive_sense - sense) > 0.0_wp) then
+      if (is_new .or. abs(self%slider%drive_direction - direction) > 0.0_wp) then
          self%recorder%drive_changes = .true.
       end if
    end subroutine take_part
@@ -448,15 +448,15 @@ contains
    end function is_there
 
    !> Let a schedule end before a displacement.
-   pure subroutine stop_within(schedule, displacement, sense)
+   pure subroutine stop_within(schedule, displacement, direction)
       type(schedule_type), intent(inout) :: schedule
-      !> The displacement [m], and the sense in which it must not be passed, +1 or -1
-      real(wp), intent(in) :: displacement, sense
+      !> The displacement [m], and the direction in which it must not be passed, +1 or -1
+      real(wp), intent(in) :: displacement, direction
 
       if (schedule%is_over) return
-      if (sense * schedule%direction > 0.0_wp) then
+      if (direction * schedule%direction > 0.0_wp) then
          do while (schedule%breaks > 0)
-            if (schedule%break_coordinate(schedule%breaks) < sense * displacement) exit
+            if (schedule%break_coordinate(schedule%breaks) < direction * displacement) exit
             schedule%breaks = schedule%breaks - 1
          end do
          schedule%is_over = schedule%breaks == 0

@@ -28,7 +28,7 @@ module mesoslip_recording_recorder
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type, slider_type
-   use mesoslip_watch, only: watch_type
+   use mesoslip_step_filter, only: step_filter_type
    implicit none
    private
 
@@ -133,10 +133,9 @@ module mesoslip_recording_recorder
       procedure, non_overridable :: drain_slip_trace
       !> Record the last advance of a slider
       procedure, non_overridable :: record
-      !> What to look at in a motion that is recorded here and there only, and what to make of the
-      !> rest
-      procedure, non_overridable :: watch
-      procedure, non_overridable :: pass_over
+      !> Which steps of a slider need record, and take note of those that did not
+      procedure, non_overridable :: step_filter
+      procedure, non_overridable :: skip_steps
       !> Close a slip at the end of the run
       procedure, non_overridable :: finish
       !> Put the state into an archive or take it out
@@ -243,65 +242,67 @@ contains
    !>
    !> It is where the excess over the velocity of the drive leaves the interval, between 0 and the
    !> slip velocity, in which it is, or where something is due.
-   pure function watch(self, slider)
+   pure function step_filter(self, slider) result(filter)
       !> The recorder
       class(recorder_type), intent(in) :: self
       !> The slider
       class(slider_type), intent(in) :: slider
-      !> What is of interest
-      type(watch_type) :: watch
+      !> The filter
+      type(step_filter_type) :: filter
 
       real(wp) :: fast
 
-      watch%time = self%next_sample
-      watch%reference = slider%drive_velocity
-      watch%sense = self%sense
+      filter%time = self%next_sample
+      filter%reference = slider%drive_velocity
+      filter%direction = self%sense
       if (self%parameters%slip_velocity <= 0.0_wp) return
       if (self%drive_changes .or. slider%time <= 0.0_wp) then
          ! The start of a stage is of interest in itself.
-         watch%time = -huge(1.0_wp)
+         filter%time = -huge(1.0_wp)
          return
       end if
 
       if (self%last_excess > 0.0_wp) then
-         watch%above = 0.0_wp
+         filter%min_excess = 0.0_wp
       else
-         watch%upto = 0.0_wp
+         filter%max_excess = 0.0_wp
       end if
       if (.not. self%is_tracing) return
 
-      watch%time = min(watch%time, self%next_slip_sample)
-      watch%peaks = self%is_quick
+      filter%time = min(filter%time, self%next_slip_sample)
+      filter%selects_peaks = self%is_quick
       fast = self%parameters%slip_velocity
       if (self%last_excess > fast) then
-         watch%above = fast
+         filter%min_excess = fast
       else if (self%last_excess < -fast) then
-         watch%upto = nearest(-fast, -1.0_wp)
+         filter%max_excess = nearest(-fast, -1.0_wp)
       else
          if (self%last_excess > 0.0_wp) then
-            watch%upto = fast
+            filter%max_excess = fast
          else
-            watch%above = nearest(-fast, -1.0_wp)
+            filter%min_excess = nearest(-fast, -1.0_wp)
          end if
          ! A step or two too early does no harm.
-         watch%time = min(watch%time, self%last_fast + self%parameters%quiet_time &
+         filter%time = min(filter%time, self%last_fast + self%parameters%quiet_time &
             & - 4.0_wp * spacing(self%last_fast + self%parameters%quiet_time))
       end if
-   end function watch
+   end function step_filter
 
    !> Take note of steps of a slider that were of no interest.
-   subroutine pass_over(self, watch)
+   subroutine skip_steps(self, filter)
       !> The recorder
       class(recorder_type), intent(inout) :: self
-      !> The watch that was kept
-      type(watch_type), intent(in) :: watch
+      !> The filter after these steps
+      type(step_filter_type), intent(in) :: filter
 
-      if (self%parameters%slip_velocity <= 0.0_wp .or. .not. watch%has_passed) return
-      self%last_excess = watch%excess
+      if (self%parameters%slip_velocity <= 0.0_wp .or. .not. filter%has_skipped) return
+      self%last_excess = filter%skipped_excess
       if (.not. self%is_tracing) return
-      if (abs(watch%excess) > self%parameters%slip_velocity) self%last_fast = watch%passed_time
-      if (self%is_quick) self%later_peak = max(self%later_peak, watch%fastest)
-   end subroutine pass_over
+      if (abs(filter%skipped_excess) > self%parameters%slip_velocity) then
+         self%last_fast = filter%skipped_time
+      end if
+      if (self%is_quick) self%later_peak = max(self%later_peak, filter%max_velocity)
+   end subroutine skip_steps
 
    !> Take the samples of the trace that the last advance of a slider came past.
    subroutine take_samples(self, slider, detached)
@@ -339,7 +340,7 @@ contains
       if (self%phase == phase_fall) call self%drop_fall()
       call self%stop_trace()
       self%drive_changes = .false.
-      self%sense = slider%drive_sense
+      self%sense = slider%drive_direction
       self%last_excess = self%sense * (motion%velocity + motion%base_velocity &
          & - slider%drive_velocity_at(slider%step_time))
       ! What a faster drive stretches before the block has its velocity is regained too.

@@ -12,7 +12,7 @@ module mesoslip_recording_stages
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type, slider_type
-   use mesoslip_watch, only: watch_type
+   use mesoslip_step_filter, only: step_filter_type
    implicit none
    private
 
@@ -119,20 +119,21 @@ contains
       call slider%extremes%note(motion%spring_force, motion%time, motion%displacement)
    end subroutine note
 
-   !> Let a watch stop where the slider passes the velocity of the drive, which is constant.
-   pure subroutine narrow(self, watch, slider)
+   !> Let a filter select the steps in which the slider passes the velocity of the drive, which is
+   !> constant.
+   pure subroutine narrow(self, filter, slider)
       !> The recorder
       class(stage_recorder_type), intent(in) :: self
-      !> What else is of interest, in its sense
-      type(watch_type), intent(inout) :: watch
+      !> The filter
+      type(step_filter_type), intent(inout) :: filter
       !> The slider
       class(slider_type), intent(in) :: slider
 
       if (slider%notes_extremes) return
-      if (self%is_faster .eqv. watch%sense > 0.0_wp) then
-         watch%above = max(watch%above, merge(0.0_wp, -tiny(1.0_wp), self%is_faster))
+      if (self%is_faster .eqv. filter%direction > 0.0_wp) then
+         filter%min_excess = max(filter%min_excess, merge(0.0_wp, -tiny(1.0_wp), self%is_faster))
       else
-         watch%upto = min(watch%upto, merge(-tiny(1.0_wp), 0.0_wp, self%is_faster))
+         filter%max_excess = min(filter%max_excess, merge(-tiny(1.0_wp), 0.0_wp, self%is_faster))
       end if
    end subroutine narrow
 
@@ -219,9 +220,9 @@ contains
          call self%rows%add([real(self%number, wp), self%start_time, slider%time, &
             & self%start_velocity, slider%drive_velocity_at(slider%time), self%start_force, &
             & motion%spring_force, self%start_displacement, slider%origin + slider%displacement, &
-            & self%drive_start_displacement, extremes%greatest, extremes%greatest_time, &
-            & extremes%greatest_displacement, extremes%least, extremes%least_time, &
-            & extremes%least_displacement, mean])
+            & self%drive_start_displacement, extremes%max_force, extremes%max_time, &
+            & extremes%max_displacement, extremes%min_force, extremes%min_time, &
+            & extremes%min_displacement, mean])
       end associate
    end subroutine finish
 

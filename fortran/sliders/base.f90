@@ -10,7 +10,7 @@ module mesoslip_sliders_base
    use mesoslip_extremes, only: extremes_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_schedule, only: schedule_type
-   use mesoslip_watch, only: watch_type
+   use mesoslip_step_filter, only: step_filter_type
    implicit none
    private
 
@@ -51,7 +51,7 @@ module mesoslip_sliders_base
       !> Its acceleration at the end of the last advance, and at its start [m/s2]
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
-      real(wp) :: sense = 1.0_wp
+      real(wp) :: direction = 1.0_wp
       !> Velocity of the drive at a time [m/s], its place then, from the moving origin [s, m], and
       !> its acceleration since [m/s2]
       real(wp) :: drive_velocity = 0.0_wp, drive_time = 0.0_wp, drive_displacement = 0.0_wp, &
@@ -59,7 +59,7 @@ module mesoslip_sliders_base
       !> Time at which the drive will turn round [s]; no step goes beyond
       real(wp) :: drive_turn = huge(1.0_wp)
       !> Sign of its velocity until then, or of the last one that was not zero
-      real(wp) :: drive_sense = 1.0_wp
+      real(wp) :: drive_direction = 1.0_wp
       !> Time at which the last advance started [s]
       real(wp) :: step_time = 0.0_wp
       !> Lost in the drag of contacts and in the slider's damping [J]
@@ -174,21 +174,21 @@ module mesoslip_sliders_base
 contains
 
    !> Move through a schedule until it ends, or until a step is of interest.
-   subroutine run_ahead(self, schedule, watch)
+   subroutine run_ahead(self, schedule, filter)
       !> The slider
       class(slider_type), intent(inout) :: self
       !> What happens on the way; what is due at the end of a step of interest, or after a turn, has
       !> not happened yet
       type(schedule_type), intent(inout) :: schedule
-      !> What to stop at
-      type(watch_type), intent(inout) :: watch
+      !> Which steps are of interest; the slider stops after one
+      type(step_filter_type), intent(inout) :: filter
 
       do
          call self%advance(schedule%law(), schedule%window(self%time))
-         call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
-         if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
+         call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
+         if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)
-         if (schedule%is_over .or. watch%steps >= watch%most_steps) return
+         if (schedule%is_over .or. filter%steps >= filter%max_steps) return
       end do
    end subroutine run_ahead
 
@@ -199,7 +199,8 @@ contains
       !> Where it is
       type(pose_type) :: pose
 
-      pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, self%sense)
+      pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, &
+         & self%direction)
    end function pose
 
    !> Give the drive another velocity and acceleration.
@@ -221,9 +222,9 @@ contains
       self%drive_turn = huge(1.0_wp)
       if (velocity * acceleration < 0.0_wp) self%drive_turn = self%time - velocity / acceleration
       if (abs(velocity) > 0.0_wp) then
-         self%drive_sense = sign(1.0_wp, velocity)
+         self%drive_direction = sign(1.0_wp, velocity)
       else if (abs(acceleration) > 0.0_wp) then
-         self%drive_sense = sign(1.0_wp, acceleration)
+         self%drive_direction = sign(1.0_wp, acceleration)
       end if
    end subroutine drive_slider
 
@@ -275,7 +276,7 @@ contains
       if (.not. abs(self%drive_acceleration) > 0.0_wp) return
       velocity = velocity + self%drive_acceleration * (time - self%drive_time)
       ! Rounding must not turn it round early.
-      velocity = self%drive_sense * max(0.0_wp, self%drive_sense * velocity)
+      velocity = self%drive_direction * max(0.0_wp, self%drive_direction * velocity)
    end function drive_velocity_at
 
    !> Move the origin of displacements; ends what can be observed of the last advance.
@@ -321,13 +322,13 @@ contains
       call archive%exchange("base_velocity", self%base_velocity)
       call archive%exchange("acceleration", self%acceleration)
       call archive%exchange("start_acceleration", self%start_acceleration)
-      call archive%exchange("sense", self%sense)
+      call archive%exchange("direction", self%direction)
       call archive%exchange("drive_velocity", self%drive_velocity)
       call archive%exchange("drive_time", self%drive_time)
       call archive%exchange("drive_displacement", self%drive_displacement)
       call archive%exchange("drive_acceleration", self%drive_acceleration)
       call archive%exchange("drive_turn", self%drive_turn)
-      call archive%exchange("drive_sense", self%drive_sense)
+      call archive%exchange("drive_direction", self%drive_direction)
       call archive%exchange("step_time", self%step_time)
       call archive%exchange("impulse", self%impulse)
       call archive%exchange("earlier_work", self%earlier_work)

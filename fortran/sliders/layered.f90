@@ -240,7 +240,7 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      real(wp) :: rate, step, gap, longest, change, sense
+      real(wp) :: rate, step, gap, longest, change, direction
       logical :: ends, crosses, turns
       integer :: term
 
@@ -302,12 +302,12 @@ contains
       if (.not. (abs(self%sliding(0)) + change) * step < min(window%upper - self%displacement, &
          & self%displacement - window%lower)) then
          call first_end(self%sliding, self%terms, window%upper - self%displacement, &
-            & window%lower - self%displacement, change, step, crosses, turns, sense)
+            & window%lower - self%displacement, change, step, crosses, turns, direction)
       end if
 
       call take_back(self, step)
       if (crosses) then
-         self%displacement = merge(window%upper, window%lower, sense > 0.0_wp)
+         self%displacement = merge(window%upper, window%lower, direction > 0.0_wp)
          self%state(1, 1) = self%state(0, 1) + self%displacement
          self%is_stale = .true.
       else
@@ -325,7 +325,7 @@ contains
       else
          self%time = self%time + step
       end if
-      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
       self%acceleration = slope(self%sliding, self%terms, step)
       self%start_acceleration = self%sliding(1)
       call self%add_work(step)

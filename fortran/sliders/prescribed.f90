@@ -6,7 +6,7 @@ module mesoslip_sliders_prescribed
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_schedule, only: schedule_type
-   use mesoslip_watch, only: watch_type
+   use mesoslip_step_filter, only: step_filter_type
    use mesoslip_sliders_base, only: drive_slider, motion_type, slider_type, exchange_slider, &
       & exchange_law
    implicit none
@@ -59,7 +59,7 @@ contains
       call drive_slider(self, velocity, acceleration)
       self%velocity = velocity
       self%acceleration = acceleration
-      if (abs(velocity) > 0.0_wp) self%sense = sign(1.0_wp, velocity)
+      if (abs(velocity) > 0.0_wp) self%direction = sign(1.0_wp, velocity)
    end subroutine drive
 
    !> Put the slider where the drive is, moving with it.
@@ -92,20 +92,20 @@ contains
 
    !> Move through a schedule until it ends, or until a step is of interest; the drive has no
    !> acceleration.
-   subroutine run_ahead(self, schedule, watch)
+   subroutine run_ahead(self, schedule, filter)
       !> The slider
       class(slider_prescribed_type), intent(inout) :: self
       !> What happens on the way
       type(schedule_type), intent(inout) :: schedule
-      !> What to stop at
-      type(watch_type), intent(inout) :: watch
+      !> Which steps are of interest; the slider stops after one
+      type(step_filter_type), intent(inout) :: filter
 
       do
          call step_on(self, schedule%law(), schedule%window(self%time))
-         call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
-         if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
+         call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
+         if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)
-         if (schedule%is_over .or. watch%steps >= watch%most_steps) return
+         if (schedule%is_over .or. filter%steps >= filter%max_steps) return
       end do
    end subroutine run_ahead
 
@@ -134,14 +134,14 @@ contains
          self%displacement = self%drive_displacement &
             & + self%velocity * (self%time - self%drive_time)
       end if
-      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
 
       step = self%displacement - start
       middle = law%stiffness * (start + 0.5_wp * step) - law%offset + law%drag * self%velocity
       call self%impulse%add((self%time - self%step_time) * middle)
       call self%drag_loss%add(step * law%drag * self%velocity)
       half = abs(0.5_wp * law%stiffness * step)
-      if (middle + half > self%extremes%greatest .or. middle - half < self%extremes%least) then
+      if (middle + half > self%extremes%max_force .or. middle - half < self%extremes%min_force) then
          call note(self, self%step_time, start, self%velocity)
          call note(self, self%time, self%displacement, self%velocity)
       end if
@@ -161,16 +161,16 @@ contains
       self%start_acceleration = self%drive_acceleration
       start = self%displacement
       early = self%drive_velocity_at(self%time)
-      limit = merge(window%upper, window%lower, self%drive_sense > 0.0_wp)
+      limit = merge(window%upper, window%lower, self%drive_direction > 0.0_wp)
 
       self%displacement = self%drive_at(window%end_time)
-      if (self%drive_sense * (self%displacement - limit) >= 0.0_wp) then
+      if (self%drive_direction * (self%displacement - limit) >= 0.0_wp) then
          way = limit - self%drive_displacement
-         late = self%drive_sense * sqrt(max(0.0_wp, &
+         late = self%drive_direction * sqrt(max(0.0_wp, &
             & self%drive_velocity**2 + 2.0_wp * self%drive_acceleration * way))
          ! Of two forms of the root the one in which nothing cancels.
          pace = self%drive_velocity + late
-         if (self%drive_sense * self%drive_velocity < 0.0_wp) then
+         if (self%drive_direction * self%drive_velocity < 0.0_wp) then
             time = (late - self%drive_velocity) / self%drive_acceleration
          else if (abs(pace) > 0.0_wp) then
             time = 2.0_wp * way / pace
@@ -184,7 +184,7 @@ contains
          late = self%drive_velocity_at(self%time)
       end if
       self%velocity = late
-      if (abs(late) > 0.0_wp) self%sense = sign(1.0_wp, late)
+      if (abs(late) > 0.0_wp) self%direction = sign(1.0_wp, late)
 
       way = self%displacement - start
       step = self%time - self%step_time

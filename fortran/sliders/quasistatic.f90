@@ -103,7 +103,7 @@ contains
       self%displacement = min(max(target, window%lower), window%upper)
       way = self%displacement - start
       if (abs(way) > 0.0_wp) then
-         self%sense = sign(1.0_wp, way)
+         self%direction = sign(1.0_wp, way)
          call self%damping_loss%add(way * stiffness * (target - start - 0.5_wp * way))
          if (.not. self%stiffness > 0.0_wp) call self%earlier_work%add(way * pull)
       end if
@@ -121,7 +121,7 @@ contains
       self%velocity = rate / stiffness
       self%acceleration = change / stiffness
       limit = window%upper
-      if (self%drive_sense < 0.0_wp) limit = window%lower
+      if (self%drive_direction < 0.0_wp) limit = window%lower
       arrival = time_of(limit - start, self%velocity, self%acceleration)
       reaches = arrival < huge(1.0_wp) .and. arrival <= window%end_time - self%time
       if (reaches) then
@@ -135,7 +135,7 @@ contains
       end if
 
       way = self%displacement - start
-      if (abs(way) > 0.0_wp) self%sense = sign(1.0_wp, way)
+      if (abs(way) > 0.0_wp) self%direction = sign(1.0_wp, way)
       step = self%time - self%step_time
       ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
       middle = law%stiffness * (start + 0.5_wp * way) - law%offset

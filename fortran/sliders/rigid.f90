@@ -11,7 +11,7 @@ module mesoslip_sliders_rigid
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_schedule, only: schedule_type
-   use mesoslip_watch, only: watch_type
+   use mesoslip_step_filter, only: step_filter_type
    use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
       & exchange_law
    implicit none
@@ -146,13 +146,13 @@ contains
    end subroutine advance
 
    !> Move through a schedule until it ends, or until a step is of interest.
-   subroutine run_ahead(self, schedule, watch)
+   subroutine run_ahead(self, schedule, filter)
       !> The slider
       class(slider_rigid_type), intent(inout) :: self
       !> What happens on the way
       type(schedule_type), intent(inout) :: schedule
-      !> What to stop at
-      type(watch_type), intent(inout) :: watch
+      !> Which steps are of interest; the slider stops after one
+      type(step_filter_type), intent(inout) :: filter
 
       type(system_type) :: system
 
@@ -160,10 +160,10 @@ contains
       do
          self%law = schedule%law()
          call step_on(self, system, schedule%window(self%time))
-         call watch%look(self%time, self%velocity, self%start_acceleration, self%acceleration)
-         if (watch%is_caught .or. self%sense * schedule%direction < 0.0_wp) return
+         call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
+         if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)
-         if (schedule%is_over .or. watch%steps >= watch%most_steps) return
+         if (schedule%is_over .or. filter%steps >= filter%max_steps) return
       end do
    end subroutine run_ahead
 
@@ -405,7 +405,7 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, change, reach, target, sense
+      real(wp) :: step, change, reach, target, direction
       real(wp) :: series(0:most_terms - 1), damper(0:most_terms - 1)
       type(motion_rates_type) :: late
       logical :: crosses, turns
@@ -427,8 +427,8 @@ contains
       if (.not. reach < min(window%upper - self%displacement, &
          & self%displacement - window%lower)) then
          call first_end(series, terms, window%upper - self%displacement, &
-            & window%lower - self%displacement, change, step, crosses, turns, sense)
-         target = merge(window%upper, window%lower, sense > 0.0_wp)
+            & window%lower - self%displacement, change, step, crosses, turns, direction)
+         target = merge(window%upper, window%lower, direction > 0.0_wp)
       end if
 
       if (crosses) then
@@ -504,7 +504,7 @@ contains
       !> The motion at the end of the step
       type(motion_rates_type), intent(out) :: late
 
-      if (abs(self%velocity) > 0.0_wp) self%sense = sign(1.0_wp, self%velocity)
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
       late = rates(self, system, drive_gap)
       self%acceleration = late%acceleration
       self%start_acceleration = early%acceleration

@@ -182,7 +182,7 @@ contains
       do step = 1, 400
          displacement = 1.5_wp * sin(0.1_wp * step)
          call contacts%respond(pose_type(), pose_type(time=1.0e-4_wp * step, &
-            & displacement=displacement, sense=sign(1.0_wp, cos(0.1_wp * step))))
+            & displacement=displacement, direction=sign(1.0_wp, cos(0.1_wp * step))))
          is_whole = is_whole .and. nint(contacts%detached_count) &
             & == count(.not. contacts%record(row_stiffness, :) > 0.0_wp)
          bears = bears .and. bearing(contacts, displacement)

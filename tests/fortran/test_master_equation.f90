@@ -166,7 +166,7 @@ contains
          if (before%time > 2.0_wp) velocity = 0.0_wp
          if (before%time > 3.0_wp) velocity = -1.0_wp
          before%velocity = velocity
-         if (abs(velocity) > 0.0_wp) before%sense = velocity
+         if (abs(velocity) > 0.0_wp) before%direction = velocity
          call contacts%offer(before, law, window)
          after = before
          way = min(window%upper - before%displacement, 0.05_wp)

@@ -13,7 +13,7 @@ program test_simulation
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_parameters_type
-   use mesoslip_schedule, only: most_events
+   use mesoslip_schedule, only: max_events
    use mesoslip_loop_simulation, only: ending_drive, energy_length, simulation_type
    use mesoslip_sliders, only: make_slider
    use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
@@ -201,7 +201,7 @@ contains
             allocate (words(length))
             call now%fetch(words, error)
             allocate (next)
-            call prepare(next, slider, law, width, delay, modulo(segment, most_events))
+            call prepare(next, slider, law, width, delay, modulo(segment, max_events))
             call next%restore(words, error)
             deallocate (words)
             deallocate (now)

@@ -37,7 +37,7 @@ help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
 	@printf '\nWhat uses what, from left to right (docs/architecture.md tells what to touch to add something):\n'
-	@printf 'fortran/\tnumerics, contacts and sliders, recording, loop, boundary.f90; theory\n' | expand -t 16
+	@printf 'fortran/\tnumerics, contacts and sliders, recording, loop, boundary; theory\n' | expand -t 16
 	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign, reports and explorer, command_line\n' | expand -t 16
 
 setup: $(INSTALLED) ## Install what is missing, and build

@@ -1,4 +1,4 @@
-"""Types of the Fortran boundary, fortran/boundary.f90, as f2py wraps it."""
+"""Types of the Fortran boundary, fortran/boundary, as f2py wraps it."""
 
 from typing import Any
 

@@ -6,7 +6,7 @@ program test_simulation
    use mesoslip_contacts_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
       & initial_steady
    use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian
-   use mesoslip_handles, only: close_handle, find_simulation, open_handle
+   use mesoslip_boundary_handles, only: close_handle, find_simulation, open_handle
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type

@@ -30,8 +30,7 @@ MAY_USE: dict[str, set[str]] = {
         *("numerics", "interface_law", "schedule", "step_filter"),
         *("contacts", "sliders", "recording"),
     },
-    "handles": {"numerics", "loop"},
-    "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "loop", "handles"},
+    "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "loop"},
 }
 # The lists of kinds stand beside their folders: what is in a folder does not know them.
 KINDS = {"mesoslip_contacts", "mesoslip_sliders"}

@@ -1,4 +1,4 @@
-! The boundary to Python: flat subroutines with explicit shapes, wrapped by f2py.
+! What Python calls of a simulation: flat subroutines with explicit shapes, wrapped by f2py.
 !
 ! A simulation lives here; Python holds its handle, two numbers that only these procedures read.
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
@@ -6,7 +6,7 @@
 !> Set up a simulation without parts.
 subroutine open_simulation(handle)
    !f2py threadsafe
-   use mesoslip_handles, only: open_handle
+   use mesoslip_boundary_handles, only: open_handle
    implicit none
    !> The handle
    integer(8), intent(inout) :: handle(2)
@@ -17,7 +17,7 @@ end subroutine open_simulation
 !> Free a simulation; its handle is of no use afterwards.
 subroutine close_simulation(handle)
    !f2py threadsafe
-   use mesoslip_handles, only: close_handle
+   use mesoslip_boundary_handles, only: close_handle
    implicit none
    !> The handle; closing it again does nothing
    integer(8), intent(inout) :: handle(2)
@@ -29,7 +29,7 @@ end subroutine close_simulation
 subroutine set_contacts(handle, kind, length, names, values, seed, realization, status, message)
    !f2py threadsafe
    use mesoslip_contacts, only: make_contacts
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_loop_simulation, only: simulation_type
@@ -60,7 +60,7 @@ end subroutine set_contacts
 !> Give a simulation its slider.
 subroutine set_slider(handle, kind, length, names, values, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_loop_simulation, only: simulation_type
@@ -90,7 +90,7 @@ end subroutine set_slider
 !> Give a simulation its drive, which has a constant acceleration in each of its parts.
 subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stage, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -120,7 +120,7 @@ end subroutine set_drive
 !> Tell a simulation when to stop before its drive ends.
 subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -153,7 +153,7 @@ end subroutine set_stop
 subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &
    & layers, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_loop_simulation, only: simulation_type
@@ -189,7 +189,7 @@ end subroutine set_recorder
 subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, snapshots, &
    & snapshot_time, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
    use mesoslip_loop_simulation, only: simulation_type
@@ -226,7 +226,7 @@ end subroutine set_avalanches
 !> Start a simulation that has all its parts.
 subroutine start_simulation(handle, initial, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -247,7 +247,7 @@ end subroutine start_simulation
 !> Go on for some advances or some work, or until much waits to be drained, or until the end.
 subroutine advance_simulation(handle, most_advances, most_work, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -270,7 +270,7 @@ end subroutine advance_simulation
 subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, avalanche_slip, &
    & error_estimate, advances, avalanches, integrator, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -317,7 +317,7 @@ end subroutine ask_simulation
 !> Terms of the energy balance of a simulation.
 subroutine ask_energy(handle, energy, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -340,7 +340,7 @@ end subroutine ask_energy
 !> What each contact is: origin [m], stiffness [N/m], breaking stretch [m], renewals.
 subroutine ask_contacts(handle, count, values, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -370,7 +370,7 @@ end subroutine ask_contacts
 !> Rows of a table that wait to be drained.
 subroutine count_rows(handle, table, columns, rows, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_loop_simulation, only: simulation_type
@@ -405,7 +405,7 @@ end subroutine count_rows
 !> Take the first rows of a table away.
 subroutine drain_rows(handle, table, columns, rows, values, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -429,7 +429,7 @@ end subroutine drain_rows
 !> Put the state of a simulation into an archive, which the simulation keeps until it is fetched.
 subroutine save_simulation(handle, length, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -451,7 +451,7 @@ end subroutine save_simulation
 !> Fetch the archive that a simulation has kept.
 subroutine fetch_state(handle, length, words, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -473,7 +473,7 @@ end subroutine fetch_state
 !> Go on from an archive, in a simulation that has all its parts and was not started.
 subroutine restore_simulation(handle, length, words, status, message)
    !f2py threadsafe
-   use mesoslip_handles, only: find_simulation, report
+   use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
@@ -492,67 +492,6 @@ subroutine restore_simulation(handle, length, words, status, message)
    call report(error, status, message)
 end subroutine restore_simulation
 
-!> Thresholds, densities or survival probabilities of a threshold law.
-subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, argument, value, &
-   & acceptance, status, message)
-   !f2py threadsafe
-   use mesoslip_numerics_kinds, only: wp
-   use mesoslip_handles, only: report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
-   implicit none
-   integer, intent(in) :: law
-   real(8), intent(in) :: relative_width, minimum
-   !> 1 for thresholds of exceedance probabilities, 2 for densities, 3 for survival probabilities
-   integer, intent(in) :: what
-   integer, intent(in) :: length
-   real(8), intent(in) :: argument(length)
-   real(8), intent(out) :: value(length)
-   !> Probability that a draw is not rejected
-   real(8), intent(out) :: acceptance
-   integer, intent(out) :: status
-   character(len=200), intent(out) :: message
-
-   type(threshold_law_type) :: threshold_law
-   type(error_type), allocatable :: error
-
-   value = 0.0_wp
-   acceptance = 0.0_wp
-   call new_threshold_law(threshold_law, law, relative_width, minimum, error)
-   if (.not. allocated(error)) then
-      acceptance = threshold_law%acceptance
-      select case (what)
-      case (1)
-         value = threshold_law%quantile(argument)
-      case (2)
-         value = threshold_law%density(argument)
-      case (3)
-         value = threshold_law%survival(argument)
-      case default
-         call raise(error, status_invalid, &
-            & "a threshold law has thresholds, densities and survival probabilities")
-      end select
-   end if
-   call report(error, status, message)
-end subroutine evaluate_threshold_law
-
-!> Philox 4x32-10, for its tests and for whoever wants the same numbers elsewhere.
-subroutine philox(length, counter, key, word)
-   !f2py threadsafe
-   use mesoslip_numerics_random, only: philox4x32
-   implicit none
-   integer, intent(in) :: length
-   !> 32-bit words in 64-bit integers, shapes (4, length), (2, length)
-   integer(8), intent(in) :: counter(4, length), key(2, length)
-   integer(8), intent(out) :: word(4, length)
-
-   integer :: draw
-
-   do draw = 1, length
-      call philox4x32(counter(:, draw), key(:, draw), word(:, draw))
-   end do
-end subroutine philox
-
 !> Version of the SUNDIALS library in use.
 subroutine sundials(version)
    !f2py threadsafe
@@ -562,126 +501,3 @@ subroutine sundials(version)
 
    version = sundials_version()
 end subroutine sundials
-
-!> Scales of the lives of contacts under a slider that moves forward, dimensionless.
-subroutine contact_scales(length, names, values, scales, status, message)
-   !f2py threadsafe
-   use mesoslip_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
-   use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
-   implicit none
-   !> What the contacts are made of, each number by its name
-   integer, intent(in) :: length
-   character(len=32), intent(in) :: names(length)
-   real(8), intent(in) :: values(length)
-   !> Shortest, longest and mean life of newborns; their stiffness and force at attaching; shortest
-   !> and longest life of a relaxed first generation; mean force of stationary sliding; mean mass
-   real(8), intent(out) :: scales(9)
-   integer, intent(out) :: status
-   character(len=200), intent(out) :: message
-
-   type(parameters_type) :: parameters
-   type(contact_lives_type) :: lives
-   type(error_type), allocatable :: error
-
-   scales = 0.0d0
-   call new_parameters(parameters, names, values)
-   call make_contact_lives(lives, parameters, error)
-   if (.not. allocated(error)) then
-      scales = [lives%shortest, lives%longest, lives%mean_life, lives%newborn_stiffness, &
-         & lives%newborn_force, lives%first_shortest, lives%first_longest, &
-         & lives%steady_force, lives%mean_mass]
-   end if
-   call report(error, status, message)
-end subroutine contact_scales
-
-!> Force curve of the master equation, dimensionless, on panels of the displacement.
-subroutine force_curve(length, names, values, start, width, panels, points, point, solution, &
-   & pinned_part, mismatch, status, message)
-   !f2py threadsafe
-   use mesoslip_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
-   use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
-   use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
-   implicit none
-   !> What the contacts are made of, each number by its name
-   integer, intent(in) :: length
-   character(len=32), intent(in) :: names(length)
-   real(8), intent(in) :: values(length)
-   !> Start of the first panel, at or below 0, and width of the panels
-   real(8), intent(in) :: start, width
-   !> Number of panels, and of points in each
-   integer, intent(in) :: panels, points
-   !> Points within a panel, from 0 to 1
-   real(8), intent(out) :: point(points)
-   !> Breaks over displacement, slope of the force, force, stiffness of the pinned contacts
-   real(8), intent(out) :: solution(points, panels, 4)
-   !> Part of the contacts that is pinned, at the edges of the panels
-   real(8), intent(out) :: pinned_part(panels + 1)
-   !> Largest difference between two ways to the force
-   real(8), intent(out) :: mismatch
-   integer, intent(out) :: status
-   character(len=200), intent(out) :: message
-
-   type(parameters_type) :: parameters
-   type(contact_lives_type) :: lives
-   type(renewal_solution_type) :: renewal
-   type(error_type), allocatable :: error
-
-   point = 0.0d0
-   solution = 0.0d0
-   mismatch = 0.0d0
-   pinned_part = 0.0d0
-   call new_parameters(parameters, names, values)
-   call make_contact_lives(lives, parameters, error)
-   if (.not. allocated(error)) then
-      call solve_renewal(lives, start, width, panels, points, renewal)
-      point = renewal%point
-      solution(:, :, 1) = renewal%breaks
-      solution(:, :, 2) = renewal%slope
-      solution(:, :, 3) = renewal%force
-      solution(:, :, 4) = renewal%stiffness
-      pinned_part = renewal%pinned
-      mismatch = renewal%mismatch
-   end if
-   call report(error, status, message)
-end subroutine force_curve
-
-!> Onset of slip, dimensionless, by Eq. S46 or S47.
-subroutine onset(equation, coefficients, damping, drag, end_displacement, interval, tolerance, &
-   & capacity, samples, length, ended, status, message)
-   !f2py threadsafe
-   use mesoslip_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_theory_onset, only: integrate_onset, onset_type
-   implicit none
-   !> 1 for S46, 2 for S47
-   integer, intent(in) :: equation
-   !> D0 to D3; eta_S/Omega_S, eta/Omega_S; displacement at which S46 ends
-   real(8), intent(in) :: coefficients(4), damping, drag, end_displacement
-   !> Interval of samples, and relative tolerance of the integration
-   real(8), intent(in) :: interval, tolerance
-   !> Samples of time, displacement, velocity and its running mean, and how many were filled
-   integer, intent(in) :: capacity
-   real(8), intent(inout) :: samples(4, capacity)
-   integer, intent(out) :: length
-   !> Whether the equation came to its end
-   integer, intent(out) :: ended
-   integer, intent(out) :: status
-   character(len=200), intent(out) :: message
-
-   type(onset_type), target :: equations
-   type(error_type), allocatable :: error
-   logical :: is_over
-
-   equations%equation = equation
-   equations%D = coefficients
-   equations%damping = damping
-   equations%drag = drag
-   equations%end_displacement = end_displacement
-   call integrate_onset(equations, interval, tolerance, samples, length, is_over, error)
-   ended = merge(1, 0, is_over .and. .not. allocated(error))
-   call report(error, status, message)
-end subroutine onset

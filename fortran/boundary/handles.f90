@@ -2,7 +2,7 @@
 !>
 !> A handle is the address of a simulation and a stamp that the simulation bears as well. Closing it
 !> makes both zero, so whoever uses it afterwards gets an error.
-module mesoslip_handles
+module mesoslip_boundary_handles
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_ok
    use mesoslip_numerics_kinds, only: i8
@@ -110,4 +110,4 @@ contains
       message = error%message
    end subroutine report
 
-end module mesoslip_handles
+end module mesoslip_boundary_handles

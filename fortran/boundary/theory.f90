@@ -132,12 +132,14 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_boundary_handles, only: report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws, only: new_threshold_law
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
-   integer, intent(in) :: law
+   !> Name of the law
+   character(len=*), intent(in) :: law
    real(8), intent(in) :: relative_width, minimum
-   !> 1 for thresholds of exceedance probabilities, 2 for densities, 3 for survival probabilities
-   integer, intent(in) :: what
+   !> "quantile", of exceedance probabilities, "density" or "survival"
+   character(len=*), intent(in) :: what
    integer, intent(in) :: length
    real(8), intent(in) :: argument(length)
    real(8), intent(out) :: value(length)
@@ -146,7 +148,7 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
-   type(threshold_law_type) :: threshold_law
+   class(threshold_law_type), allocatable :: threshold_law
    type(error_type), allocatable :: error
 
    value = 0.0_wp
@@ -155,11 +157,11 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
    if (.not. allocated(error)) then
       acceptance = threshold_law%acceptance
       select case (what)
-      case (1)
+      case ("quantile")
          value = threshold_law%quantile(argument)
-      case (2)
+      case ("density")
          value = threshold_law%density(argument)
-      case (3)
+      case ("survival")
          value = threshold_law%survival(argument)
       case default
          call raise(error, status_invalid, &

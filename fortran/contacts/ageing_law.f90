@@ -8,7 +8,7 @@ module mesoslip_contacts_ageing_law
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
@@ -85,14 +85,13 @@ contains
       type(ageing_law_type), intent(out) :: self
       !> Law of the configured thresholds, conditional on what is above the back force; on return
       !> also on what is so when it is young
-      type(threshold_law_type), intent(inout) :: law
+      class(threshold_law_type), intent(inout) :: law
       !> Named numbers
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or wrong, or no contact can attach
       type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: force_ratio, width, narrowing, minimum
-      type(threshold_law_type) :: all
 
       call parameters%take("ageing", self%kind, error)
       call parameters%take("ageing_time", self%time, error)
@@ -117,10 +116,7 @@ contains
          self%mean_lack = 1.0_wp - force_ratio
          self%width_lack = 1.0_wp - force_ratio * narrowing
          minimum = (law%minimum - force_ratio * (1.0_wp - narrowing)) / (force_ratio * narrowing)
-         if (minimum > law%minimum) then
-            all = law
-            call new_threshold_law(law, all%kind, all%width, minimum, error)
-         end if
+         if (minimum > law%minimum) call law%reject_below(minimum, error)
       case (ageing_log)
          call parameters%take("growth", self%growth, error)
          if (allocated(error)) return

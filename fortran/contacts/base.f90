@@ -10,7 +10,8 @@ module mesoslip_contacts_base
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_contacts_mechanics, only: coupling_scaled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws, only: law_name, make_threshold_law
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_schedule, only: schedule_type
    implicit none
    private
@@ -47,7 +48,7 @@ module mesoslip_contacts_base
       !> Whether a broken contact attaches again
       logical :: reattach = .true.
       !> Law of the relative thresholds
-      type(threshold_law_type) :: law
+      class(threshold_law_type), allocatable :: law
       !> Key of the random numbers
       integer(i8) :: seed = 0, realization = 0
    end type contact_parameters_type
@@ -282,7 +283,6 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       integer :: law
-      real(wp) :: width
 
       self%seed = seed
       self%realization = realization
@@ -295,9 +295,8 @@ contains
       call parameters%take("coupling", self%coupling, error)
       call parameters%take("reattach", self%reattach, error)
       call parameters%take("law", law, error)
-      call parameters%take("relative_width", width, error)
       if (allocated(error)) return
-      call new_threshold_law(self%law, law, width, self%back_force_ratio, error)
+      call make_threshold_law(self%law, law_name(law), parameters, self%back_force_ratio, error)
    end subroutine take_contact_parameters
 
 end module mesoslip_contacts_base

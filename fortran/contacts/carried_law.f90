@@ -8,7 +8,7 @@ module mesoslip_contacts_carried_law
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
-   use mesoslip_contacts_threshold_law, only: threshold_law_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
@@ -24,7 +24,7 @@ module mesoslip_contacts_carried_law
 
    !> Thresholds weighted by the distance to breaking.
    type :: carried_law_type
-      type(threshold_law_type), private :: law
+      class(threshold_law_type), allocatable, private :: law
       type(partial_moments_type), private :: moments
       !> One of the coupling_ codes
       integer, private :: coupling = coupling_equal
@@ -45,13 +45,13 @@ contains
       !> The weighted law
       type(carried_law_type), intent(out) :: self
       !> Law of the thresholds of contacts that attach, all above the force at attaching
-      type(threshold_law_type), intent(in) :: law
+      class(threshold_law_type), intent(in) :: law
       !> One of the coupling_ codes
       integer, intent(in) :: coupling
       !> Force at attaching, f_b/f_s
       real(wp), intent(in) :: back_force
 
-      self%law = law
+      allocate (self%law, source=law)
       self%coupling = coupling
       self%back_force = back_force
       if (coupling == coupling_equal) then

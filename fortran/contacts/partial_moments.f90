@@ -2,7 +2,7 @@
 module mesoslip_contacts_partial_moments
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_contacts_threshold_law, only: law_lognormal, law_weibull, threshold_law_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
@@ -23,7 +23,7 @@ module mesoslip_contacts_partial_moments
    type :: partial_moments_type
       !> Thresholds at or below do not occur, nor do those above
       real(wp) :: least = 0.0_wp, greatest = 0.0_wp
-      type(threshold_law_type), private :: law
+      class(threshold_law_type), allocatable, private :: law
       !> In which coordinate the table is uniform
       integer, private :: coordinates = linear
       real(wp), private :: first = 0.0_wp, step = 1.0_wp
@@ -49,18 +49,18 @@ contains
       !> The moments
       type(partial_moments_type), intent(out) :: self
       !> The law
-      type(threshold_law_type), intent(in) :: law
+      class(threshold_law_type), intent(in) :: law
       !> Exponents a, shape (orders)
       real(wp), intent(in) :: exponent(:)
 
       real(wp) :: knot
       integer :: cell, node
 
-      self%law = law
+      allocate (self%law, source=law)
       self%exponent = exponent
       self%least = law%quantile(1.0_wp - epsilon(1.0_wp))
       self%greatest = law%quantile(outside)
-      if (law%kind == law_lognormal .or. law%kind == law_weibull) then
+      if (law%is_logarithmic) then
          self%coordinates = logarithmic
       else if (self%least < close) then
          self%coordinates = root

@@ -11,7 +11,8 @@ module mesoslip_theory_lives
       & initial_uniform, stiffness_of
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_contacts_threshold_law, only: new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws, only: law_name, make_threshold_law
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
@@ -30,7 +31,7 @@ module mesoslip_theory_lives
    !> The contacts.
    type :: contact_lives_type
       !> Law of the relative thresholds
-      type(threshold_law_type) :: law
+      class(threshold_law_type), allocatable :: law
       !> One of the coupling_ codes
       integer :: coupling = coupling_equal
       !> One of the initial_ codes
@@ -78,13 +79,11 @@ module mesoslip_theory_lives
 contains
 
    !> Set up contacts.
-   subroutine new_contact_lives(self, law, width, coupling, back_force, newborn_width, reattach, &
-      & initial, error)
+   subroutine new_contact_lives(self, law, coupling, back_force, newborn_width, reattach, initial)
       !> The contacts
       type(contact_lives_type), intent(out) :: self
-      !> One of the law_ codes, and the relative width of the law
-      integer, intent(in) :: law
-      real(wp), intent(in) :: width
+      !> Law of the thresholds, all above the back force
+      class(threshold_law_type), intent(in) :: law
       !> One of the coupling_ codes
       integer, intent(in) :: coupling
       !> Force at attaching, f_b/f_s; standard deviation of the stretch there
@@ -93,13 +92,10 @@ contains
       logical, intent(in) :: reattach
       !> One of the initial_ codes
       integer, intent(in) :: initial
-      !> Set if the law does not exist
-      type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: state(3), all(size(exponents)), stretching
 
-      call new_threshold_law(self%law, law, width, back_force, error)
-      if (allocated(error)) return
+      allocate (self%law, source=law)
       self%coupling = coupling
       self%back_force = back_force
       self%newborn_width = newborn_width
@@ -146,21 +142,23 @@ contains
       !> Set if a number is missing or superfluous, or the law does not exist
       type(error_type), allocatable, intent(out) :: error
 
+      class(threshold_law_type), allocatable :: threshold_law
       integer :: law, coupling, initial
-      real(wp) :: width, back_force, newborn_width
+      real(wp) :: back_force, newborn_width
       logical :: reattach
 
       call parameters%take("law", law, error)
-      call parameters%take("relative_width", width, error)
       call parameters%take("coupling", coupling, error)
       call parameters%take("back_force_ratio", back_force, error)
       call parameters%take("newborn_width", newborn_width, error)
       call parameters%take("reattach", reattach, error)
       call parameters%take("initial", initial, error)
+      if (allocated(error)) return
+      call make_threshold_law(threshold_law, law_name(law), parameters, back_force, error)
       call parameters%finish(error)
       if (allocated(error)) return
-      call new_contact_lives(self, law, width, coupling, back_force, newborn_width, reattach, &
-         & initial, error)
+      call new_contact_lives(self, threshold_law, coupling, back_force, newborn_width, reattach, &
+         & initial)
    end subroutine make_contact_lives
 
    !> Integrals of the newborns' state over their lives.

@@ -2,7 +2,8 @@
 program test_ageing_law
    use mesoslip_contacts_ageing_law, only: ageing_law_type, ageing_log, ageing_relax, &
       & take_ageing_law
-   use mesoslip_contacts_threshold_law, only: law_gaussian, new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws, only: new_threshold_law
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
@@ -11,7 +12,7 @@ program test_ageing_law
 
    real(wp), parameter :: width = 0.1_wp, tau = 2.0_wp
    type(ageing_law_type) :: law
-   type(threshold_law_type) :: thresholds
+   class(threshold_law_type), allocatable :: thresholds
    type(error_type), allocatable :: error
 
    call take("relax", [0.5_wp, 0.4_wp])
@@ -65,7 +66,7 @@ contains
 
       type(parameters_type) :: parameters
 
-      call new_threshold_law(thresholds, law_gaussian, width, 0.1_wp, error)
+      call new_threshold_law(thresholds, "gaussian", width, 0.1_wp, error)
       select case (kind)
       case ("relax")
          call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &

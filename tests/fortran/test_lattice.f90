@@ -13,7 +13,7 @@ program test_lattice
    use mesoslip_contacts_neighbours, only: coordination, find_neighbours, lattice_square, &
       & lattice_triangular
    use mesoslip_numerics_random, only: uniform_pair
-   use mesoslip_contacts_threshold_law, only: law_gaussian, new_threshold_law
+   use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use testing, only: check, check_close, finish
    implicit none
 
@@ -271,7 +271,7 @@ contains
       type(contact_parameters_type) :: parameters
       type(error_type), allocatable :: error
 
-      call new_threshold_law(parameters%law, law_gaussian, 0.2_wp, 0.1_wp, error)
+      call new_threshold_law(parameters%law, "gaussian", 0.2_wp, 0.1_wp, error)
       parameters%count = columns * rows
       parameters%static_force = 1.0_wp
       parameters%stiffness = 1.0_wp

@@ -15,8 +15,8 @@ program test_master_equation
    use mesoslip_numerics_quadrature, only: barycentric_weights, gauss_legendre, &
       & integration_matrix, lagrange_basis
    use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
-   use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian, law_lognormal, &
-      & law_uniform, new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws, only: new_threshold_law
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use testing, only: check, check_close, finish
    implicit none
 
@@ -24,10 +24,10 @@ program test_master_equation
 
 
    call rules()
-   call moments(law_gaussian, 0.3_wp, 0.0_wp)
-   call moments(law_gaussian, 0.01_wp, 0.1_wp)
-   call moments(law_lognormal, 0.5_wp, 0.1_wp)
-   call moments(law_uniform, 0.2_wp, 0.1_wp)
+   call moments("gaussian", 0.3_wp, 0.0_wp)
+   call moments("gaussian", 0.01_wp, 0.1_wp)
+   call moments("lognormal", 0.5_wp, 0.1_wp)
+   call moments("uniform", 0.2_wp, 0.1_wp)
    call breaking()
    call renewal()
    call sliding(coupling_scaled, initial_relaxed, 0.1_wp, rough)
@@ -58,11 +58,11 @@ contains
 
    !> Moments of order 0 are the survival function; others by a fine sum over quantiles.
    subroutine moments(kind, width, minimum)
-      integer, intent(in) :: kind
+      character(len=*), intent(in) :: kind
       real(wp), intent(in) :: width, minimum
 
       integer, parameter :: parts = 200000
-      type(threshold_law_type) :: law
+      class(threshold_law_type), allocatable :: law
       type(partial_moments_type) :: partial
       type(error_type), allocatable :: error
       real(wp) :: exact(3), quick(3), threshold, u
@@ -116,10 +116,11 @@ contains
    subroutine renewal()
       type(contact_lives_type) :: lives
       type(renewal_solution_type) :: solution
+      class(threshold_law_type), allocatable :: law
       type(error_type), allocatable :: error
 
-      call new_contact_lives(lives, law_exponential, 1.0_wp, coupling_equal, 0.0_wp, 0.0_wp, &
-         & .true., initial_relaxed, error)
+      call new_threshold_law(law, "exponential", 1.0_wp, 0.0_wp, error)
+      call new_contact_lives(lives, law, coupling_equal, 0.0_wp, 0.0_wp, .true., initial_relaxed)
       call check(.not. allocated(error), "exponential lives")
       call solve_renewal(lives, 0.0_wp, 0.25_wp, 80, 10, solution)
       call check_close(maxval(abs(solution%breaks - 1.0_wp)), 0.0_wp, 1.0e-12_wp, "Poisson process")
@@ -147,7 +148,7 @@ contains
       real(wp) :: work, start, way, velocity
       integer :: step
 
-      call new_threshold_law(parameters%law, law_gaussian, 0.1_wp, 0.1_wp, error)
+      call new_threshold_law(parameters%law, "gaussian", 0.1_wp, 0.1_wp, error)
       parameters%count = 1
       parameters%static_force = 1.0_wp
       parameters%stiffness = 1.0_wp

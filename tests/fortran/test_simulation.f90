@@ -5,7 +5,6 @@ program test_simulation
    use mesoslip_contacts_base, only: contact_record_length
    use mesoslip_contacts_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
       & initial_steady
-   use mesoslip_contacts_threshold_law, only: law_exponential, law_gaussian
    use mesoslip_boundary_handles, only: close_handle, find_simulation, open_handle
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
@@ -19,6 +18,9 @@ program test_simulation
    use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
    use testing, only: check, check_close, finish
    implicit none
+
+   !> Codes of threshold laws at the boundary
+   integer, parameter :: law_gaussian = 1, law_exponential = 5
 
    integer, parameter :: count = 200, columns = 20, layers = 6
    integer(i8), parameter :: forever = 1000000000_i8

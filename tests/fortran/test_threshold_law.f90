@@ -4,36 +4,33 @@ program test_threshold_law
    use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal, coupling_scaled
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_contacts_threshold_law, only: inverse_normal, law_exponential, law_gaussian, &
-      & law_lognormal, law_uniform, law_weibull, new_threshold_law, threshold_law_type
+   use mesoslip_contacts_threshold_laws, only: law_name, new_threshold_law
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
+   use mesoslip_contacts_threshold_laws_gaussian, only: inverse_normal
    use testing, only: check, check_close, finish
    implicit none
 
-   integer, parameter :: laws(5) = [law_gaussian, law_uniform, law_lognormal, law_weibull, &
-      & law_exponential]
-   character(len=11), parameter :: names(5) = [character(len=11) :: "gaussian", "uniform", &
-      & "lognormal", "Weibull", "exponential"]
    real(wp), parameter :: widths(3) = [0.01_wp, 0.1_wp, 0.2_wp]
    real(wp), parameter :: wide(4) = [1.0e-4_wp, 0.1_wp, 0.55_wp, 1.0_wp]
-   type(threshold_law_type) :: law
+   class(threshold_law_type), allocatable :: law
    type(error_type), allocatable :: error
    integer :: kind, width
 
-   do kind = 1, size(laws)
+   do kind = 1, size(law_name)
       do width = 1, size(widths)
-         call new_threshold_law(law, laws(kind), widths(width), 0.0_wp, error)
-         call check(.not. allocated(error), "a law: " // names(kind))
-         call moments(law, widths(width), trim(names(kind)))
-         call consistency(law, trim(names(kind)))
-         call new_threshold_law(law, laws(kind), widths(width), 0.8_wp, error)
-         call consistency(law, trim(names(kind)) // " above a minimum")
+         call new_threshold_law(law, law_name(kind), widths(width), 0.0_wp, error)
+         call check(.not. allocated(error), "a law: " // law_name(kind))
+         call moments(law, widths(width), trim(law_name(kind)))
+         call consistency(law, trim(law_name(kind)))
+         call new_threshold_law(law, law_name(kind), widths(width), 0.8_wp, error)
+         call consistency(law, trim(law_name(kind)) // " above a minimum")
          call check(law%quantile(1.0_wp - 2.0_wp**(-53)) > 0.8_wp, "thresholds exceed the minimum")
       end do
       do width = 1, size(wide)
-         if (kind == law_uniform .and. wide(width) > 0.57_wp) cycle
-         if (kind == law_exponential .and. wide(width) > 1.0_wp) cycle
-         call carried(laws(kind), wide(width), 0.0_wp, trim(names(kind)))
-         call carried(laws(kind), wide(width), 0.5_wp, trim(names(kind)) // " above a minimum")
+         if (law_name(kind) == "uniform" .and. wide(width) > 0.57_wp) cycle
+         if (law_name(kind) == "exponential" .and. wide(width) > 1.0_wp) cycle
+         call carried(law_name(kind), wide(width), 0.0_wp, "")
+         call carried(law_name(kind), wide(width), 0.5_wp, " above a minimum")
       end do
    end do
 
@@ -42,9 +39,9 @@ program test_threshold_law
    call check_close(inverse_normal(0.975_wp), 1.959963984540054_wp, 1.0e-15_wp, "normal quantile")
    call check_close(inverse_normal(1.0e-20_wp), -9.262340089798408_wp, 1.0e-14_wp, "far quantile")
 
-   call new_threshold_law(law, law_gaussian, 0.0_wp, 0.0_wp, error)
+   call new_threshold_law(law, "gaussian", 0.0_wp, 0.0_wp, error)
    call check(allocated(error), "a width of zero is refused")
-   call new_threshold_law(law, 99, 0.1_wp, 0.0_wp, error)
+   call new_threshold_law(law, "unheard", 0.1_wp, 0.0_wp, error)
    call check(allocated(error), "an unknown law is refused")
    call finish()
 
@@ -59,11 +56,11 @@ contains
       logical :: agree
 
       probability = [(real(place, wp) / (number + 1), place=1, number)]**3
-      do kind = 1, size(laws)
-         call new_threshold_law(law, laws(kind), 0.3_wp, 0.2_wp, error)
+      do kind = 1, size(law_name)
+         call new_threshold_law(law, law_name(kind), 0.3_wp, 0.2_wp, error)
          call law%quantiles(probability, threshold)
          call check(all(abs(threshold - law%quantile(probability)) <= 0.0_wp), &
-            & "quantiles of several probabilities: " // names(kind))
+            & "quantiles of several probabilities: " // law_name(kind))
          ! From the tail at small probabilities through the middle to the other tail.
          agree = .true.
          do length = 1, 70
@@ -73,13 +70,13 @@ contains
             agree = agree .and. all(abs(threshold(:length) - law%quantile(asked)) <= 0.0_wp)
             agree = agree .and. all(threshold(length + 1:) < 0.0_wp)
          end do
-         call check(agree, "quantiles of 1 to 70 probabilities: " // names(kind))
+         call check(agree, "quantiles of 1 to 70 probabilities: " // law_name(kind))
       end do
    end subroutine several
 
    !> Mean and standard deviation, integrated over the quantiles.
    subroutine moments(law, width, name)
-      type(threshold_law_type), intent(in) :: law
+      class(threshold_law_type), intent(in) :: law
       real(wp), intent(in) :: width
       character(len=*), intent(in) :: name
 
@@ -100,7 +97,7 @@ contains
 
    !> The survival function inverts the quantiles, and the density is its slope.
    subroutine consistency(law, name)
-      type(threshold_law_type), intent(in) :: law
+      class(threshold_law_type), intent(in) :: law
       character(len=*), intent(in) :: name
 
       real(wp), parameter :: probability(5) = [0.999_wp, 0.8_wp, 0.5_wp, 0.1_wp, 1.0e-4_wp]
@@ -120,41 +117,44 @@ contains
 
    !> Thresholds weighted by the distance to breaking: integrals of the law, closed forms, ends.
    subroutine carried(kind, width, minimum, name)
-      integer, intent(in) :: kind
+      character(len=*), intent(in) :: kind
       real(wp), intent(in) :: width, minimum
       character(len=*), intent(in) :: name
 
       real(wp), parameter :: probability(6) = [1.0_wp - 2.0_wp**(-53), 0.999_wp, 0.7_wp, 0.3_wp, &
          & 1.0e-3_wp, 2.0_wp**(-53)]
       integer, parameter :: couplings(2) = [coupling_equal, coupling_scaled]
-      type(threshold_law_type) :: law
+      class(threshold_law_type), allocatable :: law
       type(carried_law_type) :: weighted
       type(error_type), allocatable :: error
-      real(wp) :: threshold, previous, mean, above
+      real(wp) :: threshold, previous, mean, above, sigma
       integer :: coupling, point
 
       call new_threshold_law(law, kind, width, minimum, error)
+      sigma = sqrt(log(1.0_wp + width**2))
       do coupling = 1, size(couplings)
          call new_carried_law(weighted, law, couplings(coupling), minimum)
          mean = distance_above(law, couplings(coupling), minimum, 1.0_wp)
          previous = 0.0_wp
          do point = 1, size(probability)
             threshold = weighted%quantile(probability(point))
-            call check(threshold > max(previous, minimum), "carried thresholds grow: " // name)
+            call check(threshold > max(previous, minimum), &
+               & "carried thresholds grow: " // trim(kind) // name)
             previous = threshold
             if (abs(probability(point) - 0.5_wp) > 0.499_wp) cycle
             above = distance_above(law, couplings(coupling), minimum, law%survival(threshold))
-            call check_close(above / mean, probability(point), 1.0e-4_wp, "carried: " // name)
+            call check_close(above / mean, probability(point), 1.0e-4_wp, &
+               & "carried: " // trim(kind) // name)
             if (couplings(coupling) /= coupling_equal) cycle
             select case (kind)
-            case (law_gaussian)
+            case ("gaussian")
                call check_close(normal_above(threshold, width, minimum) &
                   & / normal_above(minimum, width, minimum), probability(point), 1.0e-11_wp, &
-                  & "closed form of carried: " // name)
-            case (law_lognormal)
-               call check_close(lognormal_above(threshold, law%scale, minimum) &
-                  & / lognormal_above(minimum, law%scale, minimum), probability(point), &
-                  & 1.0e-11_wp, "closed form of carried: " // name)
+                  & "closed form of carried: " // trim(kind) // name)
+            case ("lognormal")
+               call check_close(lognormal_above(threshold, sigma, minimum) &
+                  & / lognormal_above(minimum, sigma, minimum), probability(point), &
+                  & 1.0e-11_wp, "closed form of carried: " // trim(kind) // name)
             case default
                cycle
             end select
@@ -164,7 +164,7 @@ contains
 
    !> Distance to breaking of the contacts that are left with a probability, by a sum over it.
    function distance_above(law, coupling, minimum, probability) result(distance)
-      type(threshold_law_type), intent(in) :: law
+      class(threshold_law_type), intent(in) :: law
       integer, intent(in) :: coupling
       real(wp), intent(in) :: minimum, probability
       real(wp) :: distance

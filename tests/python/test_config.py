@@ -21,7 +21,7 @@ from mesoslip.configuration.files import override
 from mesoslip.configuration.messages import all_keys
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.configuration.threshold_law import LAWS
+from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.units import PREFIXES, SI, to_si
 from mesoslip.theory.derived import derived_quantities
 from pydantic import ValidationError

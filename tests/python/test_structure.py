@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from mesoslip.configuration.threshold_laws import LAWS
 
 FORTRAN = ROOT / "fortran"
 # Each may use those before it; contacts and sliders do not know each other, nor does theory know
@@ -129,3 +130,13 @@ def test_nobody_asks_for_a_kind(pattern):
         if re.search(pattern, line)
     ]
     assert asking == []
+
+
+def test_threshold_laws_are_the_same_on_both_sides():
+    """What the list of either side forgets, nobody can ask for."""
+    room = FORTRAN / "contacts" / "threshold_laws"
+    cases = re.findall(r'case \("(\w+)"\)', room.with_suffix(".f90").read_text())
+    configured = ROOT / "python" / "mesoslip" / "configuration" / "threshold_laws"
+    for files in (room.glob("*.f90"), configured.glob("*.py")):
+        assert sorted(cases) == sorted({path.stem for path in files} - {"base", "__init__"})
+    assert sorted(cases) == sorted(LAWS)

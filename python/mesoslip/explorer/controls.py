@@ -11,7 +11,7 @@ from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES, LA
 from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.configuration.threshold_law import LAWS
+from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.quantities import with_unit
 
 # Positions of a slider on the page.

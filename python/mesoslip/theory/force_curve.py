@@ -235,9 +235,9 @@ class ForceCurve:
         period = 0.0
         if self.config.contacts.initial == "uniform":
             period = scales.first_shortest
-        elif threshold.law == "uniform":
+        elif threshold.kind.jumps == "both":
             period = scales.first_longest - scales.first_shortest
-        elif threshold.law == "exponential":
+        elif threshold.kind.jumps == "lower":
             period = scales.shortest
         if period > width / 20:
             width = period / math.ceil(period / width)

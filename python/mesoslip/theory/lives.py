@@ -30,8 +30,7 @@ def law_parameters(config: Config, newborn_width: float = 0.0) -> dict[str, floa
     """What the kernels of the master equation are told of contacts; ``newborn_width`` in m."""
     contacts = config.contacts
     return {
-        "law": contacts.threshold.code,
-        "relative_width": contacts.threshold.relative_width,
+        **contacts.threshold.kernel_parameters,
         "coupling": COUPLINGS[contacts.coupling],
         "back_force_ratio": contacts.back_force_ratio,
         "newborn_width": newborn_width * contacts.stiffness / contacts.static_force,

@@ -101,6 +101,5 @@ def common_parameters(config: Setting) -> dict[str, float]:
         "back_force_ratio": contacts.back_force_ratio,
         "coupling": COUPLINGS[contacts.coupling],
         "reattach": int(contacts.reattach),
-        "law": contacts.threshold.code,
-        "relative_width": contacts.threshold.relative_width,
+        **contacts.threshold.kernel_parameters,
     }

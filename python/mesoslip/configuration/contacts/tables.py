@@ -25,7 +25,9 @@ from mesoslip.configuration.table import (
     choice,
     problem,
 )
-from mesoslip.configuration.threshold_law import LAWS, NARROWEST, ThresholdLaw
+from mesoslip.configuration.threshold_law import ThresholdLaw
+from mesoslip.configuration.threshold_laws import LAWS
+from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
 
 Array = NDArray[np.float64]
 
@@ -61,23 +63,21 @@ class Threshold(Table):
 
     @model_validator(mode="after")
     def _width_that_is_possible(self) -> Self:
-        if self.relative_width < NARROWEST:
-            raise problem(
-                "relative_width", f"must be at least {NARROWEST:g} (is {self.relative_width:g})"
-            )
-        law = LAWS[self.law]
-        # A width given by four digits of an irrational bound is meant to be the bound.
-        if self.relative_width > law.widest * (1 + 1e-4):
-            raise problem(
-                "relative_width",
-                f"must be at most {law.widest:.4g} for the {self.law} law{law.if_wider}",
-            )
+        wrong = self.kind.width_problem(self.relative_width)
+        if wrong:
+            raise problem("relative_width", wrong)
         return self
 
     @property
-    def code(self) -> int:
-        """The law's code in the kernels."""
-        return LAWS[self.law].code
+    def kind(self) -> ThresholdLawKind:
+        """What there is to know of the law."""
+        return LAWS[self.law]
+
+    @property
+    def kernel_parameters(self) -> dict[str, float]:
+        """What the kernel is told of the law."""
+        code = list(LAWS).index(self.law) + 1
+        return {"law": code, **self.kind.kernel_parameters(self)}
 
     def probability_above(self, threshold: float) -> float:
         """Probability that a draw of the law is above a relative threshold."""

@@ -1,0 +1,172 @@
+!> What every threshold law offers: thresholds to draw, density and survival function.
+!>
+!> Thresholds are relative, u = f_si/f_s. A law has mean 1 before thresholds that could not attach,
+!> u <= minimum, are rejected. Rejecting is done by inversion: the law that is left is the same as
+!> that of drawing again, and one draw consumes one deviate.
+module mesoslip_contacts_threshold_laws_base
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   implicit none
+   private
+
+   public :: threshold_law_type, take_relative_width
+
+   !> A law of relative thresholds, conditional on u > minimum.
+   type, abstract :: threshold_law_type
+      !> Standard deviation over mean, before rejection
+      real(wp) :: width = 0.0_wp
+      !> Thresholds at or below are rejected
+      real(wp) :: minimum = 0.0_wp
+      !> Probability that a draw is not rejected
+      real(wp) :: acceptance = 1.0_wp
+      !> Whether the density varies with the logarithm of the threshold: thresholds close to 0 are
+      !> of many orders of magnitude
+      logical :: is_logarithmic = .false.
+   contains
+      !> Take what the law is made of
+      procedure(take_interface), deferred :: take
+      !> Quantile, density and survival function before rejection
+      procedure(function_interface), deferred :: plain_quantile
+      procedure(function_interface), deferred :: plain_density
+      procedure(function_interface), deferred :: plain_survival
+      !> Thresholds that are exceeded with several probabilities, the same as those of quantile to
+      !> the bit: a law may find them in less time together
+      procedure :: quantiles
+      !> Threshold that is exceeded with a given probability
+      procedure, non_overridable :: quantile
+      !> Probability density
+      procedure, non_overridable :: density
+      !> Probability to exceed a threshold
+      procedure, non_overridable :: survival
+      !> Reject thresholds at or below a minimum
+      procedure, non_overridable :: reject_below
+      !> Smallest threshold that rejection leaves
+      procedure, non_overridable :: min_threshold
+   end type threshold_law_type
+
+   abstract interface
+      !> Take what the law is made of.
+      subroutine take_interface(self, parameters, error)
+         import :: error_type, parameters_type, threshold_law_type
+         implicit none
+         !> The law
+         class(threshold_law_type), intent(inout) :: self
+         !> Named values
+         type(parameters_type), intent(inout) :: parameters
+         !> Set if one is missing, or the law does not exist
+         type(error_type), allocatable, intent(inout) :: error
+      end subroutine take_interface
+
+      !> A function of the law before rejection.
+      pure function function_interface(self, argument) result(value)
+         import :: threshold_law_type, wp
+         implicit none
+         !> The law
+         class(threshold_law_type), intent(in) :: self
+         !> Probability to exceed the threshold, or the threshold
+         real(wp), intent(in) :: argument
+         !> Threshold, density or probability
+         real(wp) :: value
+      end function function_interface
+   end interface
+
+contains
+
+   !> Take the width of a law that has no other parameter.
+   subroutine take_relative_width(self, parameters, error)
+      !> The law
+      class(threshold_law_type), intent(inout) :: self
+      !> Named values
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if the width is missing or not positive
+      type(error_type), allocatable, intent(inout) :: error
+
+      call parameters%take("relative_width", self%width, error)
+      if (allocated(error)) return
+      if (.not. self%width > 0.0_wp) then
+         call raise(error, status_invalid, "the relative width of a threshold law must be positive")
+      end if
+   end subroutine take_relative_width
+
+   !> Reject thresholds at or below a minimum.
+   subroutine reject_below(self, minimum, error)
+      !> The law
+      class(threshold_law_type), intent(inout) :: self
+      !> Thresholds at or below are rejected; not negative
+      real(wp), intent(in) :: minimum
+      !> Set if the minimum is negative, or no threshold is above
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (.not. minimum >= 0.0_wp) then
+         call raise(error, status_invalid, "the minimum of thresholds must not be negative")
+         return
+      end if
+      self%minimum = minimum
+      self%acceptance = self%plain_survival(minimum)
+      if (.not. self%acceptance > 0.0_wp) then
+         call raise(error, status_invalid, "no threshold of the law exceeds the back force")
+      end if
+   end subroutine reject_below
+
+   !> Threshold that is exceeded with a given probability.
+   elemental function quantile(self, probability) result(threshold)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> Probability to exceed the threshold, 0 < probability < 1
+      real(wp), intent(in) :: probability
+      !> Relative threshold, greater than the law's minimum
+      real(wp) :: threshold
+
+      threshold = max(self%plain_quantile(self%acceptance * probability), self%min_threshold())
+   end function quantile
+
+   !> Thresholds that are exceeded with given probabilities.
+   pure subroutine quantiles(self, probability, threshold)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> Probabilities to exceed the thresholds, 0 < probability < 1
+      real(wp), intent(in), contiguous :: probability(:)
+      !> Relative thresholds, shape that of probability
+      real(wp), intent(out), contiguous :: threshold(:)
+
+      threshold = self%quantile(probability)
+   end subroutine quantiles
+
+   !> Smallest threshold that rejection leaves.
+   pure function min_threshold(self) result(threshold)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> A threshold just above the minimum
+      real(wp) :: threshold
+
+      threshold = self%minimum + epsilon(1.0_wp) * max(self%minimum, 1.0_wp)
+   end function min_threshold
+
+   !> Probability density of the thresholds.
+   elemental function density(self, threshold)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> Relative threshold
+      real(wp), intent(in) :: threshold
+      !> Probability density
+      real(wp) :: density
+
+      density = 0.0_wp
+      if (threshold > self%minimum) density = self%plain_density(threshold) / self%acceptance
+   end function density
+
+   !> Probability that a threshold is greater than a given one.
+   elemental function survival(self, threshold)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> Relative threshold
+      real(wp), intent(in) :: threshold
+      !> Probability
+      real(wp) :: survival
+
+      survival = 1.0_wp
+      if (threshold > self%minimum) survival = self%plain_survival(threshold) / self%acceptance
+   end function survival
+
+end module mesoslip_contacts_threshold_laws_base

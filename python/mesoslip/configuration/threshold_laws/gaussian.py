@@ -1,0 +1,7 @@
+"""The normal law, the one of the source."""
+
+from __future__ import annotations
+
+from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
+
+GAUSSIAN = ThresholdLawKind("gaussian")

@@ -1,0 +1,14 @@
+"""The uniform law."""
+
+from __future__ import annotations
+
+import math
+
+from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
+
+UNIFORM = ThresholdLawKind(
+    "uniform",
+    max_width=1 / math.sqrt(3),
+    if_wider=", whose smallest threshold would be negative",
+    jumps="both",
+)

@@ -1,0 +1,7 @@
+"""Weibull's law."""
+
+from __future__ import annotations
+
+from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
+
+WEIBULL = ThresholdLawKind("weibull")

@@ -9,13 +9,14 @@ renewal equation. Where it falls faster than the spring lets go, the slider slip
 import matplotlib.pyplot as plt
 import mesoslip
 import numpy as np
+from mesoslip.theory.force_curve import ForceCurve
 
 config = mesoslip.Config.load("klein.toml").replace(
     "contacts.coupling=equal",
     "contacts.back_force_ratio=0",
     "contacts.threshold.relative_width=0.2",
 )
-curve = mesoslip.ForceCurve(config)
+curve = ForceCurve(config)
 stretch = config.contacts.break_stretch
 x = np.linspace(0, 6 * stretch, 600)
 

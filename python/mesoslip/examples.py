@@ -1,8 +1,9 @@
-"""The runs that come with the program, to start from."""
+"""Example configurations, installed with the package."""
 
 from __future__ import annotations
 
 import difflib
+import os
 import tomllib
 from importlib.resources import files
 from pathlib import Path
@@ -13,15 +14,12 @@ ENDING = ".toml"
 
 
 def _folder() -> Path:
-    """Where the runs are installed; they are those of the repository."""
+    """The folder of the installed examples."""
     return Path(str(files("mesoslip") / "runs"))
 
 
 def examples() -> dict[str, str]:
-    """Titles of the runs that come with the program, by name.
-
-    A run without a title has the first line of its comment.
-    """
+    """Titles of the examples by name; without a title the first line of the comment."""
     found = {}
     folder = _folder()
     for path in sorted(folder.rglob(f"*{ENDING}")):
@@ -32,56 +30,57 @@ def examples() -> dict[str, str]:
     return found
 
 
-def example(name: str, file: Path) -> list[Path]:
-    """Write a run that comes with the program, and beside it what it is based on.
+def example(name: str, file: str | os.PathLike[str] | None = None) -> list[Path]:
+    """Write an example configuration, and beside it the files that it is based on.
 
     Parameters
     ----------
     name
-        One of `examples`.
+        One of `examples`, such as "klein".
     file
-        Where to write it.
+        The file to write; ``NAME.toml`` in the current folder by default.
 
     Returns
     -------
     list of pathlib.Path
-        The files that were written; what it is based on is not if it is there already.
+        The files that were written. Files that it is based on are not written over.
 
     Raises
     ------
     ConfigError
-        If there is no such run.
+        If there is no such example.
     FileError
-        If there is a file of the name already, or it cannot be written.
+        If the file exists, or cannot be written.
     """
     known = examples()
     if name not in known:
-        near = difflib.get_close_matches(name, known, 3, 0.6)
-        told = "no such example; " + (
+        near = difflib.get_close_matches(str(name), known, 3, 0.6)
+        message = "no such example; " + (
             f"did you mean {' or '.join(near)}?" if near else "mesoslip example lists them"
         )
-        raise ConfigError([Problem("", "example", told, name)])
-    if file.exists():
-        raise FileError(f"{file}: is there already; give another name with -o, or remove it")
+        raise ConfigError([Problem("", "example", message, name)])
+    target = Path(file or f"{Path(name).name}{ENDING}")
+    if target.exists():
+        raise FileError(f"{target}: exists already; give another name with -o, or remove it")
     written = []
-    path: Path | None = _folder() / f"{name}{ENDING}"
-    while path is not None:
-        text = path.read_text(encoding="utf-8")
+    source: Path | None = _folder() / f"{name}{ENDING}"
+    while source is not None:
+        text = source.read_text(encoding="utf-8")
         base = tomllib.loads(text).get("base")
         if base is not None:
-            # What it is based on stands beside it, wherever it stands here.
+            # The base is written beside it, wherever it is installed.
             text = text.replace(f'"{base}"', f'"{Path(base).name}"', 1)
         try:
-            file.parent.mkdir(parents=True, exist_ok=True)
+            target.parent.mkdir(parents=True, exist_ok=True)
             # Never over a file of somebody, not even one that has come meanwhile.
-            with file.open("x", encoding="utf-8") as stream:
+            with target.open("x", encoding="utf-8") as stream:
                 stream.write(text)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise FileError(f"{file}: cannot be written: {reason}") from error
-        written.append(file)
-        path = None if base is None else path.parent / base
-        if path is not None:
-            file = file.with_name(path.name)
-            path = None if file.exists() else path
+            raise FileError(f"{target}: cannot be written: {reason}") from error
+        written.append(target)
+        source = None if base is None else source.parent / base
+        if source is not None:
+            target = target.with_name(source.name)
+            source = None if target.exists() else source
     return written

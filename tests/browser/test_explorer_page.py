@@ -298,7 +298,7 @@ def test_files_are_saved(server, browser, tmp_path):
     assert saved == Config.load(ROOT / "runs" / "klein.toml", ["contacts.delay=0.4 ms"])
     browser.element("download", "button").click()
     assert eventually((tmp_path / "klein.nc").exists)
-    tree = mesoslip.read(tmp_path / "klein.nc")
+    tree = mesoslip.open_output(tmp_path / "klein.nc")
     assert float(tree["spring_force"].max()) == pytest.approx(
         1e-6 * max(browser.data("force:force")), rel=1e-3
     )

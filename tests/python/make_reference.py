@@ -13,7 +13,7 @@ if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     for name, case in CASES.items():
         path, tree = FOLDER / f"{name}.nc", case()
-        told = report(name, mesoslip.read(path), tree) if path.exists() else f"{name}: new"
+        told = report(name, mesoslip.open_output(path), tree) if path.exists() else f"{name}: new"
         print(told or f"{name}: as it was")
         if told:
             files.write(tree, path)

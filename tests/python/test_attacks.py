@@ -50,7 +50,7 @@ def test_functions_are_seen():
 def test_history_is_what_was_typed(short, tmp_path, command):
     output = tmp_path / "out with space.nc"
     assert command("run", short, "-o", output, "--set", "contacts.delay=1 ms")[0] == 0
-    history = mesoslip.read(output).attrs["history"]
+    history = mesoslip.open_output(output).attrs["history"]
     assert f"mesoslip run {short} -o '{output}' --set 'contacts.delay=1 ms'" in history
     assert "in Python" in mesoslip.run(short).attrs["history"]
 
@@ -116,7 +116,7 @@ def test_links_are_followed(short, tmp_path, command):
     (tmp_path / "out.nc").symlink_to(tmp_path / "store" / "real.nc")
     assert command("run", short, "-o", tmp_path / "out.nc")[0] == 0
     assert (tmp_path / "out.nc").is_symlink()
-    assert mesoslip.read(tmp_path / "store" / "real.nc")["time"].size
+    assert mesoslip.open_output(tmp_path / "store" / "real.nc")["time"].size
 
 
 def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
@@ -160,7 +160,7 @@ def test_closed_streams(closed, short, tmp_path):
     output = tmp_path / "out.nc"
     line = f"{sys.executable} -m mesoslip run {short} -o {output} {closed}"
     assert subprocess.run(["sh", "-c", line], check=False).returncode == 0
-    assert mesoslip.read(output)["time"].size
+    assert mesoslip.open_output(output)["time"].size
 
 
 def test_names_that_are_not_utf_8(short, tmp_path, command):
@@ -207,7 +207,7 @@ for _ in range(int(sys.argv[4])):
     flipped = bytearray(data)
     flipped[generator.integers(len(data))] ^= 1 << generator.integers(8)
     path.write_bytes(flipped)
-    for use in (mesoslip.read, mesoslip.slips, mesoslip.plot, mesoslip.info):
+    for use in (mesoslip.open_output, mesoslip.slips, mesoslip.plot, mesoslip.derived):
         try:
             use(path)
         except mesoslip.MesoslipError:

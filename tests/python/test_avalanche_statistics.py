@@ -601,9 +601,9 @@ def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
     assert tree["tested_count"] == tree["fitted_count"] == tree["fitted_share"] * tree["count"]
     assert "warning" not in command("avalanches", output)
 
-    shown = command("avalanches", output, "--smallest", 1)
+    shown = command("avalanches", output, "--min-size", 1)
     assert "warning: the sizes are not of this law (p = 0.005)" in shown
-    answer = json.loads(command("avalanches", output, "--smallest", 1, "--json"))["statistics"]
+    answer = json.loads(command("avalanches", output, "--min-size", 1, "--json"))["statistics"]
     assert answer["fit_rejected"] == 1
     assert answer["tested_count"] == answer["count"]
     for law in ("pure", "lognormal", "stretched_exponential"):
@@ -611,7 +611,7 @@ def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
         assert 0 <= answer[f"{law}_p_value"] <= 1
         assert math.isfinite(answer[f"{law}_ratio"])
 
-    run = mesoslip.read(output)
+    run = mesoslip.open_output(output)
     title = avalanche_plots.distribution(run).axes[0].get_title("left")
     assert "rejected" not in title
     assert f"from $s$ = {tree['smallest_fitted']:g} on" in title

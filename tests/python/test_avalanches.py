@@ -80,7 +80,7 @@ def test_sizes_in_stationary_sliding_are_those_of_a_branching_process(ratio, lar
     # The mean size, 1/(1 - r) = 1 + Nk/K, and the share of slip, both exact.
     error = sizes.std() / math.sqrt(len(sizes))
     assert abs(sizes.mean() - (1 + 1 / ratio)) < 4 * error
-    summary = mesoslip.avalanche_summary(tree, smallest=10)
+    summary = mesoslip.avalanche_summary(tree, min_size=10)
     np.testing.assert_allclose(summary["slip_share"], r, rtol=0.02)
     # An exponent of 3/2, and a cutoff that grows as K/(Nk) shrinks.
     assert abs(summary["exponent"] - 1.5) < 4 * summary["exponent_error"]
@@ -134,7 +134,7 @@ def test_bursts_of_a_bundle(bundles):
 def test_bursts_near_failure(bundles):
     """Within a thousandth of the strength the exponent is 3/2 (Pradhan, Hansen, Hemmer,
     Phys. Rev. Lett. 95 (2005) 125501)."""
-    sizes = mesoslip.avalanches(bundles, force_above=0.999)["size"].values
+    sizes = mesoslip.avalanches(bundles, min_force_ratio=0.999)["size"].values
     assert len(sizes) > 500
     fit = fit_power_law(sizes, largest=170, smallest=1)
     assert abs(fit.exponent - 1.5) < 4 * fit.exponent_error < 0.2
@@ -162,7 +162,7 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_told(command, tmp_path):
     assert tree.attrs["ending"].startswith("contacts break under the force without end; breaks")
     assert tree.attrs["complete"] == "true"
     # Rebirth makes the contacts no stronger than in their stationary state, within fluctuations.
-    steady = mesoslip.info(Config.from_dict(tables))["F_steady"].value
+    steady = mesoslip.derived(Config.from_dict(tables))["F_steady"].value
     peak = mesoslip.avalanche_summary(tree)["strength"]
     assert 0.9 * steady < peak < 1.2 * steady
     # The slide without end is no avalanche; and the force curve needs no spring.

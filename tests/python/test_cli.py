@@ -72,7 +72,7 @@ def test_an_output_can_be_run_again(short, tmp_path, command):
     first, second = tmp_path / "first.nc", tmp_path / "second.nc"
     assert command("run", short, "-o", first, "--set", "contacts.delay=1ms")[0] == 0
     assert command("run", first, "-o", second, "--quiet") == (0, "", "")
-    one, other = mesoslip.read(first), mesoslip.read(second)
+    one, other = mesoslip.open_output(first), mesoslip.open_output(second)
     np.testing.assert_array_equal(one["spring_force"].values, other["spring_force"].values)
     assert one.attrs["configuration"] == other.attrs["configuration"]
 
@@ -196,7 +196,7 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
     assert "Traceback" not in told
     assert "interrupted" in told
     assert {path.name for path in tmp_path.iterdir()} == {"long.partial.nc", "long.checkpoint"}
-    tree = mesoslip.read(tmp_path / "long.partial.nc")
+    tree = mesoslip.open_output(tmp_path / "long.partial.nc")
     assert tree.attrs["complete"] == "false"
     assert tree["time"].values[-1] > 2
     mesoslip.plot(tree, tmp_path / "partial.png")
@@ -210,7 +210,7 @@ def test_curve_tells_the_instability(short, tmp_path, command):
     summary = json.loads(told)
     for name in ("K_star", "X_c", "F_peak", "F_steady", "D0", "D1", "D2", "D3", "stable", "digits"):
         assert name in summary
-    tree = mesoslip.read(output)
+    tree = mesoslip.open_output(output)
     for node in tree.subtree:
         for name, variable in node.variables.items():
             assert "units" in variable.attrs, name
@@ -249,7 +249,7 @@ def test_onset_writes_both_equations(short, tmp_path, command):
     status, told, _ = command("onset", short, "-o", output, "--json")
     assert status == 0
     assert json.loads(told)["alpha"] == pytest.approx(14.2, abs=0.1)
-    assert set(mesoslip.read(output).children) == {"sequential", "melting"}
+    assert set(mesoslip.open_output(output).children) == {"sequential", "melting"}
     assert command("plot", output)[0] == 0
 
 
@@ -260,7 +260,7 @@ def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
     assert "1 slip, " in told
     assert command("slips", output)[0] == 0
     assert command("plot", output)[0] == 0
-    detached = mesoslip.read(output)["detached_contacts"].values
+    detached = mesoslip.open_output(output)["detached_contacts"].values
     assert np.any(detached % 1 > 0)
 
 

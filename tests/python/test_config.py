@@ -23,7 +23,7 @@ from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.units import PREFIXES, SI, to_si
-from mesoslip.theory.derived import derived_quantities
+from mesoslip.theory.derived import derived
 from pydantic import ValidationError
 
 LAYERED = {"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 4}
@@ -705,8 +705,8 @@ def test_nothing_overflows_within_the_bounds(keys, data):
         config = Config.from_dict(tables)
     except ConfigError:
         return
-    derived = derived_quantities(config)
-    assert {"contact_stiffness", "omega_s", "mean_life", "F_steady"} <= derived.keys()
+    quantities = derived(config)
+    assert {"contact_stiffness", "omega_s", "mean_life", "F_steady"} <= quantities.keys()
     for name, value in config.slider.kernel_parameters(config).items():
         assert math.isfinite(value), name
     for name, value in config.contact_kind.kernel_parameters(config).items():
@@ -768,11 +768,11 @@ def test_narrow_laws_have_their_quantities(klein, law, width):
     config = klein(
         contacts__threshold={"law": law, "relative_width": width}, contacts__coupling="equal"
     )
-    derived = derived_quantities(config)
-    assert derived["threshold_acceptance"].value == pytest.approx(1, abs=0.05)
+    quantities = derived(config)
+    assert quantities["threshold_acceptance"].value == pytest.approx(1, abs=0.05)
     if width < 0.1:
         expected = 0.5 * (1 + 0.1) * 18e-6 * (1 + width**2 / (1 - 0.1**2))
-        assert derived["F_steady"].value == pytest.approx(expected, rel=1e-9)
+        assert quantities["F_steady"].value == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_a_law_does_not_have():
@@ -814,7 +814,7 @@ def test_stages_and_duration(stages, duration, expected):
 
 def test_derived_quantities_of_klein(klein):
     """Model sections 1 and 7, the second column: what the source's own formulas give."""
-    derived = {name: one.value for name, one in derived_quantities(klein()).items()}
+    quantities = {name: one.value for name, one in derived(klein()).items()}
     expected = {
         "omega_s": 257,
         "setup_period": 0.0245,
@@ -825,10 +825,10 @@ def test_derived_quantities_of_klein(klein):
         "break_stretch": 9e-9,
     }
     for name, value in expected.items():
-        assert derived[name] == pytest.approx(value, rel=5e-3)
-    prescribed = derived_quantities(klein(slider={"kind": "prescribed"}))
+        assert quantities[name] == pytest.approx(value, rel=5e-3)
+    prescribed = derived(klein(slider={"kind": "prescribed"}))
     assert "omega_s" not in prescribed
-    assert "alpha" not in derived_quantities(klein(drive__velocity=0.0))
+    assert "alpha" not in derived(klein(drive__velocity=0.0))
 
 
 QUASISTATIC = {"kind": "quasistatic", "stiffness": 97.0}

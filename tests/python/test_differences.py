@@ -59,7 +59,9 @@ def test_an_output_tells_what_its_run_changes(tmp_path, command):
     assert command("run", KLEIN, "-o", first, "--quiet", *changes)[0] == 0
     assert command("run", first, "-o", again, "--quiet")[0] == 0
     assert command("run", first, "-o", other, "--quiet", "--set", "run.seed=2")[0] == 0
-    bases = [mesoslip.read(path).attrs["base_configuration"] for path in (first, again, other)]
+    bases = [
+        mesoslip.open_output(path).attrs["base_configuration"] for path in (first, again, other)
+    ]
     assert bases[0] == bases[1] == tree.attrs["base_configuration"]
     assert bases[2] == tree.attrs["configuration"]
 

@@ -36,7 +36,7 @@ def staircase(steps):
 
 
 def stages_of(tree):
-    return mesoslip.group(tree, "stages")
+    return tree["stages"].to_dataset(inherit=False)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,9 @@ def test_stages_are_what_fine_samples_show(kind):
 
 def assert_equal(one, other, groups=("", "slips", "stages")):
     for group in groups:
-        first, second = (mesoslip.group(tree, group) if group else tree for tree in (one, other))
+        first, second = (
+            tree[group].to_dataset(inherit=False) if group else tree for tree in (one, other)
+        )
         for name in first.data_vars:
             if name != "kernel_seconds":
                 values = first[name].values
@@ -443,7 +445,10 @@ def test_a_run_ends_with_a_slip(count):
     tree = mesoslip.run(configuration("rigid", **tables))
     whole = mesoslip.run(configuration("rigid", **SLOW | {"run": {"duration": 4.0}}))
     assert tree.attrs["ending"] == "as many slips as wanted"
-    slips, all_slips = mesoslip.group(tree, "slips"), mesoslip.group(whole, "slips")
+    slips, all_slips = (
+        tree["slips"].to_dataset(inherit=False),
+        whole["slips"].to_dataset(inherit=False),
+    )
     assert slips.sizes["slip"] == count < all_slips.sizes["slip"]
     assert np.array_equal(slips["end_time"], all_slips["end_time"][:count])
     end = stages_of(tree)["stage_end_time"].values[-1]
@@ -516,10 +521,10 @@ def test_what_is_wrong_with_an_end_is_told(changes, words):
 
 def test_info_knows_ramps_and_holds(klein):
     """Their stages, duration, way, and the speed that stands for them elsewhere."""
-    derived = mesoslip.info(klein(run__duration=None, **RAMPS))
+    derived = mesoslip.derived(klein(run__duration=None, **RAMPS))
     values = {name: derived[name].value for name in derived if name.startswith("drive_")}
     expected = {"stages": 3, "duration": 0.1, "way": 4e-7 + 0.05 * (1e-10 + 4e-10) / 6e-5}
     for name, value in expected.items():
         assert values[f"drive_{name}"] == pytest.approx(value)
     assert values["drive_speed"] == 2e-5
-    assert "drive_way" not in mesoslip.info(klein())
+    assert "drive_way" not in mesoslip.derived(klein())

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mesoslip import ForceCurve, _core
+from mesoslip import _core
 from mesoslip.simulation.kernel import named
+from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.lives import law_parameters
 from oracles import frozen_law, stationary_force
 from scipy import integrate

@@ -7,7 +7,7 @@ import pytest
 import sksundae
 from mesoslip.output import layout
 from mesoslip.simulation.realization import Realization
-from mesoslip.theory.derived import derived_quantities
+from mesoslip.theory.derived import derived
 from scipy import linalg
 
 MASS, STIFFNESS = 1.47e-3, 97.0
@@ -304,9 +304,9 @@ def test_everything_pinned_rings_at_the_frequency_of_the_base(klein):
         output__interval=1e-3,
     )
     trace = finish(config).trace
-    derived = derived_quantities(config)["pinned_base_frequency"].value
+    frequency = derived(config)["pinned_base_frequency"].value
     # Layers on their spring to the drive, which moves evenly, add its stiffness.
-    expected = np.sqrt(derived**2 + STIFFNESS / (1.0 + MASS))
+    expected = np.sqrt(frequency**2 + STIFFNESS / (1.0 + MASS))
     position = trace[:, 8] - np.polyval(np.polyfit(trace[:, 0], trace[:, 8], 1), trace[:, 0])
     crossings = np.flatnonzero(np.diff(np.sign(position)) > 0)
     exact = trace[crossings, 0] - position[crossings] * 1e-3 / np.diff(position)[crossings]
@@ -374,6 +374,6 @@ def test_the_cantilever(klein):
     config = klein(slider={"kind": "layered", "layers": 8, "cantilever": rod})
     assert config.slider.mass == pytest.approx(7800 * np.pi * 1e-6 * 0.05)
     assert config.slider.stiffness == pytest.approx(3 * 2e11 * np.pi * 1e-12 / 4 / 0.05**3)
-    derived = derived_quantities(config)
-    assert derived["bending_ratio"].value == pytest.approx(2.03, abs=0.005)
-    assert derived["chain_frequency"].value == pytest.approx(config.slider.frequencies[0])
+    quantities = derived(config)
+    assert quantities["bending_ratio"].value == pytest.approx(2.03, abs=0.005)
+    assert quantities["chain_frequency"].value == pytest.approx(config.slider.frequencies[0])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mesoslip import ForceCurve
 from mesoslip.simulation.realization import Realization
+from mesoslip.theory.force_curve import ForceCurve
 from oracles import frozen_law, stationary_force
 from states import entries, reals, saved
 

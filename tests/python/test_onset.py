@@ -5,7 +5,8 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip import ConfigError, ForceCurve
+from mesoslip import ConfigError
+from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.slip_onset import EXPANSION_ERROR, end_of_expansion, solve
 from scipy import integrate
 

@@ -121,7 +121,7 @@ def test_rows_of_the_kernel_become_variables(results):
         force = tree["spring_force"].values[place]
         np.testing.assert_array_equal(force[: len(trace)], trace[:, 4])
         assert np.isnan(force[len(trace) :]).all()
-        slips, data = one.rows("slips").read(), mesoslip.group(tree, "slips")
+        slips, data = one.rows("slips").read(), tree["slips"].to_dataset(inherit=False)
         mine = data["realization_index"].values == place
         np.testing.assert_array_equal(data["force_drop"].values[mine], slips[:, 3] - slips[:, 4])
         np.testing.assert_array_equal(data["contacts_broken"].values[mine], slips[:, 6])
@@ -132,7 +132,7 @@ def test_rows_of_the_kernel_become_variables(results):
         }
         for group in tables.keys() & tree.children.keys():
             table, columns = tables[group]
-            data, rows = mesoslip.group(tree, group), one.rows(table).read()
+            data, rows = tree[group].to_dataset(inherit=False), one.rows(table).read()
             mine = data["realization_index"].values == place
             for name, column in columns.items():
                 np.testing.assert_array_equal(data[name].values[mine], rows[:, column], name)
@@ -266,7 +266,7 @@ def test_methods_of_a_tree_work_on_the_whole(results, tmp_path):
         )
         for name, node in tree.children.items():
             assert set(node.to_dataset().data_vars) == set(node.data_vars)
-            alone = mesoslip.group(tree, name)
+            alone = tree[name].to_dataset(inherit=False)
             expected = int(np.prod([alone.sizes[one] for one in alone.dims]))
             assert len(alone.to_dataframe()) == expected
             # The same without us, from the file.
@@ -289,7 +289,7 @@ def test_files_of_earlier_versions_are_read():
         numbers = file["slips"]["realization"][:]
         starts = file["avalanches"]["time"][:]
         moments = file["snapshots"]["time"][:]
-    tree = mesoslip.read(path)
+    tree = mesoslip.open_output(path)
     np.testing.assert_array_equal(tree["slip_traces"]["sample_time"].values, times)
     np.testing.assert_array_equal(tree["slips"]["realization_index"].values, numbers)
     np.testing.assert_array_equal(tree["avalanches"]["start_time"].values, starts)

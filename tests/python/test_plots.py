@@ -19,7 +19,7 @@ from mesoslip.plots.run import Extent
 @pytest.fixture(scope="module")
 def old():
     """An output with a lattice, avalanches and snapshots."""
-    return mesoslip.read(ROOT / "tests" / "reference" / "old.nc")
+    return mesoslip.open_output(ROOT / "tests" / "reference" / "old.nc")
 
 
 @pytest.mark.parametrize("view", [None, "run", "avalanches", "lattice"])

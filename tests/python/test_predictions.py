@@ -9,6 +9,7 @@ import xarray as xr
 from conftest import klein_tables
 from matplotlib.contour import ContourSet
 from mesoslip.campaign.measures import MEASURES, RunView
+from mesoslip.theory.force_curve import ForceCurve
 
 SHORT = {"run__duration": 0.3, "contacts__count": 100}
 
@@ -29,7 +30,7 @@ def test_growth_is_that_of_steady_sliding(delay, klein):
 
 
 def test_critical_stiffness_is_that_of_the_curve(klein):
-    critical, _ = mesoslip.ForceCurve(klein(**SHORT)).K_star
+    critical, _ = ForceCurve(klein(**SHORT)).K_star
     assert measured("critical_stiffness_ratio") == pytest.approx(critical / 97, rel=1e-9)
     assert measured("critical_stiffness_ratio", slider__stiffness=2 * critical) == pytest.approx(
         0.5

@@ -153,7 +153,7 @@ def test_a_slider_without_inertia(klein):
     )
     found = mesoslip.regime(mesoslip.run(soft))
     assert found["regime"] == [STICK_SLIP]
-    life = mesoslip.info(soft)["mean_life"].value
+    life = mesoslip.derived(soft)["mean_life"].value
     assert float(found["period"][0]) * 1e-6 == pytest.approx(life, rel=0.01)
     stiff = klein(
         slider={"kind": "quasistatic", "stiffness": 1e5},

@@ -163,6 +163,6 @@ def test_times_are_in_the_table(tmp_path, command):
     assert rows[0]["waiting_time [s]"] == ""
     waiting = [float(row["waiting_time [s]"]) for row in rows[1:]]
     np.testing.assert_array_equal(waiting, slips["waiting_time"].values[1:])
-    lasting = [float(row["slip_time [s]"]) for row in rows]
-    np.testing.assert_array_equal(lasting, slips["slip_time"].values)
+    lasting = [float(row["duration [s]"]) for row in rows]
+    np.testing.assert_array_equal(lasting, slips["duration"].values)
     assert json.loads(told)["slips"][0]["waiting_time"] is None

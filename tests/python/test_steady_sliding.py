@@ -12,6 +12,7 @@ import pytest
 from conftest import ROOT
 from mesoslip import ConfigError, SteadySliding
 from mesoslip.quantities import with_unit
+from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.steady_sliding import stability_boundary, stable_stiffness
 from scipy import special
 
@@ -90,7 +91,7 @@ def test_response_is_that_of_the_linearized_equations(klein, changes):
 def test_force_and_slope_are_closed_forms(klein, law):
     config = klein(contacts__threshold={"law": law, "relative_width": 0.4}, drive__velocity=1e-5)
     sliding = SteadySliding(config)
-    quantities = mesoslip.info(config)
+    quantities = mesoslip.derived(config)
     assert sliding.force == pytest.approx(quantities["F_steady_drive"].value, rel=1e-7)
     life = sliding.lives.mean_life * config.contacts.break_stretch
     assert life == pytest.approx(quantities["mean_life"].value, rel=1e-7)
@@ -187,7 +188,7 @@ def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
     config = klein()
     found, most = stable_stiffness(config), stable_stiffness(config, out_of_step=True)
     # K* is far above, and the spring of the experiment below.
-    assert 97 < most < found < mesoslip.ForceCurve(config).K_star[0] / 10
+    assert 97 < most < found < ForceCurve(config).K_star[0] / 10
     for factor, is_stable in ((0.99, False), (1.01, True), (8, True)):
         sliding = SteadySliding(config.replace({"slider.stiffness": factor * found}))
         assert sliding.is_stable == is_stable
@@ -238,15 +239,15 @@ def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
         assert "also of contacts that break out of step" in told
     status, told, _ = command("info", file, "--set", "contacts.delay=0")
     assert "is stable, as there is no delay" in told
-    quantities = mesoslip.info(klein())
+    quantities = mesoslip.derived(klein())
     assert quantities["steady_growth_rate"].value == SteadySliding(klein()).growth_rate
     assert quantities["steady_frequency"].unit == "1/s"
     neighbours = {"strength": 0.1, "columns": 60, "rows": 68}
-    assert "steady_growth_rate" not in mesoslip.info(klein(interaction=neighbours))
+    assert "steady_growth_rate" not in mesoslip.derived(klein(interaction=neighbours))
     # What takes long is left out.
-    assert "steady_growth_rate" not in mesoslip.info(klein(contacts__delay=1e4))
+    assert "steady_growth_rate" not in mesoslip.derived(klein(contacts__delay=1e4))
     for slider in ({"kind": "prescribed"}, {"kind": "quasistatic", "stiffness": 97.0}):
-        assert "steady_growth_rate" not in mesoslip.info(klein(slider=slider))
+        assert "steady_growth_rate" not in mesoslip.derived(klein(slider=slider))
 
 
 def test_what_leaves_the_range_of_numbers_is_told(klein):
@@ -258,4 +259,4 @@ def test_what_leaves_the_range_of_numbers_is_told(klein):
     )
     with pytest.raises(mesoslip.RunError, match="range of floating-point numbers"):
         _ = SteadySliding(config).unstable_count
-    assert "steady_growth_rate" not in mesoslip.info(config)
+    assert "steady_growth_rate" not in mesoslip.derived(config)

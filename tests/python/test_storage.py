@@ -29,7 +29,7 @@ def test_a_locked_output_is_not_called_damaged(output, command):
         status, _, told = command("slips", output)
         assert status == 2
         assert "is locked by a program that writes to it" in told
-    assert mesoslip.read(output)["time"].size
+    assert mesoslip.open_output(output)["time"].size
 
 
 def test_a_file_system_without_locks_is_told(output, monkeypatch):
@@ -44,7 +44,7 @@ def test_a_file_system_without_locks_is_told(output, monkeypatch):
     monkeypatch.setattr(fcntl, "flock", refuse)
     monkeypatch.setattr(files, "_groups", fail)
     with pytest.raises(FileError, match=r"no locks \(No locks available\).*LOCKING=FALSE"):
-        mesoslip.read(output)
+        mesoslip.open_output(output)
     before = output.read_bytes()
     with (
         pytest.raises(FileError, match=r"no locks \(No locks available\).*LOCKING=FALSE"),
@@ -60,12 +60,12 @@ def test_a_newer_output_that_cannot_be_read_is_told(version, told, output):
     with netCDF4.Dataset(output, "a") as file:
         file.program_version = version
     # What is understood is read.
-    assert mesoslip.read(output)["time"].size
+    assert mesoslip.open_output(output)["time"].size
     with netCDF4.Dataset(output, "a") as file:
         file.renameVariable("velocity", "speed")
     with pytest.raises(FileError, match=told):
-        mesoslip.read(output)
+        mesoslip.open_output(output)
     with netCDF4.Dataset(output, "a") as file:
         file.program_version = "0.0.1"
     with pytest.raises(FileError, match="damaged"):
-        mesoslip.read(output)
+        mesoslip.open_output(output)

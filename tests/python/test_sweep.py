@@ -424,7 +424,7 @@ def test_outputs_of_points_on_request(tmp_path):
     assert done_by(plan, tmp_path).taken == 6
     assert done_by(Plan.from_dict(tables()), tmp_path).taken == 6
     place = next(iter(runner.places(plan)))
-    tree = mesoslip.read(tmp_path / f"{place.name}.nc")
+    tree = mesoslip.open_output(tmp_path / f"{place.name}.nc")
     expected = mesoslip.run(place.combination.config)
     np.testing.assert_array_equal(tree["spring_force"], expected["spring_force"])
 

@@ -137,7 +137,7 @@ def test_a_table_becomes_an_output(tmp_path, command):
     status, _, told = command("trace", table, "-o", output, *known)
     assert status == 0
     assert "7 slips" in told
-    tree = mesoslip.read(output)
+    tree = mesoslip.open_output(output)
     np.testing.assert_allclose(tree["spring_force"].values[0], force, atol=1e-10)
     # Displacements follow from the spring, which sticks to the run's but for noise over stiffness.
     error = tree["displacement"].values[0] - run["displacement"].values[0]

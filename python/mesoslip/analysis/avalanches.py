@@ -13,6 +13,7 @@ from mesoslip.analysis.avalanche_statistics import REJECTED, compare_laws, fit_p
 from mesoslip.analysis.slips import write_table
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
+from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.layout import group_of
 
 NO_AVALANCHES = (
@@ -64,66 +65,83 @@ SUMMARY = {
 
 
 def avalanches(
-    tree: xr.DataTree, *, after: float = 0.0, force_above: float | None = None
+    output: OutputLike, *, after: float = 0.0, min_force_ratio: float | None = None
 ) -> xr.Dataset:
-    """The avalanches of an output, dimension ``avalanche``.
+    """The catalogue of avalanches of an output, dimension ``avalanche``, in SI.
+
+    See `mesoslip.avalanche_summary` for their statistics, and for fits and histograms of sizes
+    `mesoslip.analysis.avalanche_statistics`.
 
     Parameters
     ----------
-    tree
+    output
         Output of a run.
     after
-        Only those that start after this time [s].
-    force_above
-        Only those before the greatest contact force of their realization, at more than this part of
-        it: those near the failure of a bundle.
+        Only avalanches that start after this time [s].
+    min_force_ratio
+        Only avalanches before the maximum of the contact force in their realization, at forces
+        above this fraction of it: those near the failure of a bundle.
+
+    Returns
+    -------
+    xarray.Dataset
+        The group ``avalanches`` of the output, with the coordinate ``realization_index``.
 
     Raises
     ------
     FileError
-        If the output has none.
+        If the output cannot be read, or has no avalanches.
     """
+    tree = as_run(output)
     if "avalanches" not in tree.children:
         raise FileError(NO_AVALANCHES)
-    data = group_of(tree, "avalanches")
+    data = group_of(tree, "avalanches").set_coords("realization_index")
     chosen = data["start_time"].values >= after
-    if force_above is not None:
+    if min_force_ratio is not None:
         force = np.abs(data["force_before"].values)
         owner = data["realization_index"].values
         for realization in np.unique(owner):
             mine = np.flatnonzero(owner == realization)
             peak = mine[np.argmax(force[mine])]
-            chosen[mine] &= (force[mine] > force_above * force[peak]) & (mine < peak)
+            chosen[mine] &= (force[mine] > min_force_ratio * force[peak]) & (mine < peak)
     return data.isel(avalanche=np.flatnonzero(chosen))
 
 
-def statistics(
-    tree: xr.DataTree,
+def avalanche_summary(
+    output: OutputLike,
     *,
     after: float = 0.0,
-    force_above: float | None = None,
-    smallest: int | None = None,
+    min_force_ratio: float | None = None,
+    min_size: int | None = None,
 ) -> dict[str, float | None]:
-    """Statistics of the avalanches of an output, with the names of `SUMMARY`.
+    """Statistics of the avalanches of an output, in SI, by the names that ``mesoslip avalanches``
+    explains.
 
     Parameters
     ----------
-    tree, after, force_above
+    output, after, min_force_ratio
         See `avalanches`.
-    smallest
-        Least size that the law is fitted to; chosen by default, see
+    min_size
+        Smallest size in the fit of the size distribution; chosen by default, see
         `mesoslip.analysis.avalanche_statistics.fit_power_law`.
 
     Returns
     -------
     dict
-        What the output does not tell is left out; a cutoff that the sizes do not resolve is None.
+        Statistics that are not defined for the output are left out; a cutoff that the sizes do not
+        resolve is None.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read, or has no avalanches.
     """
-    data = avalanches(tree, after=after, force_above=force_above)
+    tree = as_run(output)
+    data = avalanches(tree, after=after, min_force_ratio=min_force_ratio)
     config = Config.from_toml(tree.attrs["configuration"])
     sizes = data["size"].values
     result: dict[str, float | None] = {"count": float(sizes.size), "breaks": float(sizes.sum())}
-    is_whole = after == 0 and force_above is None
+    is_whole = after == 0 and min_force_ratio is None
     outside = float(tree.to_dataset()["breaks"].values.sum() - sizes.sum())
     if is_whole and outside > 0:
         result["breaks_outside"] = outside
@@ -146,7 +164,7 @@ def statistics(
     if is_failure.any():
         result["failure_size"] = float(sizes[is_failure].mean())
     sizes = sizes[~is_failure]
-    fit = fit_power_law(sizes, smallest=smallest)
+    fit = fit_power_law(sizes, smallest=min_size)
     if fit is not None:
         result |= {
             "exponent": fit.exponent,

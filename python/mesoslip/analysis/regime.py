@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
+from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.layout import RunResults, config_of, group_of
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.quantities import percent
@@ -219,6 +220,29 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     }
     variables["regime"].attrs["flag_values"] = np.arange(len(NAMES), dtype=np.int8)
     return xr.Dataset(variables, {"realization": root["realization"]})
+
+
+def regime(output: OutputLike) -> xr.Dataset:
+    """The regime of each realization of an output: smooth, stick-slip, irregular, or transient.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or a measured trace with the configuration of the experiment.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``realization``; ``regime`` is 0 smooth, 1 stick-slip, 2 irregular, 3 transient,
+        beside the numbers that decide it.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read, or has no configuration of a run.
+    """
+    with opened_run(output) as (tree, name):
+        return regimes(tree, name)
 
 
 def regimes_of_results(results: RunResults) -> Iterator[Judgement]:

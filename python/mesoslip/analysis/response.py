@@ -6,6 +6,7 @@ Forces are counted along the drive: positive is against its motion, whichever wa
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.experiment import Experiment, Peak, Stage
 from mesoslip.analysis.slips import write_table
 from mesoslip.analysis.steady_force import SteadyMean
+from mesoslip.output.inputs import OutputLike, as_run, several
 from mesoslip.output.variables import Group, Meaning
 
 Array = NDArray[np.float64]
@@ -558,6 +560,53 @@ def _with_ratios(data: xr.Dataset, group: Group, scale: float, suffix: str, of: 
 
 
 def response(
+    output: OutputLike | Sequence[OutputLike],
+    *,
+    normal_force: float | None = None,
+    fit: bool = True,
+    free_stiffness: bool = False,
+) -> xr.DataTree:
+    """Friction measured on an output or several: steady forces, velocity steps, holds, parameters
+    of rate and state. See ``docs/response.md``.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or several of them.
+    normal_force
+        Normal force [N]: forces are also given over it, as coefficients of friction. Without it
+        they are given over the static force.
+    fit
+        Whether rate-and-state parameters are fitted, which takes some seconds.
+    free_stiffness
+        Whether the stiffness of the spring is a parameter of that fit, instead of that of the run.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``steady``: the mean force of each stage at one velocity, with its error; ``steps``:
+        direct and evolving change and relaxation displacement of each velocity step; ``holds``:
+        relaxation, restart peak and healing of each hold; ``rate_and_state``: a, b, D_c of each
+        law, and whether it describes the output. Variables have units and long names.
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, is not of a run, or is driven by a force.
+    """
+    experiments = [
+        Experiment(
+            as_run(one),
+            os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+        )
+        for number, one in enumerate(several(output))
+    ]
+    return response_of(
+        experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
+    )
+
+
+def response_of(
     experiments: Sequence[Experiment],
     *,
     normal_force: float | None = None,

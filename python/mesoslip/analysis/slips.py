@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mesoslip.output.files import written_whole
+from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.layout import group_of
 
 if TYPE_CHECKING:
@@ -24,25 +25,35 @@ COLUMNS = (
     "force_drop",
     "peak_velocity",
     "contacts_broken",
-    "slip_time",
+    "duration",
     "waiting_time",
 )
 
 
-def slips(tree: xr.DataTree) -> xr.Dataset:
-    """The slips of an output, dimension ``slip``, with ``slip_time`` [s] and ``waiting_time`` [s].
+def slips(output: OutputLike) -> xr.Dataset:
+    """The catalogue of slips of an output, dimension ``slip``, in SI.
 
-    The waiting time is that since the start of the slip before; NaN for the first of a realization.
+    Returns
+    -------
+    xarray.Dataset
+        The group ``slips`` of the output, with the coordinate ``realization_index``, and with
+        ``duration`` and ``waiting_time``, the time since the start of the slip before; NaN for the
+        first slip of a realization.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read, or is not of a run.
     """
     import xarray as xr
 
-    data = group_of(tree, "slips")
-    slip_time = data["end_time"] - data["start_time"]
+    data = group_of(as_run(output), "slips").set_coords("realization_index")
+    duration = data["end_time"] - data["start_time"]
     waiting = np.diff(data["start_time"].values, prepend=np.nan)
     if data.sizes["slip"]:
         waiting[np.diff(data["realization_index"].values, prepend=-1) != 0] = np.nan
     return data.assign(
-        slip_time=slip_time.assign_attrs(units="s", long_name="duration of the drop"),
+        duration=duration.assign_attrs(units="s", long_name="duration of the drop"),
         waiting_time=xr.Variable(
             "slip", waiting, {"units": "s", "long_name": "time since the start of the slip before"}
         ),

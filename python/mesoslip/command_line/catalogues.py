@@ -16,7 +16,7 @@ SHOWN = {
     "force_drop": (1e6, "uN"),
     "peak_velocity": (1e6, "um/s"),
     "contacts_broken": (1.0, ""),
-    "slip_time": (1e3, "ms"),
+    "duration": (1e3, "ms"),
     "waiting_time": (1.0, "s"),
 }
 
@@ -72,20 +72,21 @@ def avalanches(
         Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
     ] = None,
     as_json: JsonOption = False,
-    smallest: Annotated[
+    min_size: Annotated[
         int | None,
-        typer.Option(min=1, help="Least size for the fit; chosen by default", metavar="SIZE"),
+        typer.Option(min=1, help="Smallest size in the fit; chosen by default", metavar="SIZE"),
     ] = None,
     after: Annotated[
         str, typer.Option(help="Only those after a time, such as '2 s'", metavar="TIME")
     ] = "0 s",
-    force_above: Annotated[
+    min_force_ratio: Annotated[
         float | None,
         typer.Option(
             min=0,
             max=1,
-            help="Only those before the greatest contact force, at more than this part of it",
-            metavar="PART",
+            help="Only avalanches before the maximum of the contact force, above this fraction of "
+            "it",
+            metavar="RATIO",
         ),
     ] = None,
 ) -> None:
@@ -98,11 +99,11 @@ def avalanches(
         files.check_writable(table, [output])
     tree = files.read_run(output)
     start = time_of(after, "--after")
-    data = avalanche_catalogue.avalanches(tree, after=start, force_above=force_above)
+    data = avalanche_catalogue.avalanches(tree, after=start, min_force_ratio=min_force_ratio)
     if table is not None:
         avalanche_catalogue.write_csv(data, table)
-    statistics = avalanche_catalogue.statistics(
-        tree, after=start, force_above=force_above, smallest=smallest
+    statistics = avalanche_catalogue.avalanche_summary(
+        tree, after=start, min_force_ratio=min_force_ratio, min_size=min_size
     )
     bins = logarithmic_bins(data["size"].values)
     columns = (bins.edges[:, 0] + 0.5, bins.edges[:, 1] - 0.5, bins.count)
@@ -133,10 +134,10 @@ def avalanches(
 
 def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
     """Show which motion it is: smooth, stick-slip, irregular, or not settled yet."""
-    from mesoslip import api
+    from mesoslip.analysis import regime as regimes
     from mesoslip.analysis.regime import NAMES, REGIME, judgements, told
 
-    data = api.regime(output)
+    data = regimes.regime(output)
     judged = judgements(data)
     if as_json:
         names = [NAMES[one.regime] for one in judged]

@@ -18,11 +18,11 @@ def example(
     ] = None,
 ) -> None:
     """List the runs that come with the program, or write one to start from."""
-    from mesoslip import api, examples
+    from mesoslip import examples
 
     if name is None:
         for known, title in examples.examples().items():
             typer.echo(f"{known:14} {title}")
         return
-    for written in api.example(name, file):
+    for written in examples.example(name, file):
         typer.echo(str(written), err=True)

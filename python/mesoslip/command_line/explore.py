@@ -43,8 +43,8 @@ def explore(
     The page is on the loopback address of this machine, loads nothing from elsewhere, and is
     refused to other pages.
     """
-    from mesoslip import api
     from mesoslip.examples import example
+    from mesoslip.output.inputs import as_config
 
     if find_spec("bokeh") is None:
         raise FileError(MISSING)
@@ -54,10 +54,10 @@ def explore(
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{EXAMPLE}.toml"
             example(EXAMPLE, path)
-            start = api.as_config(str(path), changes or ())
+            start = as_config(str(path), changes or ())
         source = f"{EXAMPLE}.toml"
     else:
-        start = api.as_config(config, changes or ())
+        start = as_config(config, changes or ())
         source = config
     from mesoslip.explorer.server import serve
 

@@ -68,15 +68,15 @@ def plot(
     ] = None,
 ) -> None:
     """Draw an output, or several over each other."""
-    from mesoslip import api
     from mesoslip.output import files
+    from mesoslip.plots import plot as plots
 
     first = outputs[0]
     path = figure or first.parent / f"{first.stem or 'output'}.png"
     there = [one for one in outputs if one.is_file()]
     if there:
         files.check_writable(path, there)
-    api.plot(
+    plots.plot(
         outputs,
         path,
         view=view,

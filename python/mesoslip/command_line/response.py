@@ -35,7 +35,7 @@ def response(
     ] = False,
 ) -> None:
     """Show steady forces, velocity steps, holds, and rate-and-state parameters."""
-    from mesoslip import api
+    from mesoslip.analysis import response as responses
     from mesoslip.analysis import response_tables
     from mesoslip.analysis.response import rows_of, scalars_of, write_csv
     from mesoslip.output import files
@@ -43,7 +43,7 @@ def response(
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
         files.check_writable(table, outputs)
-    tree = api.response(outputs, normal_force=scale, fit=fit, free_stiffness=free_stiffness)
+    tree = responses.response(outputs, normal_force=scale, fit=fit, free_stiffness=free_stiffness)
     if table is not None:
         write_csv(tree, table)
     if as_json:

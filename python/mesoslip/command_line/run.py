@@ -60,9 +60,10 @@ def run(
     """
     from mesoslip import api
     from mesoslip.output import files
+    from mesoslip.output.inputs import as_config
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 
-    checked = api.as_config(config, changes or ())
+    checked = as_config(config, changes or ())
     path = output or Path("out") / f"{Path(config).stem}.nc"
     files.check_output(path, [config])
 

@@ -24,16 +24,11 @@ MOST_WORK = 400_000
 
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
     """Show derived quantities."""
-    from mesoslip.configuration.config import Config
-    from mesoslip.theory.derived import derived_quantities, verdict
+    from mesoslip.output.inputs import as_config
+    from mesoslip.theory.derived import derived, verdict
 
-    if Path(config).suffix == ".nc":
-        from mesoslip.output import files
-
-        checked = files.configuration(Path(config), changes or ())
-    else:
-        checked = Config.load(config, changes or ())
-    quantities = derived_quantities(checked)
+    checked = as_config(config, changes or ())
+    quantities = derived(checked)
     if as_json:
         print_json({name: one.value for name, one in quantities.items()})
         return
@@ -54,12 +49,12 @@ def curve(
     as_json: JsonOption = False,
 ) -> None:
     """Force curve of the master equation, and its elastic instability."""
-    from mesoslip import api
     from mesoslip.output import files
+    from mesoslip.output.inputs import as_config
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
     from mesoslip.theory.steady_sliding import steady_sliding, told_of_stiffness
 
-    checked = api.as_config(config, changes or ())
+    checked = as_config(config, changes or ())
     if output is not None:
         files.check_output(output, [config])
     _tell_without_interaction(checked)
@@ -98,24 +93,24 @@ def onset(
     as_json: JsonOption = False,
 ) -> None:
     """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
-    from mesoslip import api
     from mesoslip.output import files
-    from mesoslip.theory.slip_onset import SUMMARY
+    from mesoslip.output.inputs import as_config
+    from mesoslip.theory import slip_onset
 
-    checked = api.as_config(config, changes or ())
+    checked = as_config(config, changes or ())
     if output is not None:
         files.check_output(output, [config])
     _tell_without_interaction(checked)
-    tree = api.onset(checked)
+    tree = slip_onset.onset(checked)
     if output is not None:
         files.write(tree, output)
-    summary = {name: tree.attrs[name] for name in SUMMARY if name in tree.attrs}
+    summary = {name: tree.attrs[name] for name in slip_onset.SUMMARY if name in tree.attrs}
     summary["stable"] = tree.attrs["stable"] == "true"
     if as_json:
         print_json(summary)
         return
     for name, value in summary.items():
-        show(name, value, *SUMMARY[name])
+        show(name, value, *slip_onset.SUMMARY[name])
     typer.echo(tree.attrs["comment"])
 
 

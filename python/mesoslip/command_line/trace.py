@@ -67,13 +67,13 @@ def trace(
     ] = None,
 ) -> None:
     """Read a measured trace, find its slips, and write an output like that of a run."""
-    from mesoslip import api
+    from mesoslip.measured.trace import read_trace
     from mesoslip.output import files
     from mesoslip.quantities import with_unit
 
     path = output or Path("out") / f"{table.stem}.nc"
     files.check_output(path, [table, *([] if config is None else [config])])
-    tree = api.read_trace(
+    tree = read_trace(
         table,
         columns=columns,
         rate=quantity_or_none(rate, "--rate", "1/s", "1 kHz", positive=True),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.measured.slips import FoundSlips, estimated_period, find_slips, noise_level
 from mesoslip.measured.table import Measurements, read_table
 from mesoslip.output import variables
+from mesoslip.output.inputs import ConfigLike, PathLike, as_config, as_path
 from mesoslip.output.provenance import program_attributes
 
 if TYPE_CHECKING:
@@ -49,18 +49,18 @@ class Known:
 
 
 def read_trace(
-    path: Path,
+    file: PathLike,
     *,
     columns: str | None = None,
     rate: float | None = None,
     largest_gap: float | None = None,
     drive_velocity: float | None = None,
     stiffness: float | None = None,
-    config: Config | None = None,
+    config: ConfigLike | None = None,
     noise: float | None = None,
     period: float | None = None,
 ) -> xr.DataTree:
-    """Read a measured trace.
+    """Read a measured trace from a table: an output like that of a run, with the slips found in it.
 
     What the table does not hold follows from what is known: the displacement of the drive from its
     velocity, that of the slider from the drive's and the stretch of the spring, the velocity from
@@ -68,15 +68,22 @@ def read_trace(
 
     Parameters
     ----------
-    path, columns, rate, largest_gap
-        See `mesoslip.measured.table.read_table`.
+    file
+        The table: columns with units in their headers, such as ``time [s]``, ``force [uN]``,
+        ``displacement [nm]``.
+    columns
+        Headers instead of those of the file, such as "time [s], force [uN], -".
+    rate
+        Sampling rate [1/s], if the table has no times.
+    largest_gap
+        Longest time without values [s] that is filled by straight lines; none by default.
     drive_velocity
         Velocity of the drive [m/s].
     stiffness
         Spring constant [N/m].
     config
-        Configuration of the experiment as far as it is known, which tells drive and spring too. The
-        output has it as its own, so that every command works on it.
+        Configuration of the experiment as far as it is known, drive and spring included. The output
+        takes it over, so that every command works on it.
     noise
         Standard deviation of the noise of the force [N]; estimated by default.
     period
@@ -91,10 +98,13 @@ def read_trace(
     Raises
     ------
     FileError
-        If the table cannot be read or is wrong.
+        If the table cannot be read or is wrong; the message names the line.
     ConfigError
         If what is known contradicts itself.
     """
+    path = as_path(file)
+    if config is not None:
+        config = as_config(config)
     measured = read_table(path, columns=columns, rate=rate, largest_gap=largest_gap)
     if config is not None and (drive_velocity is not None or stiffness is not None):
         name = "drive_velocity" if drive_velocity is not None else "stiffness"

@@ -483,7 +483,7 @@ def read(path: str | Path) -> xr.DataTree:
 def read_run(path: str | Path) -> xr.DataTree:
     """Read an output of ``mesoslip run`` into memory; see `read`."""
     tree = read(path)
-    _check_run(tree, path)
+    check_run(tree, path)
     return tree
 
 
@@ -491,11 +491,18 @@ def read_run(path: str | Path) -> xr.DataTree:
 def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
     """An output of ``mesoslip run``, of which only what is used is read; see `opened`."""
     with opened(path) as tree:
-        _check_run(tree, path)
+        check_run(tree, path)
         yield tree
 
 
-def _check_run(tree: xr.DataTree, path: str | Path) -> None:
+def check_run(tree: xr.DataTree, path: str | Path) -> None:
+    """Make sure that an output is of ``mesoslip run``.
+
+    Raises
+    ------
+    FileError
+        If it is not.
+    """
     if "spring_force" not in tree.data_vars:
         kind = " but of mesoslip sweep" if "status" in tree.data_vars else ""
         raise FileError(f"{path}: not an output of mesoslip run{kind}")

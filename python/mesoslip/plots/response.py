@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state import SMALL_MISFIT, Fit, Record, fit, record_of
-from mesoslip.analysis.response import healing_line, response, steady_line
+from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
 from mesoslip.plots.style import Canvas, canvas, styled
 from mesoslip.quantities import percent
@@ -186,7 +186,7 @@ def _scale(data: xr.Dataset, name: str) -> float:
 def overview(tree: xr.DataTree, figure: Canvas | None = None) -> Canvas:
     """The record with the law that is nearer to it; steady forces; healing in holds."""
     experiment = Experiment(tree)
-    found = response([experiment], with_fit=False)
+    found = response_of([experiment], with_fit=False)
     steady, holds = found["steady"].to_dataset(), found["holds"].to_dataset()
     velocities = steady["velocity"].values[np.isfinite(steady["steady_force"].values)]
     draws_steady = np.unique(np.abs(velocities)).size > 1

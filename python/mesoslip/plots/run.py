@@ -329,7 +329,7 @@ def largest_slip(tree: xr.DataTree, extent: Extent = EVERYTHING) -> xr.Dataset |
 
 def slip_window(slip: xr.Dataset, before: float = 0.3, after: float = 2.0) -> tuple[float, float]:
     """Start and end [s] of a window around a slip, in parts of its duration."""
-    start, length = slip["start_time"].item(), slip["slip_time"].item()
+    start, length = slip["start_time"].item(), slip["duration"].item()
     return start - before * length, start + (1 + after) * length
 
 

@@ -365,7 +365,7 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
         (bundle, None, "black", 2.5),
         (bundle, 0.999, "tab:blue", 1.5),
     ):
-        bursts = avalanche_catalogue.avalanches(tree, force_above=force_above)
+        bursts = avalanche_catalogue.avalanches(tree, min_force_ratio=force_above)
         sizes = bursts["size"].values[~avalanche_catalogue.failures(tree, bursts)]
         label = "all bursts" if force_above is None else f"above {force_above:g} of the strength"
         avalanche_plots.draw_distribution(failing, sizes, color=color, label=label)
@@ -502,7 +502,7 @@ FIGURES = {
 
 
 def draw(names: Iterable[str], outputs: Path, folder: Path) -> list[Path]:
-    """Draw figures from outputs; see `mesoslip.figures`."""
+    """Draw figures of the source from the outputs of their runs."""
     names = tuple(names) or tuple(FIGURES)
     unknown = [name for name in names if name not in FIGURES]
     if unknown:

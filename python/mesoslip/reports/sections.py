@@ -64,7 +64,7 @@ SLIP_COLUMNS = {
     "force_drop": ("drop", "N"),
     "peak_velocity": ("peak velocity", "m/s"),
     "contacts_broken": ("breaks", "1"),
-    "slip_time": ("duration", "s"),
+    "duration": ("duration", "s"),
     "waiting_time": ("waiting time", "s"),
 }
 
@@ -282,7 +282,7 @@ def _histograms(subjects: Sequence[Subject]) -> Figure:
     """Drops, durations and waiting times of slips, each output in a colour."""
     figure = Figure(figsize=(7.5, 2.5))
     panels = figure.subplots(1, 3)
-    columns = ("force_drop", "slip_time", "waiting_time")
+    columns = ("force_drop", "duration", "waiting_time")
     for axes, name in zip(panels, columns, strict=True):
         told, unit = SLIP_COLUMNS[name]
         all_values = [slip_catalogue.slips(one.tree)[name].values for one in subjects]
@@ -343,7 +343,7 @@ def avalanches(subjects: Sequence[Subject]) -> Section | None:
         return None
     blocks: list[Block] = []
     for subject in there:
-        statistics = avalanche_catalogue.statistics(subject.tree)
+        statistics = avalanche_catalogue.avalanche_summary(subject.tree)
         rows = []
         for name, value in statistics.items():
             unit, meaning = avalanche_catalogue.SUMMARY[name]
@@ -381,7 +381,7 @@ def response(subjects: Sequence[Subject]) -> Section | None:
         return None
     blocks: list[Block] = []
     for subject, experiment in there:
-        tree = responses.response([experiment])
+        tree = responses.response_of([experiment])
         blocks.append(Text(_named(subjects, subject, response_tables.unit_of_forces(tree))))
         for one in response_tables.tables(tree):
             head, rows = one.head, one.rows

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing
+from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.lives import scales
 from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
 
@@ -17,21 +18,26 @@ MOST_WORK = 10_000
 
 @dataclass(frozen=True)
 class Derived:
-    """A derived quantity: its value in SI, the unit, and what it is."""
+    """A derived quantity: its value in SI, its unit, and its meaning."""
 
     value: float
     unit: str
     meaning: str
 
 
-def derived_quantities(config: Config) -> dict[str, Derived]:
-    """Derived quantities by name.
+def derived(config: ConfigLike) -> dict[str, Derived]:
+    """Quantities that follow from a configuration, by name.
 
-    What has no meaning for the configuration is left out: the setup's frequency of a prescribed
-    slider, for example, or what refers to the drive's velocity if that is zero. With several stages
-    the first one that moves counts, a ramp by its greatest speed. Equation numbers are those of
-    Braun's "Stick-slip kinetics".
+    Quantities without a meaning for the configuration are left out, such as the setup's frequency
+    of a prescribed slider. The velocity of the drive is that of the first stage that moves, of a
+    ramp its maximum. Equation numbers are those of Braun's "Stick-slip kinetics".
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong.
     """
+    config = as_config(config)
     return {
         name: Derived(value, unit, meaning)
         for name, value, unit, meaning in (

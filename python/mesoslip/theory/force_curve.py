@@ -23,6 +23,7 @@ from scipy.interpolate import BPoly
 from mesoslip import _core
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.simulation.kernel import checked, named
@@ -127,6 +128,25 @@ def _solve(parameters: Mapping[str, float], start: float, width: float, panels: 
         conservation_error=float(np.max(np.abs(pinned - 1))),
         mismatch=float(mismatch),
     )
+
+
+def curve(config: ConfigLike) -> xr.DataTree:
+    """The force curve F(X) of the master equation, and its elastic instability.
+
+    Returns
+    -------
+    xarray.DataTree
+        Root: force, slope, stiffness and rate of breaks over ``displacement``; ``K_star``, ``X_c``,
+        ``F_peak``, ``F_steady``, ``D0`` to ``D3``, ``stable`` as attributes, in SI. Group
+        ``critical``: all X_c; ``stretch_density``: the densities that ``curve.density_at`` asks
+        for.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong.
+    """
+    return ForceCurve(as_config(config)).to_tree()
 
 
 class ForceCurve:

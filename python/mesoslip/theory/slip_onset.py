@@ -17,12 +17,13 @@ from scipy import optimize
 
 from mesoslip import _core
 from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
 from mesoslip.theory.force_curve import ForceCurve
 
 if TYPE_CHECKING:
-    from mesoslip.configuration.config import Config
+    pass
 
 Array = NDArray[np.float64]
 
@@ -160,8 +161,8 @@ def end_of_expansion(curve: ForceCurve) -> float:
     return float(optimize.brentq(excess, low, float(x[place]), xtol=1e-15 * float(x[-1])))
 
 
-def onset_of_slip(config: Config) -> xr.DataTree:
-    """The onset of slip of a configuration, from the force curve of its master equation.
+def onset(config: ConfigLike) -> xr.DataTree:
+    """The onset of slip by Eqs. S46 and S47, from the force curve of the master equation.
 
     Returns
     -------
@@ -171,11 +172,13 @@ def onset_of_slip(config: Config) -> xr.DataTree:
 
     Raises
     ------
-    ConfigError
-        If the slider is not rigid, or the drive does not move.
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong, the slider is not rigid, or the drive does
+        not move.
     RunError
         If an integration fails.
     """
+    config = as_config(config)
     slider = config.slider.oscillator
     if slider is None:
         kind = config.slider.kind

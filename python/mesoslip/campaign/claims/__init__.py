@@ -26,7 +26,7 @@ CLAIMS = {
 
 
 def judge(names: Iterable[str], outputs: Path) -> list[Judgement]:
-    """Judge claims from the outputs of their runs; see `mesoslip.claims`."""
+    """Judge claims from the outputs of their runs."""
     names = tuple(names) or tuple(CLAIMS)
     unknown = [name for name in names if name not in CLAIMS]
     if unknown:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mesoslip.campaign.claims.base import Claim, Finding, configuration, measured, verdict
-from mesoslip.theory.derived import derived_quantities
+from mesoslip.theory.derived import derived
 from mesoslip.theory.force_curve import ForceCurve
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ ROUNDING = 5e-3
 
 def derived_numbers(trees: Sequence[xr.DataTree]) -> Finding:
     """C1: Omega_S, tau_S, Omega_L and D1 of Klein's experiment."""
-    quantities = derived_quantities(configuration(trees[0]))
+    quantities = derived(configuration(trees[0]))
     source = {
         "omega_s": (257.0, "1/s"),
         "setup_period": (0.0245, "s"),
@@ -53,7 +53,7 @@ def cantilever(trees: Sequence[xr.DataTree]) -> Finding:
     """C15: lowest bending frequency of a cantilever over (K/M)^(1/2)."""
     from scipy.optimize import brentq
 
-    told = derived_quantities(configuration(trees[0]))["bending_ratio"].value
+    told = derived(configuration(trees[0]))["bending_ratio"].value
     # A beam with one free end: cos z cosh z = -1, frequency z^2 (E I/(rho S))^(1/2)/L^2.
     root = brentq(lambda z: math.cos(z) + 1 / math.cosh(z), 1.5, 2.5, xtol=1e-15)
     exact = root**2 / math.sqrt(3)

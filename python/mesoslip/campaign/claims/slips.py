@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.slips import slips
 from mesoslip.campaign.claims.base import Claim, Finding, configuration, measured, variable, verdict
 from mesoslip.plots.run import series
-from mesoslip.theory.derived import derived_quantities
+from mesoslip.theory.derived import derived
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,7 @@ def first_spike(trees: Sequence[xr.DataTree]) -> Finding:
 def slip_velocity(trees: Sequence[xr.DataTree]) -> Finding:
     """C4: the velocity in a slip is of order Omega_S F_s/K."""
     (tree,) = trees
-    scale = derived_quantities(configuration(tree))["slip_velocity_scale"].value
+    scale = derived(configuration(tree))["slip_velocity_scale"].value
     first = of_each(tree, lambda one: one["peak_velocity"].values[0]) / scale
     later = of_each(tree, lambda one: one["peak_velocity"].values[1:].mean()) / scale
     return Finding(
@@ -68,7 +68,7 @@ def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
     (tree,) = trees
     config = configuration(tree)
     contacts = config.contacts
-    omega = derived_quantities(config)["omega_s"].value
+    omega = derived(config)["omega_s"].value
     scale = config.spring_stiffness / (contacts.stiffness * omega)
     least, most, period = [], [], []
     data = slips(tree)
@@ -107,7 +107,7 @@ def ringing(trees: Sequence[xr.DataTree]) -> Finding:
     """C7: a long delay makes the force negative, and it rings at Omega_S; after a short one at
     Omega_L."""
     short, long = trees
-    quantities = derived_quantities(configuration(short))
+    quantities = derived(configuration(short))
     omega_s, omega_l = quantities["omega_s"].value, quantities["omega_l"].value
     least = variable(long, "spring_force").min(axis=1)
     slow, fast = _free_frequency(long), _ringing_frequency(short)
@@ -190,7 +190,7 @@ def periods(trees: Sequence[xr.DataTree]) -> Finding:
 
 def layers(trees: Sequence[xr.DataTree]) -> Finding:
     """C9: the slip time hardly depends on the number of layers."""
-    times = [of_each(tree, lambda one: one["slip_time"].values[0]) for tree in trees]
+    times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
     counts = [configuration(tree).slider.layer_count for tree in trees]
     few, many = (one.mean() for one in times)
     return Finding(
@@ -205,7 +205,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Finding:
 
 def viscosity(trees: Sequence[xr.DataTree]) -> Finding:
     """C11: a drag larger by 1e5 leaves the slip time nearly unchanged."""
-    times = [of_each(tree, lambda one: one["slip_time"].values[0]) for tree in trees]
+    times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
     drops = [of_each(tree, lambda one: one["force_drop"].values[0]) for tree in trees]
     rates = [configuration(tree).contacts.drag_rate for tree in trees]
     few, many = (times[place].mean() / times[0].mean() for place in (1, -1))

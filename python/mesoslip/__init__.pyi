@@ -1,0 +1,43 @@
+from .analysis.avalanches import avalanche_summary, avalanches
+from .analysis.regime import regime
+from .analysis.response import response
+from .analysis.slips import slips
+from .api import fit, run, sweep
+from .configuration.config import Config
+from .configuration.threshold_law import ThresholdLaw
+from .errors import ConfigError, FileError, MesoslipError, RunError
+from .examples import example
+from .measured.trace import read_trace
+from .output.inputs import open_output
+from .plots.plot import plot
+from .reports.report import report
+from .theory.derived import derived
+from .theory.force_curve import curve
+from .theory.slip_onset import onset
+from .theory.steady_sliding import SteadySliding
+
+__all__ = [
+    "Config",
+    "ConfigError",
+    "FileError",
+    "MesoslipError",
+    "RunError",
+    "SteadySliding",
+    "ThresholdLaw",
+    "avalanche_summary",
+    "avalanches",
+    "curve",
+    "derived",
+    "example",
+    "fit",
+    "onset",
+    "open_output",
+    "plot",
+    "read_trace",
+    "regime",
+    "report",
+    "response",
+    "run",
+    "slips",
+    "sweep",
+]

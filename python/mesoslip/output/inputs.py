@@ -1,0 +1,130 @@
+"""What functions take: a configuration or an output, or the path of one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from mesoslip.configuration.config import Config
+from mesoslip.errors import ConfigError, FileError, Problem, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PathLike: TypeAlias = str | os.PathLike[str]
+ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
+OutputLike: TypeAlias = "PathLike | xr.DataTree"
+
+
+def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
+    """A configuration from a TOML file, from an output of an earlier run, or from nested tables.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If the configuration is wrong.
+    """
+    if isinstance(config, Config):
+        return config
+    if isinstance(config, Mapping):
+        return Config.from_dict(config)
+    if not isinstance(config, str | os.PathLike):
+        message = "must be the path of a TOML file or of an output, nested tables, or a Config"
+        raise ConfigError([Problem("", "config", message, config)])
+    path = Path(config)
+    if path.suffix == ".nc":
+        # With netCDF, which takes long to import.
+        from mesoslip.output import files
+
+        return files.configuration(path, overrides)
+    return Config.load(path, overrides)
+
+
+def as_path(path: PathLike) -> Path:
+    """The path of a file.
+
+    Raises
+    ------
+    FileError
+        If it is not one.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise FileError(f"{shown(path)}: is not the path of a file")
+    return Path(path)
+
+
+def open_output(path: PathLike) -> xr.DataTree:
+    """Read an output of any command into memory.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it is not an output of mesoslip, or it is damaged.
+    """
+    from mesoslip.output import files
+
+    return files.read(as_path(path))
+
+
+def as_run(output: OutputLike) -> xr.DataTree:
+    """An output of a run in memory.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is not an output of a run.
+    """
+    from mesoslip.output import files
+
+    if isinstance(output, str | os.PathLike):
+        return files.read_run(Path(output))
+    tree = _tree(output)
+    files.check_run(tree, "the output")
+    return tree
+
+
+@contextmanager
+def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
+    """An output of a run, of which only what is used is read, and its name for messages."""
+    from mesoslip.output import files
+
+    if isinstance(output, str | os.PathLike):
+        with files.opened_run(Path(output)) as tree:
+            yield tree, os.fspath(output)
+    else:
+        yield as_run(output), "the output"
+
+
+def several(output: OutputLike | Sequence[OutputLike]) -> Sequence[OutputLike]:
+    """Outputs, of which there may be one."""
+    if isinstance(output, str | os.PathLike) or not isinstance(output, Sequence):
+        return [output]
+    return output
+
+
+def opened(outputs: Sequence[OutputLike], stack: ExitStack) -> tuple[list[xr.DataTree], list[str]]:
+    """Outputs of any command, of which only what is used is read, and their names."""
+    from mesoslip.output import files
+
+    trees, names = [], []
+    for number, one in enumerate(outputs):
+        if isinstance(one, str | os.PathLike):
+            names.append(str(one))
+            trees.append(stack.enter_context(files.opened(Path(one))))
+        else:
+            trees.append(_tree(one))
+            names.append(one.attrs.get("title", f"output {number}"))
+    return trees, names
+
+
+def _tree(output: object) -> xr.DataTree:
+    import xarray as xr
+
+    if not isinstance(output, xr.DataTree):
+        raise FileError(f"{shown(output)}: is not an output; give its path or its DataTree")
+    return output

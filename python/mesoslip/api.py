@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.output import layout
-from mesoslip.output.inputs import OutputLike, PathLike, as_config, as_run
+from mesoslip.output.inputs import OutputLike, as_config, as_run
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import Results, checked_workers, run_realizations
 from mesoslip.simulation.stop import StopFlag
@@ -138,7 +138,7 @@ def sweep(
     from mesoslip.campaign.store import Store
 
     checked = as_plan(plan)
-    kept = None if store is None else Store(Path(store))
+    kept = None if store is None else Store(as_path(store))
     with kept or nullcontext():
         done = run_plan(
             checked,
@@ -169,7 +169,7 @@ def as_plan(plan: PathLike | Mapping[str, Any] | Plan, overrides: Iterable[str] 
         return plan
     if isinstance(plan, Mapping):
         return Plan.from_dict(plan)
-    return Plan.load(plan, overrides)
+    return Plan.load(as_path(plan), overrides)
 
 
 def run_plan(
@@ -252,11 +252,11 @@ def fit(
     elif isinstance(config, Mapping):
         plan = Plan.from_dict(config)
     else:
-        plan = Plan.load(config)
+        plan = Plan.load(as_path(config))
     fitted = fits.fit(
         as_run(output),
         plan,
-        store=None if store is None else Path(store),
+        store=None if store is None else as_path(store),
         workers=workers,
         progress=progress,
         stop=stop,

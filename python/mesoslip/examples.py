@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import os
 import tomllib
 from importlib.resources import files
 from pathlib import Path
 
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, FileError, Problem
 
 ENDING = ".toml"
@@ -30,7 +30,7 @@ def examples() -> dict[str, str]:
     return found
 
 
-def example(name: str, file: str | os.PathLike[str] | None = None) -> list[Path]:
+def example(name: str, file: PathLike | None = None) -> list[Path]:
     """Write an example configuration, and beside it the files that it is based on.
 
     Parameters
@@ -53,13 +53,13 @@ def example(name: str, file: str | os.PathLike[str] | None = None) -> list[Path]
         If the file exists, or cannot be written.
     """
     known = examples()
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         near = difflib.get_close_matches(str(name), known, 3, 0.6)
         message = "no such example; " + (
             f"did you mean {' or '.join(near)}?" if near else "mesoslip example lists them"
         )
         raise ConfigError([Problem("", "example", message, name)])
-    target = Path(file or f"{Path(name).name}{ENDING}")
+    target = as_path(file or f"{Path(name).name}{ENDING}")
     if target.exists():
         raise FileError(f"{target}: exists already; give another name with -o, or remove it")
     written = []

@@ -66,7 +66,7 @@ def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
     (tmp_path / "klein.toml").write_text("mine")
     status, _, errors = command("example", "klein")
     assert status == 2
-    assert "klein.toml: is there already" in errors
+    assert "klein.toml: exists already" in errors
     # What it is based on is there, and stays.
     assert command("example", "S20")[0] == 0
     assert (tmp_path / "klein.toml").read_text() == "mine"

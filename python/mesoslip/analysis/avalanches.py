@@ -233,4 +233,4 @@ def write_csv(data: xr.Dataset, path: Path) -> None:
 
 
 def _columns(data: xr.Dataset) -> list[str]:
-    return [str(name) for name in data.data_vars]
+    return [str(name) for name in data.variables]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import html
 import math
-import os
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +29,7 @@ from mesoslip.configuration.files import (
     read_toml,
 )
 from mesoslip.configuration.messages import problems
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
 from mesoslip.configuration.tables import Curve, Output, Run
@@ -200,7 +200,7 @@ class Config(Table):
         return self.output.interval or self.expected_duration / 10000
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Config:
+    def load(cls, path: PathLike, overrides: Iterable[Change] = ()) -> Config:
         """Read a TOML file and what it is based on, lay overrides over it, and check it.
 
         Parameters
@@ -217,7 +217,7 @@ class Config(Table):
         ConfigError
             If anything in it is wrong.
         """
-        path, overrides = Path(path), tuple(overrides)
+        path, overrides = as_path(path), tuple(overrides)
         tables = read_toml(path)
         base = base_of(path) or (tables if overrides else None)
         return cls._checked(override(tables, overrides), str(path), base)

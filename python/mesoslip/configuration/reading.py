@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
+from typing import TypeAlias
 
-from mesoslip.errors import FileError
+from mesoslip.errors import FileError, shown
+
+PathLike: TypeAlias = str | os.PathLike[str]
 
 # Size of the longest file that is read [bytes]; a million stages take less.
 LONGEST_FILE = 2**26
+
+
+def as_path(path: PathLike) -> Path:
+    """The path of a file.
+
+    Raises
+    ------
+    FileError
+        If it is not one.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise FileError(f"{shown(path)}: is not the path of a file")
+    return Path(path)
 
 
 def text_of(path: Path, kind: str) -> str:

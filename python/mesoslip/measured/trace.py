@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.measured.slips import FoundSlips, estimated_period, find_slips, noise_level
 from mesoslip.measured.table import Measurements, read_table
 from mesoslip.output import variables
-from mesoslip.output.inputs import ConfigLike, PathLike, as_config, as_path
+from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 
 if TYPE_CHECKING:
     import xarray as xr
 
-PathLike: TypeAlias = str | os.PathLike[str]
 ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
 OutputLike: TypeAlias = "PathLike | xr.DataTree"
 
@@ -43,19 +43,6 @@ def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
 
         return files.configuration(path, overrides)
     return Config.load(path, overrides)
-
-
-def as_path(path: PathLike) -> Path:
-    """The path of a file.
-
-    Raises
-    ------
-    FileError
-        If it is not one.
-    """
-    if not isinstance(path, str | os.PathLike):
-        raise FileError(f"{shown(path)}: is not the path of a file")
-    return Path(path)
 
 
 def open_output(path: PathLike) -> xr.DataTree:

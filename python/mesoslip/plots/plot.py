@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
-from mesoslip.output.inputs import OutputLike, PathLike, as_path, opened, several
+from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots import avalanches
 from mesoslip.plots.draw import draw
 from mesoslip.plots.run import Extent

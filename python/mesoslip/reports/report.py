@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from mesoslip.output.inputs import OutputLike, PathLike, as_path, opened, several
+from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.reports.content import Subject
 from mesoslip.reports.page import write
 

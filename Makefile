@@ -17,7 +17,7 @@ DOCUMENTATION := $(VENV)/.documentation
 SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* fortran/*/*/* python/meson.build python/f2cmap) \
   $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
-  $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi .git/logs/HEAD)
+  $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi runs/meson.build .git/logs/HEAD)
 
 SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
 # meson and meson-python find ninja here.

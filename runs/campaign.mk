@@ -1,21 +1,24 @@
 # Outputs of runs, curves and sweeps, and what is made of them. Included by the Makefile.
 
+# The source's figures and claims, whose runs and scripts are in runs/source.
+SOURCE := runs/source
+named = $(patsubst $(SOURCE)/%.toml,out/%.nc,$(wildcard $(addprefix $(SOURCE)/,$(1))))
+
 # Figures need the outputs of runs, but for S18, and two of other commands.
-FIGURE_RUNS := $(filter-out out/S18.nc,\
-  $(patsubst runs/%.toml,out/%.nc,$(wildcard $(addprefix runs/,S*.toml limit-*.toml sizes-*.toml avalanche.toml bundle.toml))))
+FIGURE_RUNS := $(filter-out out/S18.nc,$(call named,S*.toml limit-*.toml sizes-*.toml)) \
+  out/avalanche.nc out/bundle.nc
 ONSETS := out/S19a.onset.nc out/S19b.onset.nc
 FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc $(ONSETS)
 # Claims have runs of their own, with several realizations, and use some of the figures'.
-CLAIM_OUTPUTS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/claims/*.toml runs/limit-*.toml)) \
-  out/S18.curve.nc $(ONSETS)
+CLAIM_OUTPUTS := $(call named,claims/*.toml limit-*.toml) out/S18.curve.nc $(ONSETS)
 SWEEPS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/sweeps/*.toml runs/maps/*.toml))
 MAPS := $(patsubst runs/%.toml,out/%.png,$(wildcard runs/maps/*.toml))
 
 figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/figures
-	$(MESOSLIP) figures -o out/figures
+	$(VENV)/bin/python $(SOURCE)/draw.py -o out/figures
 
 claims: $(CLAIM_OUTPUTS) | $(INSTALLED) ## Judge the source's claims into out/claims.md
-	$(MESOSLIP) claims -o out/claims.md
+	$(VENV)/bin/python $(SOURCE)/judge.py -o out/claims.md
 
 campaign: $(SWEEPS) $(MAPS) ## Run the sweeps of runs/sweeps and runs/maps, and draw the maps
 
@@ -29,6 +32,9 @@ bases = $(patsubst $(1)>%,%,$(filter $(1)>%,$(chains)))
 out/%.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) run $< -o $@
 
+out/%.nc: $(SOURCE)/%.toml $$(call bases,$(SOURCE)/$$*.toml) | $(INSTALLED)
+	$(MESOSLIP) run $< -o $@
+
 # A sweep keeps its points beside its output: what was interrupted goes on.
 out/sweeps/%.nc: runs/sweeps/%.toml $$(call bases,runs/sweeps/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) sweep $< -o $@
@@ -39,7 +45,13 @@ out/maps/%.nc: runs/maps/%.toml $$(call bases,runs/maps/$$*.toml) | $(INSTALLED)
 out/%.curve.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) curve $< -o $@
 
+out/%.curve.nc: $(SOURCE)/%.toml $$(call bases,$(SOURCE)/$$*.toml) | $(INSTALLED)
+	$(MESOSLIP) curve $< -o $@
+
 out/%.onset.nc: runs/%.toml $$(call bases,runs/$$*.toml) | $(INSTALLED)
+	$(MESOSLIP) onset $< -o $@
+
+out/%.onset.nc: $(SOURCE)/%.toml $$(call bases,$(SOURCE)/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) onset $< -o $@
 
 out/%.png: out/%.nc | $(INSTALLED)

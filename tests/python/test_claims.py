@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
+from claims import CLAIMS, Verdict, judge
+from claims.page import as_markdown, as_table
 from conftest import ROOT
-from mesoslip.campaign.claims import CLAIMS, Verdict, judge
-from mesoslip.campaign.claims.base import configuration
-from mesoslip.campaign.claims.page import as_markdown, as_table
+from figures import FIGURES
 from mesoslip.output import files
+from outputs import configuration
 
+SOURCE = ROOT / "runs" / "source"
 # Outputs of other commands that claims use.
 COMMANDS = {".curve": "curve", ".onset": "onset"}
 
@@ -28,9 +32,9 @@ def outputs(tmp_path_factory):
         mesoslip.run(mesoslip.Config.load(ROOT / "runs" / "klein.toml", short)),
         folder / "claims" / "klein.nc",
     )
-    files.write(mesoslip.curve(ROOT / "runs" / "S18.toml"), folder / "S18.curve.nc")
+    files.write(mesoslip.curve(SOURCE / "S18.toml"), folder / "S18.curve.nc")
     for name in ("S19a", "S19b"):
-        tree = mesoslip.onset(ROOT / "runs" / f"{name}.toml")
+        tree = mesoslip.onset(SOURCE / f"{name}.toml")
         files.write(tree, folder / f"{name}.onset.nc")
     return folder
 
@@ -42,12 +46,12 @@ def test_there_are_sixteen_and_their_runs_exist():
         for run in claim.runs:
             for ending in COMMANDS:
                 run = run.removesuffix(ending)
-            assert (ROOT / "runs" / f"{run}.toml").exists()
+            assert (SOURCE / f"{run}.toml").exists()
 
 
 def test_every_run_of_claims_is_used():
     used = {run for claim in CLAIMS.values() for run in claim.runs}
-    for path in (ROOT / "runs" / "claims").glob("*.toml"):
+    for path in (SOURCE / "claims").glob("*.toml"):
         assert f"claims/{path.stem}" in used
         mesoslip.Config.load(path)
 
@@ -115,7 +119,53 @@ def test_what_is_told(outputs):
 
 
 def test_mistakes(outputs):
-    with pytest.raises(mesoslip.ConfigError, match="no such claim; choose of C1"):
+    with pytest.raises(mesoslip.ConfigError, match="no such claim; choose from C1"):
         judge(["C17"], outputs)
     with pytest.raises(mesoslip.FileError, match=r"make them first: make .*delay-0\.nc"):
         judge(["C6"], outputs)
+
+
+def script(name, *arguments):
+    """A script of the source's runs, with what it prints."""
+    return subprocess.run(
+        [sys.executable, SOURCE / name, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_script_judges(outputs, tmp_path):
+    page = tmp_path / "claims.md"
+    done = script("judge.py", "C4", "--from", outputs, "-o", page)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("C4: in a slip")
+    assert "| [C4](#c4) |" in page.read_text()
+    done = script("judge.py", "C4", "--from", outputs, "--json")
+    assert json.loads(done.stdout)[0]["verdict"] == "holds with a qualification"
+
+
+def test_the_script_draws(outputs, tmp_path):
+    done = script("draw.py", "S18", "--from", outputs, "-o", tmp_path / "figures")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "figures" / "S18.png").stat().st_size > 10000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [(["S99"], 2, ["S99", "S20"]), (["S20"], 1, ["S20.nc", "make"])],
+)
+def test_mistakes_at_the_script(tmp_path, arguments, status, words):
+    done = script("draw.py", *arguments, "--from", tmp_path)
+    assert done.returncode == status
+    assert all(word in done.stderr for word in words)
+    assert "Traceback" not in done.stderr
+
+
+def test_every_figure_has_runs():
+    for figure in FIGURES.values():
+        for run in figure.runs:
+            for ending in COMMANDS:
+                run = run.removesuffix(ending)
+            there = [SOURCE / f"{run}.toml", ROOT / "runs" / f"{run}.toml"]
+            assert sum(one.exists() for one in there) == 1

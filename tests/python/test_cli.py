@@ -102,13 +102,11 @@ def test_slips(short, tmp_path, command):
     assert command("plot", output)[0] == 0
 
 
-def test_plot_and_figures(short, tmp_path, command):
-    output = tmp_path / "S20.nc"
+def test_plot(short, tmp_path, command):
+    output = tmp_path / "short.nc"
     command("run", short, "-o", output, "--quiet")
     assert command("plot", output, "-o", tmp_path / "picture.pdf")[0] == 0
     assert (tmp_path / "picture.pdf").read_bytes().startswith(b"%PDF")
-    assert command("figures", "S20", "--from", tmp_path, "-o", tmp_path / "figures")[0] == 0
-    assert (tmp_path / "figures" / "S20.png").stat().st_size > 10000
 
 
 def test_start_up_is_quick():
@@ -147,8 +145,6 @@ def test_start_up_is_quick():
         (["slips", "truncated.nc"], ["truncated.nc"]),
         (["run", "truncated.nc"], ["truncated.nc"]),
         (["slips", "good.nc", "--csv", "."], ["written"]),
-        (["figures", "S99"], ["S99", "S20"]),
-        (["figures", "S20"], ["out/S20.nc", "make"]),
     ],
 )
 @pytest.mark.usefixtures("short")

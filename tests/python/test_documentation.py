@@ -37,7 +37,7 @@ FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<language>\S*).*$")
 LEFT_OUT = re.compile(r"^(?:<!--|%)\s*not run: \S.*$")
 FILE = re.compile(r"# (?P<path>[\w/.-]+\.toml)")
 # Commands whose arguments are parsed and no more: they take long, or what no other has made.
-PARSED_ONLY = {"figures", "claims", "explore", "trace", "fit"}
+PARSED_ONLY = {"explore", "trace", "fit"}
 # Names that stand for those of a reader's own.
 PLACEHOLDER = re.compile(r"[A-Z]{3,}\b|…|\.\.\.")
 # What makes files of the documentation short enough for a test.

@@ -19,14 +19,20 @@ def tracked(folder):
     return [line for line in listed.stdout.splitlines() if (ROOT / line).exists()]
 
 
+def is_example(path):
+    """Whether a file is a run that the program brings: not one of the source's."""
+    return path.endswith(".toml") and not path.startswith("runs/source/")
+
+
 def test_the_wheel_has_all_that_is_needed():
-    """Its record: every file of the package, the kernels, and every run."""
+    """Its record: every file of the package, the kernels, and the examples, nothing else."""
     there = {str(one) for one in files("mesoslip")}
     for path in tracked("python/mesoslip"):
         if path.endswith((".py", ".pyi", ".html", "py.typed")):
             assert path.removeprefix("python/") in there, path
-    for path in tracked("runs"):
-        assert f"mesoslip/{path}" in there, path
+    runs = {one.removeprefix("mesoslip/") for one in there if one.startswith("mesoslip/runs/")}
+    assert runs == {one for one in tracked("runs") if is_example(one)}
+    assert runs == {f"runs/{name}.toml" for name in examples.examples()}
     assert any(one.startswith("mesoslip/_core.") and one.endswith(".so") for one in there)
     assert any(one.endswith("licenses/LICENSE") for one in there)
     # Nothing of others.
@@ -39,7 +45,7 @@ def test_the_source_archive_leaves_no_run_out():
     assert "runs/klein.toml" in tracked("runs")
 
 
-@pytest.mark.parametrize("name", ["klein", "S22c", "limit-2"])
+@pytest.mark.parametrize("name", ["klein", "avalanche", "velocity-step"])
 def test_an_example_is_the_run_of_the_repository(name, tmp_path):
     written = mesoslip.example(name, tmp_path / "new" / "mine.toml")
     assert written[0] == tmp_path / "new" / "mine.toml"
@@ -48,8 +54,8 @@ def test_an_example_is_the_run_of_the_repository(name, tmp_path):
     assert written[0].read_text() == (ROOT / "runs" / f"{name}.toml").read_text()
     assert {one.name for one in written[1:]} == {
         "klein": set(),
-        "S22c": {"klein.toml"},
-        "limit-2": {"limit-me.toml", "klein.toml"},
+        "avalanche": {"klein.toml"},
+        "velocity-step": {"klein.toml"},
     }[name]
 
 
@@ -68,9 +74,9 @@ def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
     assert status == 2
     assert "klein.toml: exists already" in errors
     # What it is based on is there, and stays.
-    assert command("example", "S20")[0] == 0
+    assert command("example", "avalanche")[0] == 0
     assert (tmp_path / "klein.toml").read_text() == "mine"
-    assert (tmp_path / "S20.toml").exists()
+    assert (tmp_path / "avalanche.toml").exists()
     status, _, errors = command("example", "kleim")
     assert status == 2
     assert "did you mean klein?" in errors

@@ -253,7 +253,7 @@ def test_what_has_no_curve_says_so():
 
 
 def test_a_lattice_is_shown_in_motion():
-    config = Config.load(ROOT / "runs" / "S25d.toml", ["run.duration=2 s"])
+    config = Config.load(ROOT / "runs" / "source" / "S25d.toml", ["run.duration=2 s"])
     seen = []
     follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
     lattice = seen[-1].lattice

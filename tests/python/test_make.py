@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from conftest import ROOT
@@ -35,10 +36,12 @@ def checkout(tmp_path):
         "runs/elsewhere.toml": 'base = "../mine/own.toml"\n',
         "runs/other.toml": '[sweep]\nbase = "klein.toml"\n',
         "runs/sweeps/map.toml": 'base = "../slow.toml"\n',
+        "runs/source/S20.toml": 'base = "../slow.toml"\n',
+        "runs/source/claims/one.toml": 'base = "../S20.toml"\n',
         "mine/own.toml": 'title = "own"\n',
     }
     for name, text in texts.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
         os.utime(tmp_path / name, (1e9, 1e9))
     return tmp_path
@@ -111,6 +114,17 @@ def test_sweeps_follow_their_base(checkout):
     assert made(checkout, target) == ["sweep runs/sweeps/map.toml"]
 
 
+def test_runs_of_the_source_have_outputs_beside_others(checkout):
+    targets = ["out/S20.nc", "out/claims/one.nc", "out/S20.onset.nc"]
+    runs = ["run runs/source/S20.toml", "run runs/source/claims/one.toml"]
+    assert made(checkout, *targets) == ["onset runs/source/S20.toml", *runs]
+    assert made(checkout, *targets) == []
+    for target in targets:
+        os.utime(checkout / target, (1.1e9, 1.1e9))
+    os.utime(checkout / "runs/klein.toml", (1.2e9, 1.2e9))
+    assert made(checkout, *targets) == ["onset runs/source/S20.toml", *runs]
+
+
 def test_a_changed_chain_counts_at_once(checkout):
     """Of no list that was made before: a base named now, or a run copied with its old date."""
     made(checkout, *OUTPUTS)
@@ -149,4 +163,7 @@ def test_the_runs_of_this_repository():
         chain = chains.get(f"runs/{path.name}", [])
         assert bool(chain) == ("\nbase = " in "\n" + path.read_text())
         assert not chain or chain[-1] == "runs/klein.toml"
-    assert chains["runs/limit-2.toml"] == ["runs/limit-me.toml", "runs/klein.toml"]
+    chain = ["runs/source/limit-me.toml", "runs/klein.toml"]
+    assert [Path(one).resolve() for one in chains["runs/source/limit-2.toml"]] == [
+        (ROOT / one).resolve() for one in chain
+    ]

@@ -13,7 +13,6 @@ import typer
 
 from mesoslip.command_line import (
     catalogues,
-    claims,
     example,
     explore,
     fit,
@@ -41,8 +40,6 @@ COMMANDS = (
     catalogues.regime,
     response.response,
     pictures.plot,
-    pictures.figures,
-    claims.claims,
     report.report,
     explore.explore,
     example.example,

@@ -1,4 +1,4 @@
-"""``mesoslip plot`` and ``mesoslip figures``."""
+"""``mesoslip plot``."""
 
 from __future__ import annotations
 
@@ -87,21 +87,3 @@ def plot(
         end=math.inf if end is None else time_of(end, "--to"),
     )
     typer.echo(str(path), err=True)
-
-
-def figures(
-    names: Annotated[
-        list[str] | None, typer.Argument(help="Such as S20; all by default", metavar="[NAME]...")
-    ] = None,
-    folder: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder of the pictures", metavar="DIR")
-    ] = Path("out/figures"),
-    outputs: Annotated[
-        Path, typer.Option("--from", help="Folder of the outputs of the runs", metavar="DIR")
-    ] = Path("out"),
-) -> None:
-    """Draw the figures of the source from the outputs of their runs."""
-    from mesoslip.plots import source_figures
-
-    for path in source_figures.draw(names or (), outputs, folder):
-        typer.echo(str(path), err=True)

@@ -1,0 +1,61 @@
+"""The claim that N contacts and the master equation agree: C13."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from outputs import configuration
+
+from claims.base import Claim, Finding, measured, variable, verdict
+from claims.slips import of_each
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def engines(trees: Sequence[xr.DataTree]) -> Finding:
+    """C13: EQ and ME give the same."""
+    klein, klein_infinite, infinite, *finite = trees
+    exact = variable(infinite, "contact_force")[0]
+    counts, errors = [], []
+    for tree in finite:
+        contacts = configuration(tree).contacts
+        counts.append(contacts.count)
+        deviation = (variable(tree, "contact_force") - exact) / contacts.static_force
+        errors.append(np.sqrt(np.mean(deviation**2, axis=1)))
+    means = np.array([one.mean() for one in errors])
+    slope = np.polyfit(np.log(counts), np.log(means), 1)[0]
+    drops = [
+        of_each(tree, lambda one: one["force_drop"].values[0]) * 1e6
+        for tree in (klein, klein_infinite)
+    ]
+    return Finding(
+        (
+            *(
+                measured(f"rms difference over F_s, N = {count}", one, "1", "the same")
+                for count, one in zip(counts, errors, strict=True)
+            ),
+            measured("exponent of the difference in N", slope, "1", "-1/2 expected"),
+            measured("drop in Klein's first slip, N = 4080", drops[0], "uN", "the same"),
+            measured("the same, N to infinity", drops[1], "uN", "the same"),
+        ),
+        verdict(abs(slope + 0.5) < 0.05 and abs(drops[0].mean() / drops[1].mean() - 1) < 0.01),
+        "under a block that goes forth and back the difference dies like N^(-1/2). After several "
+        "free slips they differ as realizations differ from each other: the motion is chaotic",
+    )
+
+
+CLAIMS = (
+    Claim(
+        "C13",
+        "EQ and the master equation give the same results",
+        "difference like N^(-1/2), exponent within 0.05; the first slip's drop within 1 %",
+        (
+            *("claims/klein", "claims/klein-me", "limit-me"),
+            *(f"limit-{power}" for power in range(2, 7)),
+        ),
+        engines,
+    ),
+)

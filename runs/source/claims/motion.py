@@ -1,0 +1,166 @@
+"""Claims of which motion it is: C6, C10, C12."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mesoslip.analysis.regime import regimes
+from mesoslip.output.layout import group_of
+from outputs import configuration
+
+from claims.base import Claim, Finding, measured, variable, verdict
+from claims.slips import of_each
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SMOOTH, STICK_SLIP, IRREGULAR = 0, 1, 2
+
+
+def motion(tree: xr.DataTree) -> str:
+    """In words, what the realizations of a run do in the end."""
+    data = regimes(tree)["regime"]
+    meanings = data.attrs["flag_meanings"].split()
+    found, counts = np.unique(data.values, return_counts=True)
+    return ", ".join(f"{count} {meanings[code]}" for code, count in zip(found, counts, strict=True))
+
+
+def all_are(tree: xr.DataTree, *wanted: int) -> bool:
+    """Whether all realizations move in one of the ways that are wanted."""
+    return bool(np.isin(regimes(tree)["regime"].values, wanted).all())
+
+
+def swing(tree: xr.DataTree) -> list[float]:
+    """Swing of the spring force over its mean in the last fifth of each realization."""
+    force = variable(tree, "spring_force")
+    end = force[:, -force.shape[1] // 5 :]
+    return [float(np.ptp(one) / abs(one.mean())) for one in end]
+
+
+def delay(trees: Sequence[xr.DataTree]) -> Finding:
+    """C6: without delay the slider comes to slide smoothly, with a long one it sticks and slips."""
+    delays = [configuration(tree).contacts.delay * 1e3 for tree in trees]
+    return Finding(
+        tuple(
+            measured(f"swing over mean, delay {one:g} ms", swing(tree), "1", told)
+            for one, tree, told in zip(
+                delays, trees, ("smooth", "smooth", "stick-slip", "stick-slip"), strict=True
+            )
+        ),
+        verdict(
+            max(swing(trees[0])) < 0.1
+            and all_are(trees[1], SMOOTH)
+            and all(all_are(tree, STICK_SLIP, IRREGULAR) for tree in trees[2:])
+        ),
+        "in the end: "
+        + "; ".join(f"{one:g} ms: {motion(tree)}" for one, tree in zip(delays, trees, strict=True)),
+    )
+
+
+def interaction(trees: Sequence[xr.DataTree]) -> Finding:
+    """C10: interaction widens stick-slip; at 0.3 one avalanche takes the whole system."""
+    found, largest = [], []
+    for tree in trees:
+        interaction = configuration(tree).interaction
+        strength = 0.0 if interaction is None else interaction.strength
+        data = group_of(tree, "avalanches")
+        owner, size = data["realization_index"].values, data["size"].values
+        count = configuration(tree).contacts.count
+        parts = [size[owner == one].max() / count for one in range(tree.sizes["realization"])]
+        largest.append(min(parts))
+        found.append(measured(f"swing over mean, xi = {strength:g}", swing(tree), "1", ""))
+        found.append(measured(f"largest avalanche over N, xi = {strength:g}", parts, "1", ""))
+    least = variable(trees[-1], "contact_force").min(axis=1)
+    static = configuration(trees[-1]).contacts.static_force
+    return Finding(
+        (*found, measured("least F over F_s, xi = 0.3", least / static, "1", "about 0")),
+        verdict(
+            all_are(trees[0], SMOOTH)
+            and all_are(trees[-1], STICK_SLIP, IRREGULAR)
+            and largest[-1] > 0.9
+            and bool(np.all(least < 0.05 * static))
+        ),
+        "in the end: " + "; ".join(motion(tree) for tree in trees),
+    )
+
+
+def velocity(trees: Sequence[xr.DataTree]) -> Finding:
+    """C12: F_d against v_d t does not depend on v_d while it is slow; fast sliding is smooth."""
+    slow, fast = trees[:4], trees[4:]
+    speeds = [configuration(tree).drive_speed * 1e6 for tree in trees]
+    peaks = [of_each(tree, lambda one: one["force_before"].values[1:].mean()) for tree in slow]
+    ways = [
+        of_each(tree, lambda one: one["waiting_time"].values[2:].mean()) * speed
+        for tree, speed in zip(slow, speeds, strict=False)
+    ]
+    means = [np.array([one.mean() for one in all_values]) for all_values in (peaks, ways)]
+    errors = [
+        np.sqrt(np.mean([one.var(ddof=1) / one.size for one in all_values]))
+        for all_values in (peaks, ways)
+    ]
+    # All four are the same if they scatter like means of five realizations do.
+    is_universal = all(
+        np.std(mean, ddof=1) < 2 * error for mean, error in zip(means, errors, strict=True)
+    )
+    return Finding(
+        (
+            *(
+                measured(f"mean peak at {speed:g} um/s", one * 1e6, "uN", "the same")
+                for speed, one in zip(speeds, peaks, strict=False)
+            ),
+            *(
+                measured(f"way of the drive in a period at {speed:g} um/s", one, "um", "the same")
+                for speed, one in zip(speeds, ways, strict=False)
+            ),
+            *(
+                measured(f"swing over mean at {speed:g} um/s", swing(tree), "1", "smooth at high")
+                for speed, tree in zip(speeds[4:], fast, strict=True)
+            ),
+        ),
+        verdict(is_universal and all_are(fast[-1], SMOOTH), True),
+        "over a decade of slow drives peaks and periods are the same within their scatter. On the "
+        "way to smooth sliding the swing grows at first: where the force falls with velocity "
+        "through the delay, the slider swings at Omega_S around steady sliding; in the end: "
+        + "; ".join(
+            f"{speed:g} um/s: {motion(tree)}" for speed, tree in zip(speeds[4:], fast, strict=True)
+        ),
+    )
+
+
+CLAIMS = (
+    Claim(
+        "C6",
+        "without delay sliding becomes smooth although K << K*; with a long one the slider sticks "
+        "and slips (S22)",
+        "after 400 s: swing below a tenth of the mean without delay, smooth at 0.1 ms, stick-slip "
+        "or irregular at 0.5 and 10 ms, in every realization",
+        tuple(f"claims/delay-{one}" for one in ("0", "0.1", "0.5", "10")),
+        delay,
+    ),
+    Claim(
+        "C10",
+        "interaction widens the range of stick-slip; at xi = 0.3 one avalanche takes the whole "
+        "system and F falls abruptly to about zero (S25 to S27)",
+        "smooth at xi = 0, not at 0.3; there an avalanche of more than 90 % of N, and F below 5 % "
+        "of F_s, in every realization",
+        tuple(f"claims/interaction-{one}" for one in ("0", "0.03", "0.1", "0.3")),
+        interaction,
+    ),
+    Claim(
+        "C12",
+        "F_d against v_d t does not depend on v_d in slow drives; at high v_d sliding is smooth",
+        "peaks and periods at 0.02 to 0.2 um/s scatter like realizations do; smooth at 300 um/s",
+        (
+            *(
+                "claims/velocity-0.02",
+                "claims/velocity-0.05",
+                "claims/klein",
+                "claims/velocity-0.2",
+            ),
+            *(f"claims/velocity-{one}" for one in (1, 10, 30, 100, 300)),
+        ),
+        velocity,
+    ),
+)

@@ -1,0 +1,126 @@
+"""Claims of numbers that follow from the parameters: C1, C15, C16."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mesoslip.theory.derived import derived
+from mesoslip.theory.force_curve import ForceCurve
+from outputs import configuration
+
+from claims.base import Claim, Finding, measured, verdict
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from mesoslip.configuration.config import Config
+
+# The source gives three digits.
+ROUNDING = 5e-3
+
+
+def derived_numbers(trees: Sequence[xr.DataTree]) -> Finding:
+    """C1: Omega_S, tau_S, Omega_L and D1 of Klein's experiment."""
+    quantities = derived(configuration(trees[0]))
+    source = {
+        "omega_s": (257.0, "1/s"),
+        "setup_period": (0.0245, "s"),
+        "omega_l": (1.17e3, "1/s"),
+        "D1": (2.1e-3, "1"),
+    }
+    found = {name: quantities[name].value for name in source}
+    alpha = quantities["alpha"].value
+    return Finding(
+        (
+            *(
+                measured(name, found[name], unit, f"{value:.4g}")
+                for name, (value, unit) in source.items()
+            ),
+            measured("alpha", alpha, "1", "2.21"),
+        ),
+        verdict(
+            all(abs(found[name] / value - 1) < ROUNDING for name, (value, _) in source.items()),
+            abs(alpha / 2.21 - 1) > ROUNDING,
+        ),
+        "all four agree to the digits given; alpha = (6 F_s Omega_S/(K v_d))^(1/3), given beside "
+        "them, is another number by the source's own formula",
+    )
+
+
+def cantilever(trees: Sequence[xr.DataTree]) -> Finding:
+    """C15: lowest bending frequency of a cantilever over (K/M)^(1/2)."""
+    from scipy.optimize import brentq
+
+    told = derived(configuration(trees[0]))["bending_ratio"].value
+    # A beam with one free end: cos z cosh z = -1, frequency z^2 (E I/(rho S))^(1/2)/L^2.
+    root = brentq(lambda z: math.cos(z) + 1 / math.cosh(z), 1.5, 2.5, xtol=1e-15)
+    exact = root**2 / math.sqrt(3)
+    return Finding(
+        (
+            measured("ratio by the formula with 3.52", told, "1", "2.03"),
+            measured("ratio from the beam's equation", exact, "1", "2.03"),
+        ),
+        verdict(abs(told / 2.03 - 1) < ROUNDING and abs(exact / 2.03 - 1) < ROUNDING),
+        "the beam's own equation, cos z cosh z = -1, gives the same",
+    )
+
+
+def instability(trees: Sequence[xr.DataTree]) -> Finding:
+    """C16: K* of the master equation against Nk (f_s - f_b)/Delta f_s."""
+    config = configuration(trees[0])
+    widths = np.array([0.003, 0.01, 0.03, 0.1])
+    exact = np.array([_critical_stiffness(config, width) for width in widths])
+    contacts = config.contacts
+    estimate = contacts.stiffness * (1 - contacts.back_force_ratio) / widths
+    ratio = exact / estimate
+    # Delta f_s K* must be the same for all widths for the estimate's form to hold.
+    slope = np.polyfit(np.log(widths), np.log(exact), 1)[0]
+    return Finding(
+        (
+            measured("K* at Delta f_s/f_s = 0.01", exact[1], "N/m", "4.34e4"),
+            *(
+                measured(f"K* over S48 at {width:g}", one, "1", "about 1")
+                for width, one in zip(widths, ratio, strict=True)
+            ),
+            measured("exponent of K* in Delta f_s", slope, "1", "-1"),
+        ),
+        verdict(abs(slope + 1) < 0.1 and bool(np.all((ratio > 1 / 3) & (ratio < 3))), True),
+        "K* goes nearly like 1/Delta f_s, but is 0.4 to 0.3 of the estimate, as a Gaussian law's "
+        "greatest density is 0.4/Delta f_s; the source's number is neither",
+    )
+
+
+def _critical_stiffness(config: Config, width: float) -> float:
+    """K* of the master equation at a relative width of the thresholds [N/m]."""
+    changed = config.replace(
+        {"contacts.coupling": "equal", "contacts.threshold.relative_width": float(width)},
+        {"curve.length": 3 * config.contacts.break_stretch},
+    )
+    return ForceCurve(changed).K_star[0]
+
+
+CLAIMS = (
+    Claim(
+        "C1",
+        "Omega_S = 257 1/s, tau_S = 0.0245 s, Omega_L = 1170 1/s, D1 = 2.1e-3",
+        "each within half a percent of the source's number",
+        ("claims/klein",),
+        derived_numbers,
+    ),
+    Claim(
+        "C15",
+        "a cantilever's lowest bending frequency is 2.03 (K/M)^(1/2)",
+        "by the formulas and by the beam's equation within half a percent of 2.03",
+        ("claims/cantilever",),
+        cantilever,
+    ),
+    Claim(
+        "C16",
+        "K* is about Nk (f_s - f_b)/Delta f_s (S48)",
+        "within a factor 3 at four widths from 0.003 to 0.1, exponent -1 within 0.1",
+        ("claims/klein",),
+        instability,
+    ),
+)

@@ -1,0 +1,97 @@
+"""Judgements as a page of the documentation, and as plain tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from claims.base import Judgement, Verdict
+
+
+def as_table(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
+    """Judgements as plain dictionaries."""
+    return [
+        {
+            "name": one.claim.name,
+            "statement": one.claim.statement,
+            "criterion": one.claim.criterion,
+            "runs": list(one.claim.runs),
+            "verdict": one.finding.verdict.value,
+            "reason": one.finding.reason,
+            "measured": [
+                {
+                    "name": what.name,
+                    "mean": what.mean,
+                    "standard_deviation": what.spread,
+                    "values": list(what.values),
+                    "unit": what.unit,
+                    "source": what.source,
+                }
+                for what in one.finding.measured
+            ],
+        }
+        for one in judgements
+    ]
+
+
+def summary(judgements: Sequence[Judgement]) -> str:
+    """How many claims hold, and how many fail."""
+    counts = dict.fromkeys(Verdict, 0)
+    for one in judgements:
+        counts[one.finding.verdict] += 1
+    return ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
+
+
+def as_text(judgements: Sequence[Judgement]) -> str:
+    """Judgements as lines of a terminal."""
+    lines = []
+    for one in judgements:
+        lines.append(f"{one.claim.name}: {one.claim.statement}")
+        for what in one.finding.measured:
+            source = f"   (source: {what.source})" if what.source else ""
+            lines.append(f"    {what.name:46} {what!s:>24}{source}")
+        reason = f": {one.finding.reason}" if one.finding.reason else ""
+        lines += [f"    {one.finding.verdict.value.upper()}{reason}", ""]
+    return "\n".join([*lines, summary(judgements)])
+
+
+def as_markdown(judgements: Sequence[Judgement]) -> str:
+    """Judgements as a page."""
+    lines = [
+        "# The source's claims, checked",
+        "",
+        "Written by `make claims`. Each claim of the source (`C1` to `C16`) is judged from runs in",
+        "`runs/source`; values are means and standard deviations over realizations.",
+        "",
+        f"In all: {summary(judgements)}.",
+        "",
+        "| claim | statement | verdict |",
+        "|---|---|---|",
+        *(
+            f"| [{one.claim.name}](#{one.claim.name.lower()}) | {one.claim.statement} "
+            f"| {one.finding.verdict.value} |"
+            for one in judgements
+        ),
+    ]
+    for one in judgements:
+        lines += [
+            "",
+            f"## {one.claim.name}",
+            "",
+            f"*{one.claim.statement}.* Criterion: {one.claim.criterion}. "
+            f"Runs: {', '.join(f'`{run}`' for run in one.claim.runs)}.",
+            "",
+            "| measured | value | the source |",
+            "|---|---|---|",
+            *(f"| {what.name} | {what} | {what.source} |" for what in one.finding.measured),
+            "",
+            _ending(one),
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _ending(judgement: Judgement) -> str:
+    """Verdict and reason, as sentences."""
+    finding = judgement.finding
+    told = f"**{finding.verdict.value.capitalize()}.**"
+    return f"{told} {finding.reason[0].upper()}{finding.reason[1:]}." if finding.reason else told

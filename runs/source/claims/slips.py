@@ -1,0 +1,284 @@
+"""Claims of single slips: C3, C4, C5, C7, C8, C9, C11."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mesoslip.analysis.slips import slips
+from mesoslip.plots.run import series
+from mesoslip.theory.derived import derived
+from numpy.typing import NDArray
+from outputs import configuration
+
+from claims.base import Claim, Finding, measured, variable, verdict
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+
+def of_each(tree: xr.DataTree, value: Callable[[xr.Dataset], float]) -> Array:
+    """A number from the slips of each realization that has some."""
+    data = slips(tree)
+    owner = data["realization_index"].values
+    return np.array(
+        [value(data.isel(slip=np.flatnonzero(owner == one))) for one in np.unique(owner)]
+    )
+
+
+def first_spike(trees: Sequence[xr.DataTree]) -> Finding:
+    """C3: the first spike of the force is larger than all later ones."""
+    (tree,) = trees
+    first = of_each(tree, lambda one: one["force_before"].values[0])
+    later = of_each(tree, lambda one: one["force_before"].values[1:].max())
+    mean = of_each(tree, lambda one: one["force_before"].values[1:].mean())
+    return Finding(
+        (
+            measured("first peak", first * 1e6, "uN", "large"),
+            measured("greatest later peak over the first", later / first, "1", "smaller"),
+            measured("mean later peak over the first", mean / first, "1", "smaller"),
+        ),
+        verdict(bool(np.all(later < 0.9 * first))),
+        "",
+    )
+
+
+def slip_velocity(trees: Sequence[xr.DataTree]) -> Finding:
+    """C4: the velocity in a slip is of order Omega_S F_s/K."""
+    (tree,) = trees
+    scale = derived(configuration(tree))["slip_velocity_scale"].value
+    first = of_each(tree, lambda one: one["peak_velocity"].values[0]) / scale
+    later = of_each(tree, lambda one: one["peak_velocity"].values[1:].mean()) / scale
+    return Finding(
+        (
+            measured("peak velocity of the first slip over Omega_S F_s/K", first, "1", "about 1"),
+            measured("mean of later slips", later, "1", "about 1"),
+        ),
+        verdict(bool(np.all((first > 1 / 3) & (first < 3))), bool(np.any(later < 1 / 3))),
+        "the first slip, from contacts that are all relaxed, is that fast; later ones start from a "
+        "lower force and are several times slower",
+    )
+
+
+def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
+    """C5: F falls to zero, all contacts are detached, and F swings with a period K/(Nk Omega_S)."""
+    (tree,) = trees
+    config = configuration(tree)
+    contacts = config.contacts
+    omega = derived(config)["omega_s"].value
+    scale = config.spring_stiffness / (contacts.stiffness * omega)
+    least, most, period = [], [], []
+    data = slips(tree)
+    for realization in range(tree.sizes["realization"]):
+        slip = data.isel(slip=np.flatnonzero(data["realization_index"].values == realization)[0])
+        window = (slip["start_time"].item(), slip["end_time"].item())
+        times, detached = series(tree, "detached_contacts", realization, window)
+        _, force = series(tree, "contact_force", realization, window)
+        half = 0.5 * contacts.count
+        bursts = times[1:][(detached[1:] > half) & (detached[:-1] <= half)]
+        least.append(force.min() / contacts.static_force)
+        most.append(detached.max() / contacts.count)
+        period.append(np.diff(bursts).min())
+    loading = np.array(period) - contacts.delay
+    return Finding(
+        (
+            measured("least F over F_s", least, "1", "0"),
+            measured("most detached contacts over N", most, "1", "1"),
+            measured(
+                "shortest period of F", np.array(period) * 1e3, "ms", f"about {scale * 1e3:.3g}"
+            ),
+            measured("that without the delay", loading * 1e3, "ms", f"about {scale * 1e3:.3g}"),
+        ),
+        verdict(
+            max(least) < 0.01
+            and min(most) > 0.99
+            and bool(np.all((loading > scale / 3) & (loading < 3 * scale))),
+            True,
+        ),
+        "in each swing contacts wait for the delay and then load for K/(Nk Omega_S): the period is "
+        "the sum of both, here mostly the delay",
+    )
+
+
+def ringing(trees: Sequence[xr.DataTree]) -> Finding:
+    """C7: a long delay makes the force negative, and it rings at Omega_S; after a short one at
+    Omega_L."""
+    short, long = trees
+    quantities = derived(configuration(short))
+    omega_s, omega_l = quantities["omega_s"].value, quantities["omega_l"].value
+    least = variable(long, "spring_force").min(axis=1)
+    slow, fast = _free_frequency(long), _ringing_frequency(short)
+    after = of_each(short, lambda one: one["force_after"].values[0])
+    return Finding(
+        (
+            measured("least spring force, delay 100 ms", least * 1e6, "uN", "negative"),
+            measured("frequency while detached", slow, "1/s", f"Omega_S, {omega_s:.4g}"),
+            measured("spring force after the slip, delay 0.1 ms", after * 1e6, "uN", "above F_b"),
+            measured("frequency of the ringing then", fast, "1/s", f"Omega_L, {omega_l:.4g}"),
+        ),
+        verdict(
+            bool(
+                np.all(least < 0)
+                and np.all(np.abs(slow / omega_s - 1) < 0.05)
+                and np.all(np.abs(fast / omega_l - 1) < 0.05)
+                and np.all(after > 0)
+            ),
+            True,
+        ),
+        "frequencies agree; but with a short delay the first slip ends at a positive force below "
+        f"F_b = {_back_force(short) * 1e6:.2g} uN",
+    )
+
+
+def _back_force(tree: xr.DataTree) -> float:
+    contacts = configuration(tree).contacts
+    return contacts.back_force_ratio * contacts.static_force
+
+
+def _free_frequency(tree: xr.DataTree) -> Array:
+    """Frequency at which the spring force passes zero while no contact is pinned [1/s]."""
+    times = variable(tree, "time")
+    count = configuration(tree).contacts.count
+    frequencies = []
+    for force, detached in zip(
+        variable(tree, "spring_force"), variable(tree, "detached_contacts"), strict=True
+    ):
+        passes = (force[1:] * force[:-1] < 0) & (detached[1:] > 0.99 * count)
+        zeros = times[1:][passes]
+        frequencies.append(np.pi * (len(zeros) - 1) / (zeros[-1] - zeros[0]))
+    return np.array(frequencies)
+
+
+def _ringing_frequency(tree: xr.DataTree) -> Array:
+    """Frequency of the greatest line in the velocity in the 60 ms after the first slip [1/s]."""
+    times = variable(tree, "time")
+    ends = of_each(tree, lambda one: one["end_time"].values[0])
+    frequencies = []
+    for velocity, end in zip(variable(tree, "velocity"), ends, strict=True):
+        inside = (times > end) & (times < end + 0.06)
+        ringing = velocity[inside] - velocity[inside].mean()
+        length = 2**15
+        spectrum = np.abs(np.fft.rfft(ringing * np.hanning(ringing.size), length))
+        lines = 2 * np.pi * np.fft.rfftfreq(length, times[1] - times[0])
+        frequencies.append(lines[np.argmax(spectrum)])
+    return np.array(frequencies)
+
+
+def periods(trees: Sequence[xr.DataTree]) -> Finding:
+    """C8: the larger the dispersion of thresholds, the shorter the period."""
+    widths = [configuration(tree).contacts.threshold.relative_width for tree in trees]
+    first = [of_each(tree, lambda one: one["waiting_time"].values[1]) for tree in trees]
+    later = [of_each(tree, lambda one: one["waiting_time"].values[2:].mean()) for tree in trees]
+    rising = [np.ptp([one.mean() for one in later]), max(one.std(ddof=1) for one in later)]
+    return Finding(
+        tuple(
+            measured(f"{what}, width {width:g}", values, "s", "shorter for larger widths")
+            for what, all_values in (("first period", first), ("mean of later ones", later))
+            for width, values in zip(widths, all_values, strict=True)
+        ),
+        verdict(
+            all(early.min() > late.max() for early, late in pairwise(first)),
+            rising[0] < 3 * rising[1],
+        ),
+        "the first period, after the slip in which all contacts let go, shrinks with the width in "
+        "every realization; the mean over a minute of stick-slip hardly depends on it",
+    )
+
+
+def layers(trees: Sequence[xr.DataTree]) -> Finding:
+    """C9: the slip time hardly depends on the number of layers."""
+    times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
+    counts = [configuration(tree).slider.layer_count for tree in trees]
+    few, many = (one.mean() for one in times)
+    return Finding(
+        tuple(
+            measured(f"time of the first slip, {count} layers", one * 1e3, "ms", "the same")
+            for count, one in zip(counts, times, strict=True)
+        ),
+        verdict(abs(many / few - 1) < 0.1),
+        "",
+    )
+
+
+def viscosity(trees: Sequence[xr.DataTree]) -> Finding:
+    """C11: a drag larger by 1e5 leaves the slip time nearly unchanged."""
+    times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
+    drops = [of_each(tree, lambda one: one["force_drop"].values[0]) for tree in trees]
+    rates = [configuration(tree).contacts.drag_rate for tree in trees]
+    few, many = (times[place].mean() / times[0].mean() for place in (1, -1))
+    return Finding(
+        (
+            *(
+                measured(f"time of the first slip, eta = {rate:.0e} 1/s", one * 1e3, "ms", "same")
+                for rate, one in zip(rates, times, strict=True)
+            ),
+            *(
+                measured(f"its drop, eta = {rate:.0e} 1/s", one * 1e6, "uN", "")
+                for rate, one in zip(rates, drops, strict=True)
+            ),
+        ),
+        verdict(1 / 2 < many < 2, abs(many - 1) > 0.1),
+        f"a drag 1e3 times as large changes it by {100 * (few - 1):.0f} %, one 1e5 "
+        f"times as large by {100 * (many - 1):.0f} %: little for five orders of magnitude, but the "
+        "slider is then overdamped, and the drop is a third",
+    )
+
+
+CLAIMS = (
+    Claim(
+        "C3",
+        "the first spike is large, later ones are smaller (S20)",
+        "in each realization every later peak is below nine tenths of the first",
+        ("claims/klein",),
+        first_spike,
+    ),
+    Claim(
+        "C4",
+        "in a slip the slider moves with about Omega_S F_s/K",
+        "peak velocity of the first slip within a factor 3",
+        ("claims/klein",),
+        slip_velocity,
+    ),
+    Claim(
+        "C5",
+        "in a slip F falls to zero, all N contacts are detached, and F swings with a period of "
+        "order K/(Nk Omega_S) (S21)",
+        "least F below 1 % of F_s, more than 99 % detached, the period without the delay within a "
+        "factor 3",
+        ("claims/slip",),
+        inside_a_slip,
+    ),
+    Claim(
+        "C7",
+        "tau_d > 1/Omega_S: negative spring force, and ringing at Omega_S; tau_d << 1/Omega_S: "
+        "the force stays above F_b and rings at Omega_L",
+        "signs in every realization, frequencies within 5 %",
+        ("claims/ringing-short", "claims/ringing-long"),
+        ringing,
+    ),
+    Claim(
+        "C8",
+        "larger dispersion of the thresholds, shorter period (S23)",
+        "the period after the first slip shrinks with the width, ranges of realizations apart",
+        ("claims/dispersion-0.003", "claims/dispersion-0.01", "claims/dispersion-0.03"),
+        periods,
+    ),
+    Claim(
+        "C9",
+        "the slip time hardly depends on the number of layers, 16 or 64 (S24)",
+        "within 10 %",
+        ("claims/layers-16", "claims/layers-64"),
+        layers,
+    ),
+    Claim(
+        "C11",
+        "a film 1e5 times as viscous leaves the slip time nearly unchanged (S28)",
+        "within a factor 2; with a qualification if it changes by more than a tenth",
+        ("claims/drag-2e11", "claims/drag-2e14", "claims/drag-2e16"),
+        viscosity,
+    ),
+)

@@ -1,0 +1,86 @@
+"""Figures of avalanches: one that spreads, and sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mesoslip.analysis import avalanche_statistics
+from mesoslip.analysis import avalanches as avalanche_catalogue
+from mesoslip.plots import avalanches as avalanche_plots
+from outputs import configuration
+
+from figures.base import SourceFigure
+
+
+def spreading_avalanche(trees: Sequence[xr.DataTree]) -> Figure:
+    """An avalanche through the whole system as it spreads over the lattice, a part of it at each
+    stage."""
+    (tree,) = trees
+    snapshot = avalanche_plots.chosen_snapshot(tree)
+    generation = snapshot["generation"].values.astype(float)
+    stages = np.quantile(generation[generation > 0], (0.02, 0.2, 0.5, 1.0)).astype(int)
+    figure = Figure(figsize=(6.5, 6.2))
+    panels = figure.subplots(2, 2)
+    for axes, stage in zip(panels.flat, stages, strict=True):
+        broken = np.where((generation > 0) & (generation <= stage), generation, np.nan)
+        drawn = avalanche_plots.draw_contacts(
+            axes, snapshot, broken, cmap="inferno_r", norm=Normalize(1, generation.max())
+        )
+        count = np.count_nonzero(np.isfinite(broken))
+        axes.set_title(f"generation {stage}: {count} contacts", loc="left")
+    figure.colorbar(drawn, ax=panels, shrink=0.6, label="generation in which a contact breaks")
+    return figure
+
+
+def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
+    """Sizes of avalanches without interaction: a slider without inertia, and a fibre bundle."""
+    *sliders, bundle = trees
+    figure = Figure(figsize=(6.5, 3.2))
+    stationary, failing = figure.subplots(1, 2)
+    for tree, color in zip(sliders, ("tab:green", "tab:orange", "tab:red"), strict=True):
+        config = configuration(tree)
+        sizes = avalanche_catalogue.avalanches(tree)["size"].values
+        fit = avalanche_statistics.fit_power_law(sizes, smallest=10)
+        label = f"$K/Nk$ = {config.spring_stiffness / config.contacts.stiffness:g}"
+        if fit is not None:
+            label += rf": $\tau$ = {fit.exponent:.3f}, $s_c$ = {fit.cutoff:.3g}"
+            if fit.is_rejected:
+                label += f" (rejected, p = {fit.p_value:.2g})"
+        avalanche_plots.draw_distribution(stationary, sizes, fit, color=color, label=label)
+    for tree, force_above, color, exponent in (
+        (bundle, None, "black", 2.5),
+        (bundle, 0.999, "tab:blue", 1.5),
+    ):
+        bursts = avalanche_catalogue.avalanches(tree, min_force_ratio=force_above)
+        sizes = bursts["size"].values[~avalanche_catalogue.failures(tree, bursts)]
+        label = "all bursts" if force_above is None else f"above {force_above:g} of the strength"
+        avalanche_plots.draw_distribution(failing, sizes, color=color, label=label)
+        over = np.array([1.0, 300.0])
+        failing.loglog(over, over**-exponent, ":", color=color, label=f"$s^{{-{exponent:g}}}$")
+    over = np.array([1.0, 1e4])
+    stationary.loglog(over, 0.3 * over**-1.5, ":", color="black", label="$s^{-3/2}$")
+    stationary.set_title("sliding, stationary", loc="left")
+    failing.set_title("fibre bundle", loc="left")
+    for axes in (stationary, failing):
+        axes.set_xlabel("avalanche size $s$")
+        axes.set_ylabel("$P(s)$")
+        axes.set_ylim(bottom=1e-10)
+        axes.set_xlim(0.7, 3e5 if axes is stationary else 2e4)
+        axes.legend(loc="lower left")
+    return figure
+
+
+FIGURES = {
+    "avalanche": SourceFigure(
+        ("avalanche",), spreading_avalanche, "an avalanche through the whole system at four stages"
+    ),
+    "sizes": SourceFigure(
+        ("sizes-2000", "sizes-200", "sizes-20", "bundle"),
+        avalanche_sizes,
+        "sizes of avalanches of sliders without inertia, and of a fibre bundle",
+    ),
+}

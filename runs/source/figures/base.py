@@ -1,0 +1,64 @@
+"""What a figure of the source is, and the caption below it."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from mesoslip.configuration.config import Config
+from outputs import configuration
+
+
+@dataclass(frozen=True)
+class SourceFigure:
+    """A figure of the source: the runs it needs, the function that draws it, and what it shows."""
+
+    runs: tuple[str, ...]
+    draw: Callable[[Sequence[xr.DataTree]], Figure]
+    shows: str
+
+
+# What a caption tells of the runs, if it is the same in all of them.
+PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
+    lambda config: f"$N$ = {config.contacts.count}" if config.contact_kind.is_discrete else None,
+    lambda config: f"$F_s$ = {config.contacts.static_force * 1e6:g} µN",
+    lambda config: f"$Nk$ = {config.contacts.stiffness:g} N/m",
+    lambda config: rf"$\Delta{{f_s}}/f_s$ = {config.contacts.threshold.relative_width:.3g}",
+    lambda config: f"$f_b$ = {config.contacts.back_force_ratio:g} $f_s$",
+    lambda config: rf"$\tau_d$ = {config.contacts.delay * 1e3:g} ms",
+    lambda config: rf"$\eta$ = {config.contacts.drag_rate:.0e} 1/s",
+    lambda config: (
+        f"$K$ = {config.spring_stiffness:g} N/m" if 0 < config.spring_stiffness < np.inf else None
+    ),
+    lambda config: (
+        f"$v_d$ = {config.drive_speed * 1e6:g} µm/s"
+        if len(config.drive_parts) == 1 and config.drive_speed > 0
+        else None
+    ),
+    lambda config: f"{config.contacts.threshold.law} thresholds",
+    lambda config: f"{config.contacts.coupling} coupling",
+)
+
+
+# Characters of a caption in an inch.
+CAPTION_CHARACTERS = 19
+
+
+def caption(name: str, shows: str, trees: Sequence[xr.DataTree]) -> str:
+    """What a figure shows, and the parameters that all its runs have in common."""
+    configs = [configuration(tree) for tree in trees]
+    told = [{parameter(config) for config in configs} for parameter in PARAMETERS]
+    common = [text for texts in told if len(texts) == 1 for text in texts if text is not None]
+    return f"{name}: {shows}. {', '.join(common)}."
+
+
+def add_caption(figure: Figure, text: str) -> None:
+    """Write a caption under a figure; formulas in it have no spaces, where it may be broken."""
+    # A formula takes less room than its source.
+    width = int(CAPTION_CHARACTERS * figure.get_figwidth() * 1.15)
+    kept_together = text.replace(" = ", "\u00a0=\u00a0")
+    figure.supxlabel(textwrap.fill(kept_together, width), fontsize=7, x=0.01, ha="left")

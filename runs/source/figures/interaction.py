@@ -1,0 +1,80 @@
+"""Figures of contacts that push over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import xarray as xr
+from matplotlib.figure import Figure
+from mesoslip.output.layout import group_of
+from mesoslip.plots import run as plots
+from mesoslip.plots.style import CONTACT, SPRING
+from outputs import configuration
+
+from figures.base import SourceFigure
+from figures.panels import stacked
+
+
+def interactions(trees: Sequence[xr.DataTree]) -> Figure:
+    """S25: the spring force for different strengths of the interaction."""
+    return stacked(trees, _strength)
+
+
+def detaching(trees: Sequence[xr.DataTree]) -> Figure:
+    """S26: detached contacts in the first slip for different strengths of the interaction."""
+    figure = Figure(figsize=(6.5, 4.2))
+    for letter, axes, tree in zip("abcd", figure.subplots(2, 2).flat, trees, strict=True):
+        plots.draw_series(
+            axes, tree, "detached_contacts", window=_first_slip(tree), time_unit=1e-3, color="black"
+        )
+        sizes = group_of(tree, "avalanches")["size"].values
+        axes.set_title(f"({letter}) {_strength(tree)}; largest: {sizes.max()}", loc="left")
+        axes.set_ylabel("$N_d$")
+        axes.set_xlabel("time in the first slip (ms)")
+    return figure
+
+
+def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
+    """S27: spring force and contact force in the first slip for each strength of interaction."""
+    figure = Figure(figsize=(6.5, 4.2))
+    all_axes = figure.subplots(2, 2).flat
+    for letter, axes, tree in zip("abcd", all_axes, trees, strict=True):
+        window = _first_slip(tree)
+        plots.draw_series(axes, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
+        axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
+        axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
+        axes.set_ylabel("force (µN)")
+        axes.set_xlabel("time in the first slip (ms)")
+    all_axes[0].legend()
+    return figure
+
+
+def _strength(tree: xr.DataTree) -> str:
+    interaction = configuration(tree).interaction
+    return rf"$\xi$ = {interaction.strength if interaction is not None else 0:g}"
+
+
+def _first_slip(tree: xr.DataTree) -> tuple[float, float]:
+    """Window from 2 ms before to 30 ms after the start of the first slip [s]."""
+    start = group_of(tree, "slips")["start_time"].values[0]
+    return start - 2e-3, start + 3e-2
+
+
+FIGURES = {
+    "S25": SourceFigure(
+        ("S25a", "S25b", "S25c", "S25d"),
+        interactions,
+        "spring force for different strengths of the interaction",
+    ),
+    "S26": SourceFigure(
+        ("S25a", "S25b", "S25c", "S25d"),
+        detaching,
+        "detached contacts in the first slip for different strengths of the interaction",
+    ),
+    "S27": SourceFigure(
+        ("S25a", "S25b", "S25c", "S25d"),
+        interacting_slips,
+        "spring and contact force in the first slip for different strengths of the interaction",
+    ),
+}

@@ -37,10 +37,10 @@ module mesoslip_schedule
       real(wp) :: behind = -huge(1.0_wp)
       !> Time after which a contact that breaks attaches; huge if it does not [s]
       real(wp) :: delay = 0.0_wp
-      !> Time at which it ends, and longest step [s]
-      real(wp) :: end_time = 0.0_wp, longest_step = 0.0_wp
-      !> Mean stiffness of a contact [N/m], and its force at the displacement at which it ends [N]
-      real(wp) :: mean_stiffness = 0.0_wp, farthest_force = 0.0_wp
+      !> Time at which it ends, and maximum duration of a step [s]
+      real(wp) :: end_time = 0.0_wp, max_step = 0.0_wp
+      !> Mean stiffness of a contact [N/m]; it ends where that times the displacement is a force [N]
+      real(wp) :: mean_stiffness = 0.0_wp, max_force = 0.0_wp
 
       !> Of each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
       !> of the contact when it is detached [N s/m]
@@ -95,7 +95,7 @@ contains
          window%lower = -self%break_coordinate(self%broken + 1)
       end if
       window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
-         & time + self%longest_step)
+         & time + self%max_step)
    end function window
 
    !> Let what is due happen: first contacts break, then contacts attach.
@@ -111,7 +111,7 @@ contains
       if (self%attach_time(self%attached + 1) <= time) call self%attach_due(time, displacement)
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
          & .or. self%attach_time(self%attached + 1) <= time &
-         & .or. abs(displacement) * self%mean_stiffness >= self%farthest_force
+         & .or. abs(displacement) * self%mean_stiffness >= self%max_force
    end subroutine pass
 
    !> Contacts break.

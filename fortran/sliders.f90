@@ -6,6 +6,7 @@ module mesoslip_sliders
    use mesoslip_sliders_layered, only: make_slider_layered
    use mesoslip_sliders_prescribed, only: make_slider_prescribed
    use mesoslip_sliders_quasistatic, only: make_slider_quasistatic
+   use mesoslip_sliders_quasistatic_force, only: make_slider_quasistatic_force
    use mesoslip_sliders_rigid, only: make_slider_rigid
    implicit none
    private
@@ -34,6 +35,8 @@ contains
          call make_slider_prescribed(slider, parameters, error)
       case ("quasistatic")
          call make_slider_quasistatic(slider, parameters, error)
+      case ("quasistatic_force")
+         call make_slider_quasistatic_force(slider, parameters, error)
       case default
          call raise(error, status_invalid, "unknown kind of slider '" // kind // "'")
       end select

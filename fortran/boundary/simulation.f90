@@ -87,18 +87,18 @@ subroutine set_slider(handle, kind, length, names, values, status, message)
    call report(error, status, message)
 end subroutine set_slider
 
-!> Give a simulation its drive, which has a constant acceleration in each of its parts.
-subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stage, status, message)
+!> Give a simulation, which has its slider, a drive of constant acceleration in each of its parts.
+subroutine set_drive(handle, parts, part_end, start_rate, end_rate, stage, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Number of parts; when each ends [s], velocities of the drive at its start and its end [m/s],
-   !> and the number of the stage that it is of
+   !> Number of parts; when each ends [s], rates of the drive at its start and at its end, [m/s], or
+   !> [N/s] if it is a force, and the number of the stage that it is of
    integer, intent(in) :: parts
-   real(8), intent(in) :: part_end(parts), start_velocity(parts), end_velocity(parts)
+   real(8), intent(in) :: part_end(parts), start_rate(parts), end_rate(parts)
    integer, intent(in) :: stage(parts)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -108,11 +108,12 @@ subroutine set_drive(handle, parts, part_end, start_velocity, end_velocity, stag
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
-      simulation%part_end = part_end
-      simulation%start_velocity = start_velocity
-      simulation%end_velocity = end_velocity
-      simulation%stage_of_part = stage
       call simulation%stages%open()
+      if (allocated(simulation%slider)) then
+         call simulation%slider%drive%open(part_end, start_rate, end_rate, stage, error)
+      else
+         call raise(error, status_invalid, "the slider comes before its drive")
+      end if
    end if
    call report(error, status, message)
 end subroutine set_drive
@@ -142,8 +143,8 @@ subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, s
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
-      if (slips > 0) simulation%most_slips = slips
-      simulation%farthest = displacement
+      if (slips > 0) simulation%stop%max_slips = slips
+      simulation%stop%displacement = displacement
       call simulation%steady%open(block_way, blocks, tolerance)
    end if
    call report(error, status, message)

@@ -62,14 +62,14 @@ module mesoslip_recording_avalanches
       procedure, non_overridable :: open
       !> Whether so much waits that it should be taken away
       procedure, non_overridable :: is_full
-      !> Look at an advance of the slider, before the contacts respond
-      procedure, non_overridable :: see_advance
-      !> Look at the response of the contacts
-      procedure, non_overridable :: see_response
-      !> Whether it has to see each advance, and what to make of those that it did not
-      procedure, non_overridable :: sees_each
-      procedure, non_overridable :: pass_over
-      !> Close the present avalanche
+      !> Take the snapshots that are due after an advance of the slider
+      procedure, non_overridable :: take_due_snapshots
+      !> Count the breaks of a response of the contacts
+      procedure, non_overridable :: count_breaks
+      !> Whether each avalanche is needed, and the number of others
+      procedure, non_overridable :: needs_each
+      procedure, non_overridable :: count_others
+      !> Close the present avalanche, if there is one
       procedure, non_overridable :: close
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
@@ -114,20 +114,17 @@ contains
       is_full = self%catalogue%count >= many_avalanches .or. self%snapshots%count >= self%many
    end function is_full
 
-   !> Look at an advance of the slider, before the contacts respond.
-   subroutine see_advance(self, slider, contacts)
+   !> Take the snapshots that are due after an advance of the slider, before the contacts respond.
+   subroutine take_due_snapshots(self, slider, contacts)
       !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
       !> The contacts as they were during the advance
-      class(contacts_type), intent(inout) :: contacts
+      class(contacts_type), intent(in) :: contacts
 
       type(motion_type) :: motion
 
-      if (self%size > 0.0_wp .and. slider%settled) then
-         call self%close(slider, contacts, slider%rest_displacement)
-      end if
       do while (self%taken < size(self%snapshot_time))
          if (self%snapshot_time(self%taken + 1) > slider%time) exit
          self%taken = self%taken + 1
@@ -135,16 +132,16 @@ contains
          call self%take_snapshot(contacts, motion%time, motion%displacement, &
             & motion%displacement - slider%origin)
       end do
-   end subroutine see_advance
+   end subroutine take_due_snapshots
 
-   !> Look at the response of the contacts.
-   subroutine see_response(self, slider, contacts, law)
+   !> Count the breaks of a response of the contacts; an avalanche begins unless there is one.
+   subroutine count_breaks(self, slider, contacts, law)
       !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
       !> The slider
       class(slider_type), intent(in) :: slider
       !> The contacts after their response
-      class(contacts_type), intent(inout) :: contacts
+      class(contacts_type), intent(in) :: contacts
       !> Contact force before
       type(interface_law_type), intent(in) :: law
 
@@ -152,23 +149,22 @@ contains
       if (.not. self%size > 0.0_wp) call self%begin(slider, law)
       self%size = self%size + (contacts%breaks - self%breaks)
       self%breaks = contacts%breaks
-      if (.not. slider%instant) call self%close(slider, contacts, slider%displacement)
-   end subroutine see_response
+   end subroutine count_breaks
 
-   !> Whether there is more to do than to count the avalanches of a slider with inertia.
-   pure function sees_each(self)
+   !> Whether there is more to do than to count avalanches.
+   pure function needs_each(self)
       !> The recorder
       class(avalanche_recorder_type), intent(in) :: self
       !> Whether there is
-      logical :: sees_each
+      logical :: needs_each
 
-      sees_each = self%parameters%least_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
+      needs_each = self%parameters%least_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
          & .or. self%parameters%most_avalanches < huge(1_i8) &
          & .or. self%taken < size(self%snapshot_time)
-   end function sees_each
+   end function needs_each
 
-   !> Count avalanches that came to an end unseen.
-   subroutine pass_over(self, number, breaks)
+   !> Count avalanches of which nothing else is recorded.
+   subroutine count_others(self, number, breaks)
       !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
       !> Their number
@@ -178,7 +174,7 @@ contains
 
       self%avalanches = self%avalanches + number
       self%breaks = breaks
-   end subroutine pass_over
+   end subroutine count_others
 
    !> An avalanche begins.
    subroutine begin(self, slider, law)

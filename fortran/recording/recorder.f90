@@ -225,7 +225,7 @@ contains
 
       if (self%drive_changes .or. slider%time <= 0.0_wp) call self%change_stage(slider, breaks)
       excess = self%sense * (slider%velocity + slider%base_velocity &
-         & - slider%drive_velocity_at(slider%time))
+         & - slider%drive%rate_at(slider%time))
       turns = excess > 0.0_wp .neqv. self%last_excess > 0.0_wp
       self%last_excess = excess
       if (turns) then
@@ -253,7 +253,7 @@ contains
       real(wp) :: fast
 
       filter%time = self%next_sample
-      filter%reference = slider%drive_velocity
+      filter%reference = slider%drive%rate
       filter%direction = self%sense
       if (self%parameters%slip_velocity <= 0.0_wp) return
       if (self%drive_changes .or. slider%time <= 0.0_wp) then
@@ -340,9 +340,9 @@ contains
       if (self%phase == phase_fall) call self%drop_fall()
       call self%stop_trace()
       self%drive_changes = .false.
-      self%sense = slider%drive_direction
+      self%sense = slider%drive%direction
       self%last_excess = self%sense * (motion%velocity + motion%base_velocity &
-         & - slider%drive_velocity_at(slider%step_time))
+         & - slider%drive%rate_at(slider%step_time))
       ! What a faster drive stretches before the block has its velocity is regained too.
       self%minima%count = 0
       call self%add_minimum(motion)
@@ -614,7 +614,7 @@ contains
       pure logical function is_faster(velocity, time)
          real(wp), intent(in) :: velocity, time
 
-         is_faster = sense * (velocity - slider%drive_velocity_at(time)) > 0.0_wp
+         is_faster = sense * (velocity - slider%drive%rate_at(time)) > 0.0_wp
       end function is_faster
 
    end function pace

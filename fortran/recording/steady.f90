@@ -37,7 +37,7 @@ module mesoslip_recording_steady
       !> Begin with the first block
       procedure, non_overridable :: begin
       !> A block is over
-      procedure, non_overridable :: see_block
+      procedure, non_overridable :: end_block
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type steady_recorder_type
@@ -82,7 +82,7 @@ contains
    end subroutine begin
 
    !> A block is over: is the state steady?
-   subroutine see_block(self, impulse, is_steady)
+   subroutine end_block(self, impulse, is_steady)
       !> The recorder
       class(steady_recorder_type), intent(inout) :: self
       !> Impulse of the drive since the first block began [N s]
@@ -112,7 +112,7 @@ contains
       scatter_before = sqrt(sum((self%mean - early)**2, .not. is_late) / (blocks - 1))
       is_steady = abs(late - early) <= max(sqrt(2.0_wp / blocks) * scatter, self%tolerance) &
          & .and. scatter_before <= max(2.0_wp * scatter, self%tolerance)
-   end subroutine see_block
+   end subroutine end_block
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -1,20 +1,19 @@
 !> What every slider can do: move under a linear law of the contact force, and say where it is.
 !>
-!> A slider knows nothing about contacts. Displacements are relative to an origin that moves along
-!> with the slider, so that they keep their digits however far it goes.
+!> A slider has a drive, and knows nothing about contacts. Displacements are relative to an origin
+!> that moves along with the slider, so that they keep their digits however far it goes.
 module mesoslip_sliders_base
+   use mesoslip_drive, only: drive_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_extremes, only: extremes_type
-   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_schedule, only: schedule_type
    use mesoslip_step_filter, only: step_filter_type
    implicit none
    private
 
-   public :: slider_type, motion_type, drive_slider, exchange_slider, exchange_law, shift_slider
+   public :: slider_type, motion_type, exchange_slider, exchange_law, shift_slider
 
    !> The motion at one time.
    type :: motion_type
@@ -52,42 +51,14 @@ module mesoslip_sliders_base
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
       real(wp) :: direction = 1.0_wp
-      !> Velocity of the drive at a time [m/s], its place then, from the moving origin [s, m], and
-      !> its acceleration since [m/s2]
-      real(wp) :: drive_velocity = 0.0_wp, drive_time = 0.0_wp, drive_displacement = 0.0_wp, &
-         & drive_acceleration = 0.0_wp
-      !> Time at which the drive will turn round [s]; no step goes beyond
-      real(wp) :: drive_turn = huge(1.0_wp)
-      !> Sign of its velocity until then, or of the last one that was not zero
-      real(wp) :: drive_direction = 1.0_wp
+      !> What drives it
+      type(drive_type) :: drive
       !> Time at which the last advance started [s]
       real(wp) :: step_time = 0.0_wp
       !> Lost in the drag of contacts and in the slider's damping [J]
       type(accumulator_type) :: drag_loss, damping_loss
-      !> Impulse of the drive since it took its velocity [N s], by which, times the velocity, its
-      !> work is more than what was added up [J]; none under an acceleration
-      type(accumulator_type) :: impulse, earlier_work
-      !> Impulse of the drive in its stage, but for that [N s]
-      type(accumulator_type) :: stage_impulse
-      !> Extremes of the drive's force in its stage, and whether the slider notes them itself: those
-      !> without inertia, whose force jumps
-      type(extremes_type) :: extremes
-      logical :: notes_extremes = .false.
-      !> Whether it has no inertia, and jumps to its equilibrium while the drive stands still
-      logical :: instant = .false.
-      !> Whether it came to its equilibrium in the last advance, and where [m]
-      logical :: settled = .false.
-      real(wp) :: rest_displacement = 0.0_wp
-      !> Set when nothing holds it any more
-      logical :: unbound = .false.
-      !> Whether the drive is a force, under which contacts may break without end
-      logical :: under_force = .false.
-      !> Whether a run that is put away here goes on to the bit
-      logical :: can_pause = .true.
-      !> Whether it may run through a schedule, being looked at here and there only
-      logical :: runs_ahead = .false.
-      !> Layers whose displacements can be observed
-      integer :: layer_count = 0
+      !> Whether it is faster than the drive where the drive's spring pulls: the force falls
+      logical :: is_faster = .false.
       !> Cost of an advance over that of a rigid slider
       real(wp) :: cost = 1.0_wp
       !> Steps, evaluations and failed steps of its integrator, if it has one
@@ -99,25 +70,27 @@ module mesoslip_sliders_base
       procedure(start_interface), deferred :: start
       !> Move until the first end of a window, or less far
       procedure(advance_interface), deferred :: advance
-      !> Move through a schedule of changes of the contact force
-      procedure :: run_ahead
       !> The motion at a time of the last advance
       procedure(observe_interface), deferred :: observe
       !> Kinetic energy and that of the drive's spring
       procedure(energy_interface), deferred :: energy
       !> Where it is
       procedure, non_overridable :: pose
-      !> Give the drive another velocity and acceleration
-      procedure :: drive => drive_slider
-      !> Where the drive is at a time, and its velocity
-      procedure, non_overridable :: drive_at
-      procedure, non_overridable :: drive_velocity_at
-      !> Work that the drive has done
-      procedure, non_overridable :: drive_work
+      !> Take note that the drive has changed
+      procedure :: adapt_to_drive
+      !> Whether a run that is put away now goes on to the bit
+      procedure :: can_pause
       !> Velocity where the drive's spring pulls
       procedure :: pulled_velocity
       !> Move the origin of displacements
       procedure :: shift_origin => shift_slider
+      !> Take the force of the drive at a time of the last advance into account in its extremes
+      procedure, non_overridable :: note_force
+      !> The same now, where the drive has changed
+      procedure, non_overridable :: mark_extreme
+      !> Look for an extreme of the force in the last advance, and select steps that may have one
+      procedure :: note_extreme
+      procedure :: select_extremes
       !> Displacements of the layers at a time of the last advance
       procedure :: observe_layers
       !> Put the state into an archive or take it out
@@ -173,25 +146,6 @@ module mesoslip_sliders_base
 
 contains
 
-   !> Move through a schedule until it ends, or until a step is of interest.
-   subroutine run_ahead(self, schedule, filter)
-      !> The slider
-      class(slider_type), intent(inout) :: self
-      !> What happens on the way; what is due at the end of a step of interest, or after a turn, has
-      !> not happened yet
-      type(schedule_type), intent(inout) :: schedule
-      !> Which steps are of interest; the slider stops after one
-      type(step_filter_type), intent(inout) :: filter
-
-      do
-         call self%advance(schedule%law(), schedule%window(self%time))
-         call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
-         if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
-         call schedule%pass(self%time, self%displacement)
-         if (schedule%is_over .or. filter%steps >= filter%max_steps) return
-      end do
-   end subroutine run_ahead
-
    !> Where the slider is.
    pure function pose(self)
       !> The slider
@@ -203,42 +157,23 @@ contains
          & self%direction)
    end function pose
 
-   !> Give the drive another velocity and acceleration.
-   subroutine drive_slider(self, velocity, acceleration)
+   !> Take note that the drive has changed: most sliders see it in their next advance.
+   subroutine adapt_to_drive(self)
       !> The slider
       class(slider_type), intent(inout) :: self
-      !> Velocity of the drive now [m/s], and its acceleration from now on [m/s2]
-      real(wp), intent(in) :: velocity, acceleration
 
-      if (.not. self%under_force) then
-         call self%earlier_work%add(self%drive_velocity * self%impulse%total())
-      end if
-      call self%stage_impulse%add(self%impulse%total())
-      self%impulse = accumulator_type()
-      self%drive_displacement = self%drive_at(self%time)
-      self%drive_time = self%time
-      self%drive_velocity = velocity
-      self%drive_acceleration = acceleration
-      self%drive_turn = huge(1.0_wp)
-      if (velocity * acceleration < 0.0_wp) self%drive_turn = self%time - velocity / acceleration
-      if (abs(velocity) > 0.0_wp) then
-         self%drive_direction = sign(1.0_wp, velocity)
-      else if (abs(acceleration) > 0.0_wp) then
-         self%drive_direction = sign(1.0_wp, acceleration)
-      end if
-   end subroutine drive_slider
+   end subroutine adapt_to_drive
 
-   !> Work that the drive has done.
-   pure function drive_work(self) result(work)
+   !> Whether a run that is put away now goes on to the bit: it does where all of the slider's state
+   !> can be put away.
+   pure function can_pause(self)
       !> The slider
       class(slider_type), intent(in) :: self
-      !> Work [J]
-      real(wp) :: work
+      !> Whether it does
+      logical :: can_pause
 
-      work = self%earlier_work%total()
-      ! A drive by force has a rate of that for its velocity.
-      if (.not. self%under_force) work = work + self%drive_velocity * self%impulse%total()
-   end function drive_work
+      can_pause = .true.
+   end function can_pause
 
    !> Velocity, at the end of the last advance, where the drive's spring pulls.
    pure function pulled_velocity(self) result(velocity)
@@ -250,34 +185,103 @@ contains
       velocity = self%velocity + self%base_velocity
    end function pulled_velocity
 
-   !> Where the drive is at a time.
-   pure function drive_at(self, time) result(displacement)
+   !> Take the force of the drive at a time of the last advance into account in its extremes.
+   subroutine note_force(self, time)
       !> The slider
-      class(slider_type), intent(in) :: self
+      class(slider_type), intent(inout) :: self
       !> Time [s]
       real(wp), intent(in) :: time
-      !> Displacement of the drive from the moving origin [m]
-      real(wp) :: displacement
 
-      displacement = self%drive_displacement + (self%drive_velocity &
-         & + 0.5_wp * self%drive_acceleration * (time - self%drive_time)) * (time - self%drive_time)
-   end function drive_at
+      type(motion_type) :: motion
 
-   !> Velocity of the drive at a time.
-   pure function drive_velocity_at(self, time) result(velocity)
+      motion = self%observe(time)
+      call self%drive%extremes%note(motion%spring_force, motion%time, motion%displacement)
+   end subroutine note_force
+
+   !> The drive has changed: its force may have an extreme here.
+   subroutine mark_extreme(self)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+
+      call self%note_force(self%time)
+      self%is_faster = self%pulled_velocity() > self%drive%rate
+   end subroutine mark_extreme
+
+   !> Look for an extreme of the force in the last advance: that of a spring has one where the
+   !> slider passes the velocity of the drive. Of two passages within one step, between which the
+   !> force hardly changes, nothing is found.
+   subroutine note_extreme(self)
+      !> The slider
+      class(slider_type), intent(inout) :: self
+
+      logical :: is_faster
+
+      is_faster = self%pulled_velocity() > self%drive%rate_at(self%time)
+      if (is_faster .eqv. self%is_faster) return
+      self%is_faster = is_faster
+      call self%note_force(passage(self))
+   end subroutine note_extreme
+
+   !> Let a filter select the steps in which the slider passes the velocity of the drive, which is
+   !> constant.
+   pure subroutine select_extremes(self, filter)
       !> The slider
       class(slider_type), intent(in) :: self
-      !> Time, until the drive turns round [s]
-      real(wp), intent(in) :: time
-      !> Velocity [m/s]
-      real(wp) :: velocity
+      !> The filter
+      type(step_filter_type), intent(inout) :: filter
 
-      velocity = self%drive_velocity
-      if (.not. abs(self%drive_acceleration) > 0.0_wp) return
-      velocity = velocity + self%drive_acceleration * (time - self%drive_time)
-      ! Rounding must not turn it round early.
-      velocity = self%drive_direction * max(0.0_wp, self%drive_direction * velocity)
-   end function drive_velocity_at
+      if (self%is_faster .eqv. filter%direction > 0.0_wp) then
+         filter%min_excess = max(filter%min_excess, merge(0.0_wp, -tiny(1.0_wp), self%is_faster))
+      else
+         filter%max_excess = min(filter%max_excess, merge(-tiny(1.0_wp), 0.0_wp, self%is_faster))
+      end if
+   end subroutine select_extremes
+
+   !> Time at which the slider passed the drive's velocity in the last advance, by the rule of
+   !> Illinois.
+   pure function passage(slider) result(time)
+      class(slider_type), intent(in) :: slider
+      real(wp) :: time
+
+      integer, parameter :: max_iterations = 60
+      real(wp) :: early, late, early_excess, late_excess, excess
+      integer :: iteration
+
+      early = slider%step_time
+      late = slider%time
+      early_excess = excess_at(early)
+      late_excess = excess_at(late)
+      time = merge(late, early, abs(early_excess) > 0.0_wp)
+      if (.not. early_excess * late_excess < 0.0_wp) return
+      do iteration = 1, max_iterations
+         time = late - late_excess * ((late - early) / (late_excess - early_excess))
+         if (.not. (time > min(early, late) .and. time < max(early, late))) exit
+         excess = excess_at(time)
+         if (excess * late_excess < 0.0_wp) then
+            early = late
+            early_excess = late_excess
+         else
+            early_excess = 0.5_wp * early_excess
+         end if
+         late = time
+         late_excess = excess
+         if (.not. abs(excess) > 0.0_wp) exit
+      end do
+      time = min(max(time, slider%step_time), slider%time)
+
+   contains
+
+      !> Velocity of the slider, where it is pulled, above that of the drive.
+      pure real(wp) function excess_at(time)
+         real(wp), intent(in) :: time
+
+         type(motion_type) :: motion
+
+         motion = slider%observe(time)
+         excess_at = motion%pulled_velocity - slider%drive%rate_at(time)
+      end function excess_at
+
+   end function passage
 
    !> Move the origin of displacements; ends what can be observed of the last advance.
    subroutine shift_slider(self, shift)
@@ -286,9 +290,7 @@ contains
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
-      self%drive_displacement = self%drive_at(self%time) - shift
-      self%drive_velocity = self%drive_velocity_at(self%time)
-      self%drive_time = self%time
+      call self%drive%rebase(self%time, shift)
       self%displacement = self%displacement - shift
       self%origin = self%origin + shift
    end subroutine shift_slider
@@ -323,24 +325,11 @@ contains
       call archive%exchange("acceleration", self%acceleration)
       call archive%exchange("start_acceleration", self%start_acceleration)
       call archive%exchange("direction", self%direction)
-      call archive%exchange("drive_velocity", self%drive_velocity)
-      call archive%exchange("drive_time", self%drive_time)
-      call archive%exchange("drive_displacement", self%drive_displacement)
-      call archive%exchange("drive_acceleration", self%drive_acceleration)
-      call archive%exchange("drive_turn", self%drive_turn)
-      call archive%exchange("drive_direction", self%drive_direction)
+      call self%drive%exchange(archive)
       call archive%exchange("step_time", self%step_time)
-      call archive%exchange("impulse", self%impulse)
-      call archive%exchange("earlier_work", self%earlier_work)
-      call archive%exchange("stage_impulse", self%stage_impulse)
-      call self%extremes%exchange(archive)
+      call archive%exchange("is_faster", self%is_faster)
       call archive%exchange("drag_loss", self%drag_loss)
       call archive%exchange("damping_loss", self%damping_loss)
-      call archive%exchange("instant", self%instant)
-      call archive%exchange("settled", self%settled)
-      call archive%exchange("rest_displacement", self%rest_displacement)
-      call archive%exchange("unbound", self%unbound)
-      call archive%exchange("can_pause", self%can_pause)
    end subroutine exchange_slider
 
    !> Put a law of the contact force into an archive or take it out.

@@ -20,7 +20,7 @@ module mesoslip_sliders_layered
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_sliders_base, only: motion_type, slider_type, drive_slider, exchange_slider, &
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
       & exchange_law, shift_slider
    use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf
    implicit none
@@ -105,7 +105,8 @@ module mesoslip_sliders_layered
       !> What CVODE did before the run was put away
       integer(i8), private :: counts_before(3) = 0_i8
    contains
-      procedure :: drive
+      procedure :: adapt_to_drive
+      procedure :: can_pause
       procedure :: pulled_velocity
       procedure :: start
       procedure :: advance
@@ -115,7 +116,7 @@ module mesoslip_sliders_layered
       procedure :: shift_origin
       procedure :: exchange
       procedure, non_overridable, private :: expand, step_cvode, restart, take_back, add_work, &
-         & see_drive
+         & copy_drive
       final :: close
    end type slider_layered_type
 
@@ -160,7 +161,6 @@ contains
       integer :: term
 
       self%parameters = parameters
-      self%layer_count = parameters%layers
       self%cost = 1.0_wp + parameters%layers / layers_per_cost
       allocate (self%state(0:parameters%layers, 2), source=0.0_wp)
       allocate (self%series(0:parameters%layers, 2, 0:longest_series), source=0.0_wp)
@@ -195,22 +195,30 @@ contains
          self%state(layer, 1) = self%state(0, 1) + self%displacement &
             & + (layer - 1) * force / self%system%spring
       end do
-      self%drive_displacement = self%state(self%parameters%layers, 1) + force / self%system%spring
+      self%drive%value = self%state(self%parameters%layers, 1) + force / self%system%spring
       self%velocity = 0.0_wp
       self%series(:, :, 0) = self%state
       self%system%law = law
    end subroutine start
 
-   !> Give the drive another velocity and acceleration; CVODE starts anew.
-   subroutine drive(self, velocity, acceleration)
+   !> Take note that the drive has changed: CVODE starts anew.
+   subroutine adapt_to_drive(self)
       !> The slider
       class(slider_layered_type), intent(inout) :: self
-      !> Velocity of the drive now [m/s], and its acceleration from now on [m/s2]
-      real(wp), intent(in) :: velocity, acceleration
 
-      call drive_slider(self, velocity, acceleration)
       self%is_stale = .true.
-   end subroutine drive
+   end subroutine adapt_to_drive
+
+   !> Whether a run that is put away now goes on to the bit: the history of CVODE cannot be put
+   !> away, so only where it starts anew.
+   pure function can_pause(self)
+      !> The slider
+      class(slider_layered_type), intent(in) :: self
+      !> Whether it does
+      logical :: can_pause
+
+      can_pause = self%is_stale .or. self%parameters%solver == solver_series
+   end function can_pause
 
    !> Velocity, at the end of the last advance, of the layer that the drive's spring pulls.
    pure function pulled_velocity(self) result(velocity)
@@ -222,14 +230,14 @@ contains
       velocity = self%state(self%parameters%layers, 2)
    end function pulled_velocity
 
-   !> Let the system know the drive as it is now.
-   subroutine see_drive(self)
+   !> Copy the drive as it is now into the system.
+   subroutine copy_drive(self)
       class(slider_layered_type), intent(inout) :: self
 
-      self%system%drive = self%drive_at(self%time)
-      self%system%drive_velocity = self%drive_velocity_at(self%time)
-      self%system%drive_acceleration = self%drive_acceleration
-   end subroutine see_drive
+      self%system%drive = self%drive%at(self%time)
+      self%system%drive_velocity = self%drive%rate_at(self%time)
+      self%system%drive_acceleration = self%drive%acceleration
+   end subroutine copy_drive
 
    !> Move until the first end of a window, or less far.
    subroutine advance(self, law, window)
@@ -260,7 +268,7 @@ contains
       end if
 
       if (self%parameters%solver == solver_series) then
-         call self%see_drive()
+         call self%copy_drive()
          rate = fastest_rate(self%system)
          ends = step * rate <= longest_step
          if (.not. ends) step = longest_step / rate
@@ -333,8 +341,6 @@ contains
          self%steps = self%steps + 1
          if (self%steps >= max(fewest_steps, min(most_steps, &
             & most_layer_steps / self%parameters%layers))) self%is_stale = .true.
-         ! What CVODE remembers of its last steps cannot be put away: only where it forgets them.
-         self%can_pause = self%is_stale
          self%integrator_counts = self%counts_before + int(self%cvode%counts(), i8)
       end if
    end subroutine advance
@@ -516,7 +522,7 @@ contains
 
       self%start_time = self%time
       self%local_time = 0.0_wp
-      call self%see_drive()
+      call self%copy_drive()
       if (.not. associated(self%vector)) allocate (self%vector(size(self%state)))
       self%vector(1::2) = self%state(:, 1)
       self%vector(2::2) = self%state(:, 2)
@@ -638,9 +644,9 @@ contains
       integer :: last, node, term
 
       last = self%parameters%layers
-      drive_velocity = self%drive_velocity_at(self%step_time)
-      drive_acceleration = self%drive_acceleration
-      drive = self%drive_at(self%step_time)
+      drive_velocity = self%drive%rate_at(self%step_time)
+      drive_acceleration = self%drive%acceleration
+      drive = self%drive%at(self%step_time)
       way = 0.0_wp
       do term = self%terms, 0, -1
          way = way * step + self%series(last, 1, term) * inverse(term + 1)
@@ -655,11 +661,11 @@ contains
          end do
          lever = step**2 * (0.5_wp * drive + step * (drive_velocity / 3.0_wp &
             & + 0.125_wp * drive_acceleration * step) - lever)
-         call self%stage_impulse%add(self%system%spring * extension)
-         call self%earlier_work%add(self%system%spring &
+         call self%drive%earlier_impulse%add(self%system%spring * extension)
+         call self%drive%earlier_work%add(self%system%spring &
             & * (drive_velocity * extension + drive_acceleration * lever))
       else
-         call self%impulse%add(self%system%spring * extension)
+         call self%drive%impulse%add(self%system%spring * extension)
       end if
 
       drag = 0.0_wp
@@ -696,7 +702,7 @@ contains
 
       layers = self%parameters%layers
       step = time - self%step_time
-      drive = self%drive_at(time)
+      drive = self%drive%at(time)
       ! All of them term by term: they do not wait for each other.
       base = 0.0_wp
       first = 0.0_wp
@@ -754,7 +760,7 @@ contains
       associate (x => self%state(:, 1), v => self%state(:, 2))
          energy = 0.5_wp * self%system%layer_mass * sum(v(2:)**2) &
             & + 0.5_wp * self%system%spring * (sum((x(3:) - x(2:last))**2) &
-            & + (self%drive_at(self%time) - x(last + 1))**2) &
+            & + (self%drive%at(self%time) - x(last + 1))**2) &
             & + 0.5_wp * self%parameters%base_mass * v(1)**2 &
             & + 0.5_wp * self%parameters%base_stiffness * x(1)**2
       end associate

@@ -7,19 +7,21 @@ module mesoslip_sliders_prescribed
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_schedule, only: schedule_type
    use mesoslip_step_filter, only: step_filter_type
-   use mesoslip_sliders_base, only: drive_slider, motion_type, slider_type, exchange_slider, &
-      & exchange_law
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law
+   use mesoslip_sliders_scheduled, only: scheduled_slider_type
    implicit none
    private
 
    public :: slider_prescribed_type, make_slider_prescribed
 
    !> A slider whose displacement is that of the drive.
-   type, extends(slider_type) :: slider_prescribed_type
+   type, extends(scheduled_slider_type) :: slider_prescribed_type
       !> Contact force during the last advance
       type(interface_law_type), private :: law
    contains
-      procedure :: drive
+      procedure :: adapt_to_drive
+      procedure :: note_extreme
+      procedure :: select_extremes
       procedure :: start
       procedure :: advance
       procedure :: run_ahead
@@ -44,23 +46,34 @@ contains
       allocate (self)
       call parameters%finish(error)
       if (allocated(error)) return
-      self%runs_ahead = .true.
-      self%notes_extremes = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_prescribed
 
-   !> Give the drive another velocity and acceleration: the slider has them at once.
-   subroutine drive(self, velocity, acceleration)
+   !> Take velocity and acceleration of the drive, which the slider has at once.
+   subroutine adapt_to_drive(self)
       !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> Velocity of the drive now [m/s], and its acceleration from now on [m/s2]
-      real(wp), intent(in) :: velocity, acceleration
 
-      call drive_slider(self, velocity, acceleration)
-      self%velocity = velocity
-      self%acceleration = acceleration
-      if (abs(velocity) > 0.0_wp) self%direction = sign(1.0_wp, velocity)
-   end subroutine drive
+      self%velocity = self%drive%rate
+      self%acceleration = self%drive%acceleration
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
+   end subroutine adapt_to_drive
+
+   !> The contact force jumps: extremes are noted in each step.
+   subroutine note_extreme(self)
+      !> The slider
+      class(slider_prescribed_type), intent(inout) :: self
+
+   end subroutine note_extreme
+
+   !> No step is needed for extremes.
+   pure subroutine select_extremes(self, filter)
+      !> The slider
+      class(slider_prescribed_type), intent(in) :: self
+      !> The filter
+      type(step_filter_type), intent(inout) :: filter
+
+   end subroutine select_extremes
 
    !> Put the slider where the drive is, moving with it.
    subroutine start(self, law)
@@ -70,8 +83,8 @@ contains
       type(interface_law_type), intent(in) :: law
 
       self%law = law
-      self%drive_displacement = 0.0_wp
-      self%velocity = self%drive_velocity
+      self%drive%value = 0.0_wp
+      self%velocity = self%drive%rate
    end subroutine start
 
    !> Move until the first end of a window.
@@ -83,7 +96,7 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      if (abs(self%drive_acceleration) > 0.0_wp) then
+      if (abs(self%drive%acceleration) > 0.0_wp) then
          call speed_up(self, law, window)
       else
          call step_on(self, law, window)
@@ -119,29 +132,30 @@ contains
 
       self%law = law
       self%step_time = self%time
-      self%velocity = self%drive_velocity
+      self%velocity = self%drive%rate
       start = self%displacement
       limit = window%upper
       if (self%velocity < 0.0_wp) limit = window%lower
 
       if (abs(self%velocity) > 0.0_wp .and. abs(limit - start) &
          & <= abs(self%velocity) * (window%end_time - self%time)) then
-         arrival = self%drive_time + (limit - self%drive_displacement) / self%velocity
+         arrival = self%drive%time + (limit - self%drive%value) / self%velocity
          self%time = min(max(arrival, self%time), window%end_time)
          self%displacement = limit
       else
          self%time = window%end_time
-         self%displacement = self%drive_displacement &
-            & + self%velocity * (self%time - self%drive_time)
+         self%displacement = self%drive%value &
+            & + self%velocity * (self%time - self%drive%time)
       end if
       if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
 
       step = self%displacement - start
       middle = law%stiffness * (start + 0.5_wp * step) - law%offset + law%drag * self%velocity
-      call self%impulse%add((self%time - self%step_time) * middle)
+      call self%drive%impulse%add((self%time - self%step_time) * middle)
       call self%drag_loss%add(step * law%drag * self%velocity)
       half = abs(0.5_wp * law%stiffness * step)
-      if (middle + half > self%extremes%max_force .or. middle - half < self%extremes%min_force) then
+      if (middle + half > self%drive%extremes%max_force &
+         & .or. middle - half < self%drive%extremes%min_force) then
          call note(self, self%step_time, start, self%velocity)
          call note(self, self%time, self%displacement, self%velocity)
       end if
@@ -157,50 +171,50 @@ contains
 
       self%law = law
       self%step_time = self%time
-      self%acceleration = self%drive_acceleration
-      self%start_acceleration = self%drive_acceleration
+      self%acceleration = self%drive%acceleration
+      self%start_acceleration = self%drive%acceleration
       start = self%displacement
-      early = self%drive_velocity_at(self%time)
-      limit = merge(window%upper, window%lower, self%drive_direction > 0.0_wp)
+      early = self%drive%rate_at(self%time)
+      limit = merge(window%upper, window%lower, self%drive%direction > 0.0_wp)
 
-      self%displacement = self%drive_at(window%end_time)
-      if (self%drive_direction * (self%displacement - limit) >= 0.0_wp) then
-         way = limit - self%drive_displacement
-         late = self%drive_direction * sqrt(max(0.0_wp, &
-            & self%drive_velocity**2 + 2.0_wp * self%drive_acceleration * way))
+      self%displacement = self%drive%at(window%end_time)
+      if (self%drive%direction * (self%displacement - limit) >= 0.0_wp) then
+         way = limit - self%drive%value
+         late = self%drive%direction * sqrt(max(0.0_wp, &
+            & self%drive%rate**2 + 2.0_wp * self%drive%acceleration * way))
          ! Of two forms of the root the one in which nothing cancels.
-         pace = self%drive_velocity + late
-         if (self%drive_direction * self%drive_velocity < 0.0_wp) then
-            time = (late - self%drive_velocity) / self%drive_acceleration
+         pace = self%drive%rate + late
+         if (self%drive%direction * self%drive%rate < 0.0_wp) then
+            time = (late - self%drive%rate) / self%drive%acceleration
          else if (abs(pace) > 0.0_wp) then
             time = 2.0_wp * way / pace
          else
             time = 0.0_wp
          end if
-         self%time = min(max(self%drive_time + time, self%time), window%end_time)
+         self%time = min(max(self%drive%time + time, self%time), window%end_time)
          self%displacement = limit
       else
          self%time = window%end_time
-         late = self%drive_velocity_at(self%time)
+         late = self%drive%rate_at(self%time)
       end if
       self%velocity = late
       if (abs(late) > 0.0_wp) self%direction = sign(1.0_wp, late)
 
       way = self%displacement - start
       step = self%time - self%step_time
-      call self%earlier_work%add(way * (law%stiffness * (start + 0.5_wp * way) - law%offset) &
+      call self%drive%earlier_work%add(way * (law%stiffness * (start + 0.5_wp * way) - law%offset) &
          & + law%drag * square())
       call self%drag_loss%add(law%drag * square())
-      call self%stage_impulse%add(step * (law%stiffness * (start + step * (0.5_wp * early &
-         & + self%drive_acceleration * step / 6.0_wp)) - law%offset) + law%drag * way)
+      call self%drive%earlier_impulse%add(step * (law%stiffness * (start + step * (0.5_wp * early &
+         & + self%drive%acceleration * step / 6.0_wp)) - law%offset) + law%drag * way)
       call note(self, self%step_time, start, early)
       call note(self, self%time, self%displacement, late)
       if (law%stiffness > 0.0_wp) then
          ! Where contacts pull more by as much as drag pulls less.
-         time = -law%drag / law%stiffness - early / self%drive_acceleration
+         time = -law%drag / law%stiffness - early / self%drive%acceleration
          if (time > 0.0_wp .and. time < step) call note(self, self%step_time + time, start + time &
-            & * (early + 0.5_wp * self%drive_acceleration * time), &
-            & early + self%drive_acceleration * time)
+            & * (early + 0.5_wp * self%drive%acceleration * time), &
+            & early + self%drive%acceleration * time)
       end if
 
    contains
@@ -218,7 +232,7 @@ contains
       !> Time [s], displacement [m] and velocity [m/s]
       real(wp), intent(in) :: time, displacement, velocity
 
-      call self%extremes%note(self%law%stiffness * displacement - self%law%offset &
+      call self%drive%extremes%note(self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * velocity, time, self%origin + displacement)
    end subroutine note
 
@@ -233,11 +247,11 @@ contains
 
       real(wp) :: displacement
 
-      displacement = self%drive_at(time)
+      displacement = self%drive%at(time)
       motion%time = time
       motion%displacement = self%origin + displacement
       motion%drive_displacement = motion%displacement
-      motion%velocity = self%drive_velocity_at(time)
+      motion%velocity = self%drive%rate_at(time)
       motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
          & + self%law%drag * motion%velocity

@@ -2,36 +2,45 @@
 !>
 !> Under a linear law of the contact force the equilibrium is one division away. Where contacts have
 !> changed since, the slider jumps to it, or to the first contact on the way, while the drive
-!> stands still; then it goes with the drive. The drive moves the end of the spring, or, without a
-!> spring, is a force itself.
+!> stands still; then it goes with the drive, which moves the end of the spring.
 module mesoslip_sliders_quasistatic
+   use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_interface_law, only: interface_law_type, window_type
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
-      & exchange_law, shift_slider
+   use mesoslip_sliders_base, only: exchange_law, motion_type, slider_type
+   use mesoslip_sliders_instant, only: exchange_instant, instant_slider_type
    implicit none
    private
 
-   public :: slider_quasistatic_type, make_slider_quasistatic
+   public :: slider_quasistatic_type, make_slider_quasistatic, observe_quasistatic
+
+   !> A contact farther away than this is none [m].
+   real(wp), parameter :: max_distance = 1.0e150_wp
 
    !> A slider in equilibrium.
-   type, extends(slider_type) :: slider_quasistatic_type
-      !> Stiffness of the drive's spring K [N/m]; zero if the drive is a force [N] that grows at a
-      !> rate [N/s], for which the drive's displacement and velocity stand
+   type, extends(instant_slider_type) :: slider_quasistatic_type
+      !> Stiffness of the drive's spring K [N/m]; 0 for none
       real(wp) :: stiffness = 0.0_wp
       !> Contact force during the last advance
-      type(interface_law_type), private :: law
+      type(interface_law_type) :: law
    contains
       procedure :: start
       procedure :: advance
-      procedure :: observe
+      procedure :: observe => observe_quasistatic
       procedure :: energy
-      procedure :: shift_origin
       procedure :: exchange
-      procedure, non_overridable, private :: pull
+      !> Force of the drive on the slider at displacement 0, and its rate and acceleration
+      procedure :: pull
+      procedure :: pull_rate
+      procedure :: pull_acceleration
+      !> Let the drive pull with a force at the start
+      procedure :: set_pull
+      !> Add to the work and the impulse of the drive what a jump and a motion add
+      procedure :: add_jump
+      procedure :: add_motion
+      procedure, non_overridable, private :: jump, go_with_drive
    end type slider_quasistatic_type
 
 contains
@@ -40,7 +49,7 @@ contains
    subroutine make_slider_quasistatic(slider, parameters, error)
       !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> Stiffness of the drive's spring; 0 if the drive is a force
+      !> Stiffness of the drive's spring
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
@@ -51,8 +60,6 @@ contains
       call parameters%take("stiffness", self%stiffness, error)
       call parameters%finish(error)
       if (allocated(error)) return
-      self%under_force = .not. self%stiffness > 0.0_wp
-      self%notes_extremes = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_quasistatic
 
@@ -64,10 +71,7 @@ contains
       type(interface_law_type), intent(in) :: law
 
       self%law = law
-      self%instant = .true.
-      self%drive_displacement = law%stiffness * self%displacement - law%offset
-      if (self%stiffness > 0.0_wp) self%drive_displacement = self%displacement &
-         & + self%drive_displacement / self%stiffness
+      call self%set_pull(law%stiffness * self%displacement - law%offset)
       self%rest_displacement = self%displacement
    end subroutine start
 
@@ -80,125 +84,189 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      real(wp) :: stiffness, start, target, way, pull, rate, limit, middle, change
-      real(wp) :: arrival, step
-      logical :: reaches
-
-      self%instant = .true.
       self%law = law
       self%step_time = self%time
       self%velocity = 0.0_wp
       self%acceleration = 0.0_wp
-      self%settled = .false.
-      stiffness = self%stiffness + law%stiffness
-      if (.not. stiffness > 0.0_wp) then
-         self%unbound = .true.
+      self%is_settled = .false.
+      if (.not. self%stiffness + law%stiffness > 0.0_wp) then
+         self%is_unbound = .true.
          return
       end if
+      call self%jump(window)
+      call note(self)
+      if (.not. self%is_settled) return
+      call self%go_with_drive(window)
+      call note(self)
+   end subroutine advance
 
+   !> Jump to equilibrium or to the first contact on the way.
+   subroutine jump(self, window)
+      class(slider_quasistatic_type), intent(inout) :: self
+      type(window_type), intent(in) :: window
+
+      real(wp) :: stiffness, start, target, distance, pull
+
+      stiffness = self%stiffness + self%law%stiffness
       start = self%displacement
       pull = self%pull(self%time)
-      target = (pull + law%offset) / stiffness
-      self%settled = target < window%upper .and. target > window%lower
+      target = (pull + self%law%offset) / stiffness
+      self%is_settled = target < window%upper .and. target > window%lower
       self%displacement = min(max(target, window%lower), window%upper)
-      way = self%displacement - start
-      if (abs(way) > 0.0_wp) then
-         self%direction = sign(1.0_wp, way)
-         call self%damping_loss%add(way * stiffness * (target - start - 0.5_wp * way))
-         if (.not. self%stiffness > 0.0_wp) call self%earlier_work%add(way * pull)
-      end if
-      call note(self)
-      if (.not. self%settled) return
+      distance = self%displacement - start
+      if (.not. abs(distance) > 0.0_wp) return
+      self%direction = sign(1.0_wp, distance)
+      call self%damping_loss%add(distance * stiffness * (target - start - 0.5_wp * distance))
+      call self%add_jump(distance, pull)
+   end subroutine jump
 
+   !> Go with the drive from the equilibrium until the window's end.
+   subroutine go_with_drive(self, window)
+      class(slider_quasistatic_type), intent(inout) :: self
+      type(window_type), intent(in) :: window
+
+      real(wp) :: stiffness, start, distance, limit, arrival, step
+
+      stiffness = self%stiffness + self%law%stiffness
       start = self%displacement
       self%rest_displacement = start
-      rate = self%drive_velocity_at(self%time)
-      change = self%drive_acceleration
-      if (self%stiffness > 0.0_wp) then
-         rate = rate * self%stiffness
-         change = change * self%stiffness
-      end if
-      self%velocity = rate / stiffness
-      self%acceleration = change / stiffness
+      self%velocity = self%pull_rate(self%time) / stiffness
+      self%acceleration = self%pull_acceleration() / stiffness
       limit = window%upper
-      if (self%drive_direction < 0.0_wp) limit = window%lower
+      if (self%drive%direction < 0.0_wp) limit = window%lower
       arrival = time_of(limit - start, self%velocity, self%acceleration)
-      reaches = arrival < huge(1.0_wp) .and. arrival <= window%end_time - self%time
-      if (reaches) then
+      if (arrival < huge(1.0_wp) .and. arrival <= window%end_time - self%time) then
          self%time = min(self%time + arrival, window%end_time)
          self%displacement = limit
       else
          self%time = window%end_time
-         self%displacement = (self%pull(self%time) + law%offset) / stiffness
+         self%displacement = (self%pull(self%time) + self%law%offset) / stiffness
          ! Rounding may take it to the other side of a contact that is about to break.
          self%displacement = min(max(self%displacement, window%lower), window%upper)
       end if
-
-      way = self%displacement - start
-      if (abs(way) > 0.0_wp) self%direction = sign(1.0_wp, way)
+      distance = self%displacement - start
+      if (abs(distance) > 0.0_wp) self%direction = sign(1.0_wp, distance)
       step = self%time - self%step_time
-      ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
-      middle = law%stiffness * (start + 0.5_wp * way) - law%offset
+      call self%add_motion(step, distance)
       if (abs(self%acceleration) > 0.0_wp) then
-         call self%earlier_work%add(step * (self%drive_velocity_at(self%step_time) &
-            & + 0.5_wp * self%drive_acceleration * step) * middle)
-         call self%stage_impulse%add(step * (law%stiffness * (start + step * (0.5_wp &
-            & * self%velocity + self%acceleration * step / 6.0_wp)) - law%offset))
          self%velocity = self%velocity + self%acceleration * step
-      else if (self%stiffness > 0.0_wp) then
-         call self%impulse%add(step * middle)
-      else
-         call self%earlier_work%add(way * (pull + 0.5_wp * rate * step))
-         call self%impulse%add(step * (pull + 0.5_wp * rate * step))
       end if
-      call note(self)
-   end subroutine advance
+   end subroutine go_with_drive
 
-   !> Time in which a motion makes a way, without turning round; huge if it does not move.
-   pure function time_of(way, velocity, acceleration) result(time)
-      !> Way [m], velocity at first [m/s], acceleration [m/s2]
-      real(wp), intent(in) :: way, velocity, acceleration
+   !> A spring whose end stands still has no work done on it in a jump.
+   subroutine add_jump(self, distance, pull)
+      !> The slider
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Displacement in the jump [m], and force of the drive at displacement 0 [N]
+      real(wp), intent(in) :: distance, pull
+
+   end subroutine add_jump
+
+   !> Add the work and the impulse of the drive in the motion of the last advance.
+   subroutine add_motion(self, step, distance)
+      !> The slider, its velocity being that at the start of the motion
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Duration [s] and displacement [m] of the motion
+      real(wp), intent(in) :: step, distance
+
+      real(wp) :: middle
+
+      associate (law => self%law, drive => self%drive, start => self%rest_displacement)
+         ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
+         middle = law%stiffness * (start + 0.5_wp * distance) - law%offset
+         if (abs(drive%acceleration) > 0.0_wp) then
+            call drive%earlier_work%add(step * (drive%rate_at(self%step_time) &
+               & + 0.5_wp * drive%acceleration * step) * middle)
+            call drive%earlier_impulse%add(step * (law%stiffness * (start + step * (0.5_wp &
+               & * self%velocity + self%acceleration * step / 6.0_wp)) - law%offset))
+         else
+            call drive%impulse%add(step * middle)
+         end if
+      end associate
+   end subroutine add_motion
+
+   !> Duration of a displacement without a turn; huge if the motion does not come there.
+   pure function time_of(distance, velocity, acceleration) result(time)
+      !> Displacement [m], velocity at first [m/s], acceleration [m/s2]
+      real(wp), intent(in) :: distance, velocity, acceleration
       real(wp) :: time
 
       real(wp) :: square, pace
 
       time = huge(1.0_wp)
+      if (abs(distance) > max_distance) return
       if (abs(acceleration) > 0.0_wp) then
-         square = velocity**2 + 2.0_wp * acceleration * way
+         square = velocity**2 + 2.0_wp * acceleration * distance
          if (square < 0.0_wp) return
          pace = abs(velocity) + sqrt(square)
-         if (abs(way) > 0.0_wp .and. pace > abs(way) / time) time = 2.0_wp * abs(way) / pace
-         if (.not. abs(way) > 0.0_wp) time = 0.0_wp
+         if (abs(distance) > 0.0_wp .and. pace > abs(distance) / time) then
+            time = 2.0_wp * abs(distance) / pace
+         end if
+         if (.not. abs(distance) > 0.0_wp) time = 0.0_wp
       else if (abs(velocity) > 0.0_wp) then
-         time = way / velocity
+         time = distance / velocity
       end if
    end function time_of
 
    !> Note the force of the drive where the slider is.
-   pure subroutine note(self)
-      type(slider_quasistatic_type), intent(inout) :: self
+   subroutine note(self)
+      class(slider_quasistatic_type), intent(inout) :: self
 
-      call self%extremes%note(self%pull(self%time) - self%stiffness * self%displacement, &
+      call self%drive%extremes%note(self%pull(self%time) - self%stiffness * self%displacement, &
          & self%time, self%origin + self%displacement)
    end subroutine note
 
-   !> Force of the drive on a slider without displacement.
+   !> Force of the drive on the slider at displacement 0.
    pure function pull(self, time) result(force)
-      class(slider_quasistatic_type), intent(in) :: self
-      real(wp), intent(in) :: time
-      real(wp) :: force
-
-      force = self%drive_at(time)
-      if (self%stiffness > 0.0_wp) force = force * self%stiffness
-   end function pull
-
-   !> The motion at a time of the last advance.
-   pure function observe(self, time) result(motion)
       !> The slider
       class(slider_quasistatic_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
-      !> The motion; under a force the drive is where the slider is
+      !> Force [N]
+      real(wp) :: force
+
+      force = self%drive%at(time) * self%stiffness
+   end function pull
+
+   !> Rate of that force.
+   pure function pull_rate(self, time) result(rate)
+      !> The slider
+      class(slider_quasistatic_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Rate [N/s]
+      real(wp) :: rate
+
+      rate = self%drive%rate_at(time) * self%stiffness
+   end function pull_rate
+
+   !> Acceleration of that force.
+   pure function pull_acceleration(self) result(acceleration)
+      !> The slider
+      class(slider_quasistatic_type), intent(in) :: self
+      !> Acceleration [N/s2]
+      real(wp) :: acceleration
+
+      acceleration = self%drive%acceleration * self%stiffness
+   end function pull_acceleration
+
+   !> Let the drive pull with a force at the start.
+   subroutine set_pull(self, force)
+      !> The slider
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Force at displacement 0 [N]
+      real(wp), intent(in) :: force
+
+      self%drive%value = self%displacement + force / self%stiffness
+   end subroutine set_pull
+
+   !> The motion at a time of the last advance.
+   pure function observe_quasistatic(self, time) result(motion)
+      !> The slider
+      class(slider_quasistatic_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> The motion
       type(motion_type) :: motion
 
       real(wp) :: displacement, step
@@ -214,9 +282,8 @@ contains
       motion%contact_force = self%law%stiffness * displacement - self%law%offset
       motion%spring_force = self%pull(time) - self%stiffness * displacement
       motion%elastic_force = motion%spring_force
-      motion%drive_displacement = motion%displacement
-      if (self%stiffness > 0.0_wp) motion%drive_displacement = self%origin + self%drive_at(time)
-   end function observe
+      motion%drive_displacement = self%origin + self%drive%at(time)
+   end function observe_quasistatic
 
    !> Energy of the drive's spring.
    pure function energy(self)
@@ -225,25 +292,8 @@ contains
       !> Energy [J]
       real(wp) :: energy
 
-      energy = 0.0_wp
-      if (self%stiffness > 0.0_wp) then
-         energy = 0.5_wp * self%stiffness * (self%drive_at(self%time) - self%displacement)**2
-      end if
+      energy = 0.5_wp * self%stiffness * (self%drive%at(self%time) - self%displacement)**2
    end function energy
-
-   !> Move the origin of displacements; ends what can be observed of the last advance.
-   subroutine shift_origin(self, shift)
-      !> The slider
-      class(slider_quasistatic_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
-      real(wp), intent(in) :: shift
-
-      real(wp) :: force
-
-      force = self%drive_at(self%time)
-      call shift_slider(self, shift)
-      if (.not. self%stiffness > 0.0_wp) self%drive_displacement = force
-   end subroutine shift_origin
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
@@ -253,7 +303,7 @@ contains
       type(archive_type), intent(inout) :: archive
 
       call archive%section("quasistatic slider")
-      call exchange_slider(self, archive)
+      call exchange_instant(self, archive)
       call exchange_law(self%law, archive)
    end subroutine exchange
 

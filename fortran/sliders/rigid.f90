@@ -12,8 +12,8 @@ module mesoslip_sliders_rigid
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_schedule, only: schedule_type
    use mesoslip_step_filter, only: step_filter_type
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
-      & exchange_law
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law
+   use mesoslip_sliders_scheduled, only: scheduled_slider_type
    implicit none
    private
 
@@ -74,7 +74,7 @@ module mesoslip_sliders_rigid
    end type motion_rates_type
 
    !> A rigid slider on a spring.
-   type, extends(slider_type) :: slider_rigid_type
+   type, extends(scheduled_slider_type) :: slider_rigid_type
       !> Mass M [kg], stiffness of the drive's spring K [N/m], damping rate eta_S [1/s]
       real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp, damping = 0.0_wp
       !> Deceleration by the damper, D = eta_S (V - W), W being the mean velocity [m/s2]
@@ -113,7 +113,6 @@ contains
       call parameters%take("damping", self%damping, error)
       call parameters%finish(error)
       if (allocated(error)) return
-      self%runs_ahead = .true.
       call move_alloc(self, slider)
    end subroutine make_slider_rigid
 
@@ -128,7 +127,7 @@ contains
       self%velocity = 0.0_wp
       self%damper = 0.0_wp
       self%start_displacement = self%displacement
-      self%drive_displacement = (law%stiffness * self%displacement - law%offset) / self%stiffness
+      self%drive%value = (law%stiffness * self%displacement - law%offset) / self%stiffness
       self%series = 0.0_wp
    end subroutine start
 
@@ -174,8 +173,8 @@ contains
 
       system%inverse_mass = 1.0_wp / self%mass
       system%spring = self%stiffness * system%inverse_mass
-      system%drive_velocity = self%drive_velocity
-      system%driving = system%spring * self%drive_velocity
+      system%drive_velocity = self%drive%rate
+      system%driving = system%spring * self%drive%rate
       system%driving_rate = 0.0_wp
       system%stiffness = 0.0_wp
       system%drag = 0.0_wp
@@ -199,11 +198,11 @@ contains
       system%stiffness = system%spring + self%law%stiffness * system%inverse_mass
       system%drag = self%law%drag * system%inverse_mass
       is_done = .false.
-      if (abs(self%drive_acceleration) > 0.0_wp) then
-         system%drive_velocity = self%drive_velocity_at(self%time)
+      if (abs(self%drive%acceleration) > 0.0_wp) then
+         system%drive_velocity = self%drive%rate_at(self%time)
          system%driving = system%spring * system%drive_velocity
-         system%driving_rate = system%spring * self%drive_acceleration
-         system%drive_gap = self%drive_at(self%time) - self%displacement
+         system%driving_rate = system%spring * self%drive%acceleration
+         system%drive_gap = self%drive%at(self%time) - self%displacement
          early = rates(self, system, system%drive_gap)
       else
          system%drive_gap = uniform_gap(self)
@@ -444,10 +443,10 @@ contains
       self%velocity = horner(series, terms, step)
       if (turns) self%velocity = 0.0_wp
       self%damper = horner(damper, terms, step)
-      if (abs(self%drive_acceleration) > 0.0_wp) then
+      if (abs(self%drive%acceleration) > 0.0_wp) then
          call pull_unevenly(self, system, step, second_integral(series, terms, step), &
             & lever(series, terms, step))
-         call arrive(self, system, early, self%drive_at(self%time) - self%displacement, late)
+         call arrive(self, system, early, self%drive%at(self%time) - self%displacement, late)
       else
          call pull(self, system, step, second_integral(series, terms, step))
          call arrive(self, system, early, uniform_gap(self), late)
@@ -469,8 +468,8 @@ contains
       !> Length of the step [s], and integral of the way over the time [m s]
       real(wp), intent(in) :: step, swept
 
-      call self%impulse%add(self%stiffness &
-         & * (step * (system%drive_gap + 0.5_wp * self%drive_velocity * step) - swept))
+      call self%drive%impulse%add(self%stiffness &
+         & * (step * (system%drive_gap + 0.5_wp * self%drive%rate * step) - swept))
    end subroutine pull
 
    !> Add the drive's impulse and work of a step to the balance, under an acceleration.
@@ -482,11 +481,11 @@ contains
 
       real(wp) :: extension
 
-      associate (velocity => system%drive_velocity, acceleration => self%drive_acceleration)
+      associate (velocity => system%drive_velocity, acceleration => self%drive%acceleration)
          extension = step * (system%drive_gap + step * (0.5_wp * velocity &
             & + inverse(6) * acceleration * step)) - swept
-         call self%stage_impulse%add(self%stiffness * extension)
-         call self%earlier_work%add(self%stiffness * (velocity * extension + acceleration &
+         call self%drive%earlier_impulse%add(self%stiffness * extension)
+         call self%drive%earlier_work%add(self%stiffness * (velocity * extension + acceleration &
             & * (step**2 * (0.5_wp * system%drive_gap + step &
             & * (inverse(3) * velocity + 0.125_wp * acceleration * step)) - moment)))
       end associate
@@ -516,8 +515,8 @@ contains
       !> The gap [m]
       real(wp) :: drive_gap
 
-      drive_gap = self%drive_displacement - self%displacement &
-         & + self%drive_velocity * (self%time - self%drive_time)
+      drive_gap = self%drive%value - self%displacement &
+         & + self%drive%rate * (self%time - self%drive%time)
    end function uniform_gap
 
    !> Velocity and damper with their rates, from the equation of motion.
@@ -610,7 +609,7 @@ contains
       real(wp) :: displacement, drive, step
 
       step = time - self%step_time
-      drive = self%drive_at(time)
+      drive = self%drive%at(time)
       ! As in advance, the number of terms is a constant in each call.
       select case (self%terms)
       case (few_terms)
@@ -651,7 +650,7 @@ contains
       real(wp) :: energy
 
       energy = 0.5_wp * self%mass * self%velocity**2 &
-         & + 0.5_wp * self%stiffness * (self%drive_at(self%time) - self%displacement)**2
+         & + 0.5_wp * self%stiffness * (self%drive%at(self%time) - self%displacement)**2
    end function energy
 
    !> Put the state into an archive or take it out.

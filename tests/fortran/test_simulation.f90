@@ -13,7 +13,9 @@ program test_simulation
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_schedule, only: max_events
-   use mesoslip_loop_simulation, only: ending_drive, energy_length, simulation_type
+   use mesoslip_loop_endings, only: ending_drive
+   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_loop_state, only: energy_length
    use mesoslip_sliders, only: make_slider
    use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
    use testing, only: check, check_close, finish
@@ -132,13 +134,13 @@ contains
 
       name = contacts // ", " // slider // ", solver " // achar(iachar("0") + solver)
       call build(whole, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
-      whole%part_end = short
+      call set_drive(whole, short)
       call whole%start(initial_relaxed)
       call whole%run(forever, any_work, error)
 
       allocate (now)
       call build(now, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
-      now%part_end = short
+      call set_drive(now, short)
       call now%start(initial_relaxed)
       do segment = 1, 100000
          ! Longer and longer, so that all phases of a run are cut, and the test ends.
@@ -149,7 +151,7 @@ contains
          if (.not. allocated(error)) call now%fetch(words, error)
          allocate (next)
          call build(next, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
-         next%part_end = short
+         call set_drive(next, short)
          if (.not. allocated(error)) call next%restore(words, error)
          deallocate (words)
          deallocate (now)
@@ -234,7 +236,7 @@ contains
       call build(simulation, "ensemble", slider, law, width, coupling_scaled, solver_series)
       simulation%contacts%parameters%delay = delay
       call simulation%avalanches%open(avalanche_parameters_type(), [real(wp) ::], count)
-      simulation%longest_schedule = longest
+      simulation%max_schedule = longest
    end subroutine prepare
 
    !> Whether two tables are the same to the bit.
@@ -362,15 +364,25 @@ contains
       end if
       call make_slider(simulation%slider, slider, parameters, error)
       call check(.not. allocated(error), "slider: " // slider)
-      simulation%part_end = [0.03_wp, 0.05_wp, 0.15_wp]
-      simulation%start_velocity = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
-      simulation%end_velocity = simulation%start_velocity
-      simulation%stage_of_part = [0, 1, 2]
+      call set_drive(simulation, [0.03_wp, 0.05_wp, 0.15_wp])
       call simulation%stages%open()
       call simulation%steady%open(0.0_wp, 1, 0.0_wp)
       call simulation%recorder%open(recorder)
       call simulation%avalanches%open(avalanche_parameters_type(least_size=1.0_wp, &
          & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%followed())
    end subroutine build
+
+   !> A drive forward, in a hold, and back.
+   subroutine set_drive(simulation, part_end)
+      type(simulation_type), intent(inout) :: simulation
+      !> Ends of the three parts [s]
+      real(wp), intent(in) :: part_end(3)
+
+      real(wp), parameter :: velocity(3) = [1.0e-5_wp, 0.0_wp, -1.0e-5_wp]
+      type(error_type), allocatable :: error
+
+      call simulation%slider%drive%open(part_end, velocity, velocity, [0, 1, 2], error)
+      call check(.not. allocated(error), "drive")
+   end subroutine set_drive
 
 end program test_simulation

@@ -31,7 +31,7 @@ contains
 
       slider = slider_rigid_type(mass=2.0_wp, stiffness=2.0_wp * frequency**2)
       call slider%start(law)
-      call slider%drive(drive_velocity, 0.0_wp)
+      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
       window%end_time = 10.0_wp
       do while (slider%time < window%end_time)
          call slider%advance(law, window)
@@ -42,7 +42,7 @@ contains
          & / frequency), 1.0e-13_wp, "displacement of a free oscillator")
       call check_close(slider%velocity, drive_velocity * (1.0_wp - cos(frequency * time)), &
          & 1.0e-13_wp, "velocity of a free oscillator")
-      call check_close(slider%drive_work(), slider%energy(), 1.0e-12_wp, &
+      call check_close(slider%drive%work(), slider%energy(), 1.0e-12_wp, &
          & "energy is conserved")
    end subroutine oscillates
 
@@ -54,7 +54,7 @@ contains
 
       slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
       call slider%start(law)
-      call slider%drive(drive_velocity, 0.0_wp)
+      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
       window%end_time = 10.0_wp
       window%upper = drive_velocity * (0.5_wp - sin(0.5_wp * frequency) / frequency)
       do while (slider%displacement < window%upper)
@@ -78,7 +78,7 @@ contains
 
       slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
       call slider%start(law)
-      call slider%drive(drive_velocity, 0.0_wp)
+      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
       window%end_time = 10.0_wp
       off = 0.0_wp
       late = 0.0_wp
@@ -99,7 +99,7 @@ contains
       call check(off <= 0.0_wp, "displacement of all crossings")
       call check_close(late, 0.0_wp, 1.0e-13_wp, "time of all crossings")
       call check_close(fast, 0.0_wp, 1.0e-12_wp, "velocity at all crossings")
-      call check_close(slider%drive_work(), slider%energy(), 1.0e-13_wp, &
+      call check_close(slider%drive%work(), slider%energy(), 1.0e-13_wp, &
          & "energy over all crossings")
    end subroutine climbs
 
@@ -117,7 +117,7 @@ contains
 
       slider = slider_rigid_type(mass=mass, stiffness=mass * frequency**2, damping=damping)
       call slider%start(law)
-      call slider%drive(drive_velocity, 0.0_wp)
+      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
       window%end_time = 10.0_wp
       do crossing = 1, int(1.5_wp / rung)
          window%upper = crossing * rung
@@ -126,8 +126,8 @@ contains
          end do
       end do
       call check_close(mass * (2.0_wp * slider%velocity - slider%damper / damping), &
-         & slider%drive_work() / drive_velocity, 1.0e-12_wp, "momentum of block and damper")
-      call check_close(slider%energy() + slider%damping_loss%total(), slider%drive_work(), &
+         & slider%drive%work() / drive_velocity, 1.0e-12_wp, "momentum of block and damper")
+      call check_close(slider%energy() + slider%damping_loss%total(), slider%drive%work(), &
          & 1.0e-12_wp, "energy with a damper")
    end subroutine damps
 
@@ -157,7 +157,7 @@ contains
 
       slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
       call slider%start(law)
-      call slider%drive(0.0_wp, 0.0_wp)
+      call slider%drive%change(slider%time, 0.0_wp, 0.0_wp)
       slider%displacement = -side
       window%end_time = 10.0_wp
       if (side > 0) then

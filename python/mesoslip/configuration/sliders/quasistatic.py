@@ -31,8 +31,12 @@ class QuasistaticSlider(SliderTable):
     def spring_stiffness(self) -> float:
         return self.stiffness or 0.0
 
+    @property
+    def kernel_kind(self) -> str:
+        return "quasistatic_force" if self.stiffness is None else self.kind
+
     def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
-        return {"stiffness": self.spring_stiffness}
+        return {} if self.stiffness is None else {"stiffness": self.stiffness}
 
     def problems(self, config: Setting) -> Complaints:
         by_force = config.drive.force_rate is not None

@@ -1,0 +1,315 @@
+!> The drive of a slider: what it prescribes over time, and the work that it does.
+!>
+!> A drive prescribes a value: the displacement of the end of a spring, or of the slider itself [m],
+!> or a force [N]. Its rate is then in m/s or N/s, its acceleration in m/s2 or N/s2. A run has parts
+!> of constant acceleration; a stage is one part or several. A slider has its drive, and adds the
+!> work that it does; the loop asks it when it changes.
+module mesoslip_drive
+   use mesoslip_extremes, only: extremes_type
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: drive_type
+
+   !> A drive in parts of constant acceleration.
+   type :: drive_type
+      !> A time [s], the value then, a displacement being from the moving origin, and the rate then
+      real(wp) :: time = 0.0_wp, value = 0.0_wp, rate = 0.0_wp
+      !> Acceleration since then
+      real(wp) :: acceleration = 0.0_wp
+      !> Time at which the rate changes sign [s]; no step goes beyond
+      real(wp) :: turn = huge(1.0_wp)
+      !> Sign of the rate until then, or of the last one that was not zero
+      real(wp) :: direction = 1.0_wp
+      !> Impulse on the slider since the drive took a constant velocity [N s]; times the velocity it
+      !> is the work since then. A drive that accelerates, or is a force, adds nothing here.
+      type(accumulator_type) :: impulse
+      !> Work but for that [J]; impulse in the present stage but for that [N s]
+      type(accumulator_type) :: earlier_work, earlier_impulse
+      !> Maximum and minimum of the force on the slider in the present stage
+      type(extremes_type) :: extremes
+
+      !> Present part, and of each part: its end [s], the rates at its start and at its end, the
+      !> number of its stage; shape (parts)
+      integer, private :: part = 1
+      real(wp), allocatable, private :: part_end(:), start_rate(:), end_rate(:)
+      integer, allocatable, private :: stage_of_part(:)
+   contains
+      !> Set the parts
+      procedure, non_overridable :: open
+      procedure, non_overridable :: is_open
+      !> Take the rate of the first part, of the next, or turn round
+      procedure, non_overridable :: begin
+      procedure, non_overridable :: take_next_part
+      procedure, non_overridable :: turn_round
+      !> When the part ends, or the drive turns round before
+      procedure, non_overridable :: end_of_part
+      procedure, non_overridable :: next_change
+      !> Whether no part comes after the present one, and whether the next is of another stage
+      procedure, non_overridable :: is_last_part
+      procedure, non_overridable :: is_stage_over
+      !> Number of the stage, and its start
+      procedure, non_overridable :: stage
+      procedure, non_overridable :: begin_stage
+      !> Impulse on the slider in the present stage
+      procedure, non_overridable :: stage_impulse
+      !> Take a rate and an acceleration
+      procedure, non_overridable :: change
+      !> Value and rate at a time
+      procedure, non_overridable :: at
+      procedure, non_overridable :: rate_at
+      !> Work done so far
+      procedure, non_overridable :: work
+      !> Count the value from now on, a displacement from another origin
+      procedure, non_overridable :: rebase
+      !> Put the state into an archive or take it out
+      procedure, non_overridable :: exchange
+   end type drive_type
+
+contains
+
+   !> Set the parts of a drive.
+   subroutine open(self, part_end, start_rate, end_rate, stage_of_part, error)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+      !> End of each part [s]; rates at its start and at its end
+      real(wp), intent(in) :: part_end(:), start_rate(:), end_rate(:)
+      !> Number of the stage that each part is of
+      integer, intent(in) :: stage_of_part(:)
+      !> Set if there is no part
+      type(error_type), allocatable, intent(out) :: error
+
+      if (size(part_end) == 0) then
+         call raise(error, status_invalid, "a drive has one part at least")
+         return
+      end if
+      self%part_end = part_end
+      self%start_rate = start_rate
+      self%end_rate = end_rate
+      self%stage_of_part = stage_of_part
+   end subroutine open
+
+   !> Whether the parts are set.
+   pure function is_open(self)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Whether they are
+      logical :: is_open
+
+      is_open = allocated(self%part_end)
+   end function is_open
+
+   !> Take the rate of the first part.
+   subroutine begin(self, time)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+      !> Time now [s]
+      real(wp), intent(in) :: time
+
+      self%part = 1
+      call self%change(time, self%start_rate(1), part_acceleration(self))
+   end subroutine begin
+
+   !> Take the rate of the next part.
+   subroutine take_next_part(self, time)
+      !> The drive, not in its last part
+      class(drive_type), intent(inout) :: self
+      !> Time now [s]
+      real(wp), intent(in) :: time
+
+      self%part = self%part + 1
+      call self%change(time, self%start_rate(self%part), part_acceleration(self))
+   end subroutine take_next_part
+
+   !> Turn round within a part.
+   subroutine turn_round(self, time)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+      !> Time now [s]
+      real(wp), intent(in) :: time
+
+      call self%change(time, 0.0_wp, part_acceleration(self))
+   end subroutine turn_round
+
+   !> Acceleration in the present part.
+   pure function part_acceleration(self) result(acceleration)
+      type(drive_type), intent(in) :: self
+      real(wp) :: acceleration
+
+      real(wp) :: start
+
+      acceleration = self%end_rate(self%part) - self%start_rate(self%part)
+      start = 0.0_wp
+      if (self%part > 1) start = self%part_end(self%part - 1)
+      if (abs(acceleration) > 0.0_wp) acceleration = acceleration &
+         & / (self%part_end(self%part) - start)
+   end function part_acceleration
+
+   !> End of the present part.
+   pure function end_of_part(self) result(time)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Time [s]; huge if it has none
+      real(wp) :: time
+
+      time = self%part_end(self%part)
+   end function end_of_part
+
+   !> Time at which the drive changes next: its part ends, or it turns round.
+   pure function next_change(self) result(time)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Time [s]
+      real(wp) :: time
+
+      time = min(self%part_end(self%part), self%turn)
+   end function next_change
+
+   !> Whether no part comes after the present one.
+   pure function is_last_part(self) result(is_last)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Whether it is the last one
+      logical :: is_last
+
+      is_last = self%part == size(self%part_end)
+   end function is_last_part
+
+   !> Whether the stage ends with the present part.
+   pure function is_stage_over(self) result(is_over)
+      !> The drive, not in its last part
+      class(drive_type), intent(in) :: self
+      !> Whether it does
+      logical :: is_over
+
+      is_over = self%stage_of_part(self%part + 1) /= self%stage_of_part(self%part)
+   end function is_stage_over
+
+   !> Number of the present stage.
+   pure function stage(self) result(number)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Its number
+      integer :: number
+
+      number = self%stage_of_part(self%part)
+   end function stage
+
+   !> A stage begins: its impulse and its extremes count from here.
+   subroutine begin_stage(self)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+
+      self%extremes = extremes_type()
+      self%earlier_impulse = accumulator_type()
+   end subroutine begin_stage
+
+   !> Impulse on the slider in the present stage.
+   pure function stage_impulse(self) result(impulse)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Impulse [N s]
+      real(wp) :: impulse
+
+      impulse = self%earlier_impulse%total() + self%impulse%total()
+   end function stage_impulse
+
+   !> Take a rate and an acceleration.
+   subroutine change(self, time, rate, acceleration)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+      !> Time now [s], rate now, and acceleration from now on
+      real(wp), intent(in) :: time, rate, acceleration
+
+      call self%earlier_work%add(self%rate * self%impulse%total())
+      call self%earlier_impulse%add(self%impulse%total())
+      self%impulse = accumulator_type()
+      self%value = self%at(time)
+      self%time = time
+      self%rate = rate
+      self%acceleration = acceleration
+      self%turn = huge(1.0_wp)
+      if (rate * acceleration < 0.0_wp) self%turn = time - rate / acceleration
+      if (abs(rate) > 0.0_wp) then
+         self%direction = sign(1.0_wp, rate)
+      else if (abs(acceleration) > 0.0_wp) then
+         self%direction = sign(1.0_wp, acceleration)
+      end if
+   end subroutine change
+
+   !> Value at a time.
+   pure function at(self, time) result(value)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Time, until the drive changes [s]
+      real(wp), intent(in) :: time
+      !> Displacement from the moving origin [m], or force [N]
+      real(wp) :: value
+
+      value = self%value &
+         & + (self%rate + 0.5_wp * self%acceleration * (time - self%time)) * (time - self%time)
+   end function at
+
+   !> Rate at a time.
+   pure function rate_at(self, time) result(rate)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Time, until the drive changes [s]
+      real(wp), intent(in) :: time
+      !> Rate [m/s or N/s]
+      real(wp) :: rate
+
+      rate = self%rate
+      if (.not. abs(self%acceleration) > 0.0_wp) return
+      rate = rate + self%acceleration * (time - self%time)
+      ! Rounding must not turn it round early.
+      rate = self%direction * max(0.0_wp, self%direction * rate)
+   end function rate_at
+
+   !> Work done so far.
+   pure function work(self)
+      !> The drive
+      class(drive_type), intent(in) :: self
+      !> Work [J]
+      real(wp) :: work
+
+      work = self%earlier_work%total() + self%rate * self%impulse%total()
+   end function work
+
+   !> Count time and value from now on, a displacement from another origin.
+   subroutine rebase(self, time, shift)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+      !> Time now [s], and displacement of the new origin [m]; 0 for a force
+      real(wp), intent(in) :: time, shift
+
+      self%value = self%at(time) - shift
+      self%rate = self%rate_at(time)
+      self%time = time
+   end subroutine rebase
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange("drive part", self%part)
+      call archive%exchange("drive time", self%time)
+      call archive%exchange("drive value", self%value)
+      call archive%exchange("drive rate", self%rate)
+      call archive%exchange("drive acceleration", self%acceleration)
+      call archive%exchange("drive turn", self%turn)
+      call archive%exchange("drive direction", self%direction)
+      call archive%exchange("impulse", self%impulse)
+      call archive%exchange("earlier_work", self%earlier_work)
+      call archive%exchange("earlier_impulse", self%earlier_impulse)
+      call self%extremes%exchange(archive)
+   end subroutine exchange
+
+end module mesoslip_drive

@@ -1,0 +1,64 @@
+!> The loop for sliders that move continuously: one advance, and the events at its end.
+module mesoslip_loop_events
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_loop_endings, only: ending_broken, ending_none
+   use mesoslip_loop_state, only: state_type
+   use mesoslip_loop_transitions, only: change_drive, end_at_avalanches, end_at_displacement, &
+      & end_at_slips, end_if_steady, finish, is_broken, max_step
+   implicit none
+   private
+
+   public :: advance_to_event, respond
+
+contains
+
+   !> One advance of the slider, and the events at its end.
+   subroutine advance_to_event(state)
+      !> The state
+      class(state_type), intent(inout) :: state
+
+      type(pose_type) :: before
+      type(interface_law_type) :: law
+      type(window_type) :: window
+
+      before = state%slider%pose()
+      call state%contacts%offer(before, law, window)
+      if (is_broken(state, law, window)) then
+         call finish(state, ending_broken)
+         return
+      end if
+      window%end_time = min(window%end_time, state%slider%drive%next_change(), &
+         & state%steady%block_end, state%slider%time + max_step(state))
+      call state%stop%limit_window(window, state%slider%origin)
+
+      call state%slider%advance(law, window)
+      state%advances = state%advances + 1
+      if (allocated(state%slider%failure) .or. allocated(state%contacts%failure)) return
+      call state%recorder%record(state%slider, state%contacts%detached_count, &
+         & state%contacts%breaks)
+      call state%slider%note_extreme()
+      call state%avalanches%take_due_snapshots(state%slider, state%contacts)
+      call end_at_avalanches(state)
+      if (state%ending /= ending_none) return
+
+      call respond(state, before, law)
+      call end_at_slips(state)
+      call end_at_displacement(state)
+      call end_if_steady(state)
+      call change_drive(state)
+   end subroutine advance_to_event
+
+   !> Contacts respond to a motion: what breaks at one displacement is an avalanche.
+   subroutine respond(state, before, law)
+      !> The state
+      class(state_type), intent(inout) :: state
+      !> Where the slider was, and the contact force until now
+      type(pose_type), intent(in) :: before
+      type(interface_law_type), intent(in) :: law
+
+      call state%contacts%respond(before, state%slider%pose())
+      call state%avalanches%count_breaks(state%slider, state%contacts, law)
+      call state%avalanches%close(state%slider, state%contacts, state%slider%displacement)
+   end subroutine respond
+
+end module mesoslip_loop_events

@@ -1,0 +1,102 @@
+!> The loop for sliders that run through a schedule of events, where nothing needs each of them.
+module mesoslip_loop_scheduled
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_loop_events, only: advance_to_event, respond
+   use mesoslip_loop_segment, only: segment_type
+   use mesoslip_loop_state, only: state_type
+   use mesoslip_loop_transitions, only: change_drive, end_at_displacement, end_at_slips, &
+      & end_if_steady, max_step, shift_stretches
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_sliders_scheduled, only: scheduled_slider_type
+   use mesoslip_step_filter, only: step_filter_type
+   implicit none
+   private
+
+   public :: advance_through_schedule
+
+contains
+
+   !> Some advances of the slider through a schedule, or one if there is none.
+   subroutine advance_through_schedule(state, segment)
+      !> The state, its slider being one that runs through schedules
+      class(state_type), intent(inout) :: state
+      !> The segment of the run
+      type(segment_type), intent(in) :: segment
+
+      call plan(state)
+      if (state%schedule%is_over) then
+         call advance_to_event(state)
+      else
+         call run_ahead(state, segment%last_advance(state%advances, &
+            & state%slider%cost + state%contacts%cost))
+      end if
+   end subroutine advance_through_schedule
+
+   !> Let the contacts write a schedule, if nothing needs each event.
+   subroutine plan(state)
+      class(state_type), intent(inout) :: state
+
+      state%schedule%is_over = .true.
+      if (state%max_schedule == 0 .or. state%avalanches%needs_each() &
+         & .or. abs(state%slider%drive%acceleration) > 0.0_wp) return
+      call state%contacts%plan(state%slider%pose(), state%max_schedule, state%schedule)
+      call state%stop%limit_schedule(state%schedule, state%slider%origin)
+      state%schedule%end_time = min(state%slider%drive%end_of_part(), state%steady%block_end)
+      state%schedule%max_step = max_step(state)
+      state%schedule%mean_stiffness = state%contacts%parameters%stiffness
+      state%schedule%max_force = shift_stretches * state%contacts%parameters%static_force
+   end subroutine plan
+
+   !> The slider runs ahead through the schedule, and contacts keep their books afterwards.
+   subroutine run_ahead(state, last)
+      class(state_type), intent(inout) :: state
+      !> The advance after which to stop
+      integer(i8), intent(in) :: last
+
+      type(pose_type) :: before
+      logical :: turns
+
+      before = state%slider%pose()
+      do
+         call take_steps(state, last)
+         turns = state%slider%direction * state%schedule%direction < 0.0_wp
+         if (turns .or. state%schedule%is_over .or. state%advances >= last) exit
+         if (state%recorder%is_full()) exit
+         if (state%recorder%slips_so_far() >= state%stop%max_slips) exit
+      end do
+      call state%contacts%settle(state%schedule, state%slider%pose())
+      call state%avalanches%count_others(state%schedule%moments, state%contacts%breaks)
+      ! The schedule was for the other direction: what is due at the turn is for contacts to say.
+      if (turns) call respond(state, before, state%contacts%law())
+      call end_at_slips(state)
+      call end_at_displacement(state)
+      call end_if_steady(state)
+      call change_drive(state)
+   end subroutine run_ahead
+
+   !> Steps up to one that is of interest, which is recorded.
+   subroutine take_steps(state, last)
+      class(state_type), intent(inout) :: state
+      !> The advance after which to stop
+      integer(i8), intent(in) :: last
+
+      type(step_filter_type) :: filter
+
+      filter = state%recorder%step_filter(state%slider)
+      call state%slider%select_extremes(filter)
+      filter%max_steps = last - state%advances
+      select type (slider => state%slider)
+      class is (scheduled_slider_type)
+         call slider%run_ahead(state%schedule, filter)
+      end select
+      state%advances = state%advances + filter%steps
+      call state%recorder%skip_steps(filter)
+      if (.not. filter%is_selected) return
+      call state%recorder%record(state%slider, real(state%schedule%detached, wp), &
+         & state%contacts%breaks + state%schedule%broken)
+      call state%slider%note_extreme()
+      if (state%slider%direction * state%schedule%direction < 0.0_wp) return
+      call state%schedule%pass(state%slider%time, state%slider%displacement)
+   end subroutine take_steps
+
+end module mesoslip_loop_scheduled

@@ -1,0 +1,261 @@
+!> The state of a run: a slider on contacts, how far it has come, and what is recorded of it.
+module mesoslip_loop_state
+   use mesoslip_contacts_base, only: contacts_type
+   use mesoslip_loop_endings, only: ending_none, stop_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_recording_avalanches, only: avalanche_recorder_type
+   use mesoslip_recording_buffer, only: buffer_type
+   use mesoslip_recording_recorder, only: recorder_type
+   use mesoslip_recording_stages, only: stage_recorder_type
+   use mesoslip_recording_steady, only: steady_recorder_type
+   use mesoslip_schedule, only: max_events, schedule_type
+   use mesoslip_sliders_base, only: slider_type
+   implicit none
+   private
+
+   public :: state_type
+   public :: energy_length
+
+   !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
+   !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
+   integer, parameter :: energy_length = 8
+
+   !> A slider, which has its drive, on contacts, and what is recorded of it.
+   type :: state_type
+      !> The slider
+      class(slider_type), allocatable :: slider
+      !> The contacts
+      class(contacts_type), allocatable :: contacts
+      !> The recorder
+      type(recorder_type) :: recorder
+      !> The recorder of avalanches and snapshots
+      type(avalanche_recorder_type) :: avalanches
+      !> The recorder of stages of the drive
+      type(stage_recorder_type) :: stages
+      !> Whether the state is steady, in the last part of the drive
+      type(steady_recorder_type) :: steady
+      !> What stops the run before its drive ends
+      type(stop_type) :: stop
+      !> Advances of the slider so far
+      integer(i8) :: advances = 0
+      !> Why the run is over, an ending_ code
+      integer :: ending = ending_none
+      !> Whether the run has been started
+      logical :: is_started = .false.
+      !> Maximum number of breaks, and of attachments, in a schedule; 0 for no schedules. The
+      !> numbers of a run do not depend on it
+      integer :: max_schedule = max_events
+      !> What comes next; between two segments it is over
+      type(schedule_type) :: schedule
+      !> Advances since time or displacement changed
+      integer :: idle = 0
+      !> Energy of slider and contacts at the start [J]
+      real(wp) :: start_energy = 0.0_wp
+
+      !> A state that was put away and has not been fetched
+      type(archive_type), private :: kept
+   contains
+      !> Whether all parts are there
+      procedure, non_overridable :: is_whole
+      !> Terms of the energy balance
+      procedure, non_overridable :: energy_balance
+      !> A table of what was recorded, rows of it that can be taken away, and taking them away
+      procedure, non_overridable :: table
+      procedure, non_overridable :: rows_to_drain
+      procedure, non_overridable :: drain
+      !> Put the state into an archive or take it out
+      procedure, non_overridable :: exchange
+      !> Put the state away, fetch it, and go on from it
+      procedure, non_overridable :: save
+      procedure, non_overridable :: fetch
+      procedure, non_overridable :: restore
+   end type state_type
+
+contains
+
+   !> Whether all parts are there: a slider with its drive, contacts, and recorders.
+   pure function is_whole(self)
+      !> The state
+      class(state_type), intent(in) :: self
+      !> Whether they are
+      logical :: is_whole
+
+      is_whole = allocated(self%slider) .and. allocated(self%contacts) &
+         & .and. allocated(self%recorder%trace%row) .and. allocated(self%recorder%slips%row) &
+         & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row)
+      if (is_whole) is_whole = self%slider%drive%is_open()
+   end function is_whole
+
+   !> Terms of the energy balance, and how far it is from closing.
+   function energy_balance(self) result(energy)
+      !> The state
+      class(state_type), intent(in) :: self
+      !> Terms in the order of energy_length [J]
+      real(wp) :: energy(energy_length)
+
+      energy(1) = self%slider%drive%work()
+      energy(2) = self%slider%energy()
+      energy(3) = self%contacts%elastic_energy(self%slider%displacement)
+      energy(4) = self%slider%damping_loss%total()
+      energy(5) = self%slider%drag_loss%total()
+      energy(6) = self%contacts%break_loss%total()
+      energy(7) = self%contacts%birth_gain%total()
+      energy(8) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
+         & - energy(4) - energy(5) - energy(6) + energy(7)
+   end function energy_balance
+
+   !> A table of what was recorded.
+   function table(self, name) result(buffer)
+      !> The state
+      class(state_type), intent(inout), target :: self
+      !> Its name
+      character(len=*), intent(in) :: name
+      !> The table; null if there is none of this name
+      type(buffer_type), pointer :: buffer
+
+      select case (name)
+      case ("trace")
+         buffer => self%recorder%trace
+      case ("slip_trace")
+         buffer => self%recorder%slip_trace
+      case ("slips")
+         buffer => self%recorder%slips
+      case ("stages")
+         buffer => self%stages%rows
+      case ("layers")
+         buffer => self%recorder%layers
+      case ("avalanches")
+         buffer => self%avalanches%catalogue
+      case ("snapshot_places")
+         buffer => self%avalanches%places
+      case ("snapshots")
+         buffer => self%avalanches%snapshots
+      case default
+         buffer => null()
+      end select
+   end function table
+
+   !> Rows of a table that can be taken away.
+   function rows_to_drain(self, name) result(rows)
+      !> The state
+      class(state_type), intent(inout), target :: self
+      !> Name of the table
+      character(len=*), intent(in) :: name
+      !> Their number
+      integer :: rows
+
+      type(buffer_type), pointer :: buffer
+
+      buffer => self%table(name)
+      rows = 0
+      if (associated(buffer)) rows = buffer%count
+      if (name == "slip_trace") rows = self%recorder%final_slip_samples()
+   end function rows_to_drain
+
+   !> Take the first rows of a table away.
+   subroutine drain(self, name, values, error)
+      !> The state
+      class(state_type), intent(inout), target :: self
+      !> Name of the table
+      character(len=*), intent(in) :: name
+      !> The rows, shape (numbers in a row, rows)
+      real(wp), intent(inout) :: values(:, :)
+      !> Set if there is no such table, or it has not as many rows, or others
+      type(error_type), allocatable, intent(out) :: error
+
+      type(buffer_type), pointer :: buffer
+      integer :: rows
+
+      buffer => self%table(name)
+      rows = self%rows_to_drain(name)
+      if (.not. associated(buffer)) then
+         call raise(error, status_invalid, "unknown table '" // name // "'")
+      else if (size(values, 1) /= size(buffer%row, 1) .or. size(values, 2) > rows) then
+         call raise(error, status_invalid, "the table '" // name // "' has other rows")
+      else if (name == "slip_trace") then
+         call self%recorder%drain_slip_trace(values)
+      else
+         call buffer%drain(values)
+      end if
+   end subroutine drain
+
+   !> Put the state into an archive or take it out; a queue taken out is ordered anew.
+   subroutine exchange(self, archive)
+      !> The state
+      class(state_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("simulation")
+      call archive%exchange("idle", self%idle)
+      call archive%exchange("start_energy", self%start_energy)
+      call archive%exchange("advances", self%advances)
+      call archive%exchange("ending", self%ending)
+      call archive%exchange("is_started", self%is_started)
+      call self%slider%exchange(archive)
+      call self%contacts%exchange(archive)
+      call self%recorder%exchange(archive)
+      call self%stages%exchange(archive)
+      call self%steady%exchange(archive)
+      call self%avalanches%exchange(archive)
+      call archive%finish()
+      if (archive%saving .or. allocated(archive%failure)) return
+      call self%contacts%rebuild(self%slider%displacement)
+   end subroutine exchange
+
+   !> Put the state away.
+   subroutine save(self, length, error)
+      !> The state
+      class(state_type), intent(inout) :: self
+      !> Words of the state
+      integer(i8), intent(out) :: length
+      !> Set if the run cannot be taken up from here
+      type(error_type), allocatable, intent(out) :: error
+
+      self%kept = archive_type(saving=.true.)
+      call self%exchange(self%kept)
+      length = self%kept%length
+      if (allocated(self%kept%failure)) error = self%kept%failure
+   end subroutine save
+
+   !> Fetch the state that was put away; it is forgotten.
+   subroutine fetch(self, words, error)
+      !> The state
+      class(state_type), intent(inout) :: self
+      !> The state, as many words as it has
+      integer(i8), intent(inout) :: words(:)
+      !> Set if there is none, or one of another length
+      type(error_type), allocatable, intent(out) :: error
+
+      if (size(words, kind=i8) == self%kept%length .and. self%kept%length > 0) then
+         words = self%kept%word(:self%kept%length)
+         self%kept = archive_type()
+      else
+         call raise(error, status_invalid, "no state of this length was put away")
+      end if
+   end subroutine fetch
+
+   !> Go on from a state that was put away.
+   subroutine restore(self, words, error)
+      !> The state
+      class(state_type), intent(inout) :: self
+      !> The state
+      integer(i8), intent(in) :: words(:)
+      !> Set if the state is of another simulation, or damaged
+      type(error_type), allocatable, intent(out) :: error
+
+      type(archive_type) :: archive
+
+      if (self%is_started) then
+         call raise(error, status_invalid, "the simulation has been started already")
+         return
+      end if
+      archive%word = words
+      archive%length = size(words, kind=i8)
+      call self%exchange(archive)
+      if (allocated(archive%failure)) error = archive%failure
+   end subroutine restore
+
+end module mesoslip_loop_state

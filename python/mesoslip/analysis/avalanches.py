@@ -9,7 +9,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from mesoslip.analysis.avalanche_statistics import REJECTED, compare_laws, fit_power_law
+from mesoslip.analysis.avalanche_sizes import (
+    REJECTED,
+    compare_laws,
+    fit_power_law,
+    local_exponents,
+)
 from mesoslip.analysis.slips import write_table
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
@@ -27,41 +32,53 @@ SUMMARY = {
     "breaks": ("1", "breaks of contacts in them"),
     "breaks_outside": (
         "1",
-        "breaks of the run in none of them: of a slide without end, an avalanche that the end of "
-        "an interrupted run cut off, or those below output.avalanche_size",
+        "breaks of the run outside them: in sliding without end, in an avalanche cut off by the "
+        "end of an interrupted run, or in avalanches below output.avalanche_size",
     ),
     "mean_size": ("1", "mean size"),
-    "largest_size": ("1", "largest size"),
-    "largest_part": ("1", "largest size over the number of contacts"),
-    "triggered_share": ("1", "share of the breaks that others brought about"),
+    "max_size": ("1", "maximum size"),
+    "max_size_ratio": ("1", "maximum size over the number of contacts"),
+    "triggered_share": ("1", "share of the breaks that were triggered by others"),
     "slip_share": (
         "1",
         "share of the slider's displacement that happens in avalanches, for a drive "
         "in one direction",
     ),
     "spanning_count": ("1", "avalanches that span the lattice"),
-    "strength": ("N", "greatest contact force before an avalanche"),
-    "failure_size": ("1", "mean size of the avalanches that broke all contacts that were left"),
-    "exponent": ("1", "exponent tau of the sizes, P(s) ~ s^(-tau) exp(-s/s_c)"),
-    "exponent_error": ("1", "standard error of the exponent"),
-    "cutoff": ("1", "cutoff s_c of the sizes; none if they do not tell one"),
+    "bundle_strength": ("N", "maximum contact force before an avalanche"),
+    "failure_size": ("1", "mean size of the avalanches that broke all remaining contacts"),
+    "exponent": ("1", "exponent tau of P(s) ~ s^(-tau), averaged over forms of the law"),
+    "exponent_error": ("1", "standard error of the exponent, with that of the form"),
+    "cutoff_shape": ("1", "c of the best form's cutoff exp(-(s/s_c)^c); 0: no cutoff"),
+    "correction_power": ("1", "b of the best form's correction exp(a s^(-b)); 0: no correction"),
+    "cutoff": ("1", "cutoff s_c of the sizes; none if not resolved"),
     "cutoff_error": ("1", "standard error of the cutoff"),
-    "smallest_fitted": ("1", "least size that the law is fitted to"),
+    "min_fitted_size": ("1", "minimum size that the law is fitted to"),
     "fitted_count": ("1", "avalanches that the law is fitted to"),
     "fitted_share": ("1", "share of the avalanches that the law is fitted to"),
-    "fit_distance": ("1", "greatest distance of the law's distribution from theirs"),
+    "fit_distance": ("1", "maximum distance between the law's distribution and theirs"),
     "fit_p_value": ("1", "probability that sizes of the law fit as badly"),
     "tested_count": ("1", "avalanches that this was tested with"),
-    "fit_rejected": ("1", f"1 if that is less than {REJECTED:g}: the sizes are not of the law"),
+    "fit_rejected": ("1", f"1 if that is below {REJECTED:g}: the sizes do not follow the law"),
+    "local_exponent": ("1", "exponent of the pure law nearest to sizes from s to 10 s, the first"),
+    "local_exponent_error": ("1", "standard error of the first local exponent"),
+    "last_local_exponent": ("1", "the same for the last factor of ten with 50 sizes or more"),
+    "last_local_exponent_error": ("1", "standard error of the last local exponent"),
     "pure_exponent": ("1", "exponent of the law without cutoff, from the same size on"),
-    "pure_exponent_error": ("1", "its standard error if there is no cutoff"),
+    "pure_exponent_error": ("1", "standard error of that exponent if there is no cutoff"),
     "pure_ratio": ("1", "log-likelihood of the law over that without cutoff"),
     "pure_p_value": ("1", "probability of such a ratio without cutoff"),
+    "exponential_cutoff_ratio": ("1", "log-likelihood of the law over an exponential cutoff"),
+    "exponential_cutoff_p_value": ("1", "probability of such a ratio if both are as good"),
+    "gaussian_cutoff_ratio": ("1", "log-likelihood of the law over a Gaussian cutoff"),
+    "gaussian_cutoff_p_value": ("1", "probability of such a ratio if both are as good"),
     "lognormal_ratio": ("1", "log-likelihood of the law over a lognormal one; > 0: likelier"),
     "lognormal_p_value": ("1", "probability of such a ratio, of any sign, if both are as good"),
-    "stretched_exponential_ratio": ("1", "the same over a stretched exponential"),
+    "stretched_exponential_ratio": ("1", "log-likelihood of the law over a stretched exponential"),
     "stretched_exponential_p_value": ("1", "probability of such a ratio if both are as good"),
 }
+# Sizes in a window whose local exponent is reported.
+MIN_LOCAL_COUNT = 50
 
 
 def avalanches(
@@ -70,7 +87,7 @@ def avalanches(
     """The catalogue of avalanches of an output, dimension ``avalanche``, in SI.
 
     See `mesoslip.avalanche_summary` for their statistics, and for fits and histograms of sizes
-    `mesoslip.analysis.avalanche_statistics`.
+    `mesoslip.analysis.avalanche_sizes`.
 
     Parameters
     ----------
@@ -123,7 +140,7 @@ def avalanche_summary(
         See `avalanches`.
     min_size
         Smallest size in the fit of the size distribution; chosen by default, see
-        `mesoslip.analysis.avalanche_statistics.fit_power_law`.
+        `mesoslip.analysis.avalanche_sizes.fit_power_law`.
 
     Returns
     -------
@@ -148,8 +165,8 @@ def avalanche_summary(
     if sizes.size == 0:
         return result
     result["mean_size"] = float(sizes.mean())
-    result["largest_size"] = float(sizes.max())
-    result["largest_part"] = float(sizes.max() / config.contacts.count)
+    result["max_size"] = float(sizes.max())
+    result["max_size_ratio"] = float(sizes.max() / config.contacts.count)
     result["triggered_share"] = float(1 - sizes.size / sizes.sum())
     directions = set[float]().union(*(part.directions for part in config.drive_parts))
     if "slip" in data and is_whole and len(directions) == 1:
@@ -159,19 +176,21 @@ def avalanche_summary(
             result["slip_share"] = float(np.abs(root["avalanche_slip"]).sum()) / moved
     if "spans" in data:
         result["spanning_count"] = float(data["spans"].values.sum())
-    result["strength"] = float(np.abs(data["force_before"].values).max())
+    result["bundle_strength"] = float(np.abs(data["force_before"].values).max())
     is_failure = failures(tree, data)
     if is_failure.any():
         result["failure_size"] = float(sizes[is_failure].mean())
     sizes = sizes[~is_failure]
-    fit = fit_power_law(sizes, smallest=min_size)
+    fit = fit_power_law(sizes, min_size=min_size)
     if fit is not None:
         result |= {
             "exponent": fit.exponent,
             "exponent_error": fit.exponent_error,
+            "cutoff_shape": fit.form.cutoff_shape,
+            "correction_power": fit.form.correction_power,
             "cutoff": fit.cutoff if fit.cutoff_is_resolved else None,
             "cutoff_error": fit.cutoff_error if fit.cutoff_is_resolved else None,
-            "smallest_fitted": float(fit.smallest),
+            "min_fitted_size": float(fit.min_size),
             "fitted_count": float(fit.count),
             "fitted_share": fit.count / sizes.size,
             "fit_distance": fit.distance,
@@ -181,6 +200,14 @@ def avalanche_summary(
             "pure_exponent": fit.pure_exponent,
             "pure_exponent_error": fit.pure_exponent_error,
         }
+        windows = [
+            one for one in local_exponents(sizes, fit.min_size) if one.count >= MIN_LOCAL_COUNT
+        ]
+        for prefix, window in zip(
+            ("local", "last_local"), (windows[:1] + windows[-1:]), strict=False
+        ):
+            result[f"{prefix}_exponent"] = window.exponent
+            result[f"{prefix}_exponent_error"] = window.exponent_error
         for one in compare_laws(sizes, fit):
             result[f"{one.law}_ratio"] = one.log_likelihood_ratio
             result[f"{one.law}_p_value"] = one.p_value
@@ -188,18 +215,18 @@ def avalanche_summary(
 
 
 def warning(statistics: dict[str, float | None]) -> str | None:
-    """What must be said beside an exponent, or None: that its law is rejected."""
+    """Warning that the law is rejected; None if it is not."""
     p_value = statistics.get("fit_p_value")
     if not statistics.get("fit_rejected") or p_value is None:
         return None
     return (
-        f"the sizes are not of this law (p = {p_value:.2g}): its exponent and cutoff do not "
+        f"the sizes do not follow this law (p = {p_value:.2g}): its exponent and cutoff do not "
         "describe them"
     )
 
 
 def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which avalanches broke all contacts that were left; no law of sizes describes them."""
+    """Which avalanches broke all remaining contacts; no law of sizes describes them."""
     config = Config.from_toml(tree.attrs["configuration"])
     if config.contacts.reattach:
         return np.zeros(data.sizes["avalanche"], dtype=bool)

@@ -92,7 +92,7 @@ def avalanches(
 ) -> None:
     """Show sizes of avalanches: their distribution, and the law that fits it."""
     from mesoslip.analysis import avalanches as avalanche_catalogue
-    from mesoslip.analysis.avalanche_statistics import ccdf, logarithmic_bins
+    from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files
 
     if table is not None:

@@ -18,7 +18,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mesoslip.analysis.avalanche_statistics import (
+from mesoslip.analysis.avalanche_sizes import (
     PowerLawFit,
     ccdf,
     fit_power_law,
@@ -133,9 +133,9 @@ def draw_distribution(
     )
     if fit is None:
         return
-    fitted = bins.centre >= fit.smallest
+    fitted = bins.centre >= fit.min_size
     centre, width = bins.centre[fitted], np.diff(bins.edges[fitted], axis=1)[:, 0]
-    law = centre**-fit.exponent * np.exp(-centre / fit.cutoff)
+    law = fit.forms[0].relative_probability(centre)
     law *= np.sum(bins.density[fitted] * width) / np.sum(law * width)
     axes.loglog(centre, law, color=points.get_color(), linewidth=0.7, alpha=0.7)
 
@@ -155,13 +155,14 @@ def draw_density(axes: Axes, tree: xr.DataTree) -> None:
     axes.set_xlabel("avalanche size $s$")
     axes.set_ylabel("$P(s)$")
     if fit is not None:
-        label = rf"$s^{{-\tau}}e^{{-s/s_c}}$, $\tau$ = {fit.exponent:.3f} ± "
+        cutoff = {1.0: "e^{-s/s_c}", 2.0: "e^{-(s/s_c)^2}"}.get(fit.form.cutoff_shape, "")
+        label = rf"$s^{{-\tau}}{cutoff}$, $\tau$ = {fit.exponent:.3f} ± "
         label += f"{fit.exponent_error:.3f}"
         if fit.cutoff_is_resolved:
             label += f"\n$s_c$ = {fit.cutoff:.3g} ± {fit.cutoff_error:.2g}"
-        label += f"\nfrom $s$ = {fit.smallest} on, {fit.count / sizes.size:.2g} of them"
+        label += f"\nfrom $s$ = {fit.min_size} on, {fit.count / sizes.size:.2g} of them"
         if fit.is_rejected:
-            label += f"\nrejected: sizes are not of this law (p = {fit.p_value:.2g})"
+            label += f"\nrejected: sizes do not follow this law (p = {fit.p_value:.2g})"
         axes.set_title(label, loc="left", color="tab:red" if fit.is_rejected else "black")
 
 

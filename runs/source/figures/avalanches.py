@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from mesoslip.analysis import avalanche_statistics
+from mesoslip.analysis.avalanche_sizes import fit_power_law
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.plots import avalanches as avalanche_plots
 from outputs import configuration
@@ -44,7 +44,7 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
     for tree, color in zip(sliders, ("tab:green", "tab:orange", "tab:red"), strict=True):
         config = configuration(tree)
         sizes = avalanche_catalogue.avalanches(tree)["size"].values
-        fit = avalanche_statistics.fit_power_law(sizes, smallest=10)
+        fit = fit_power_law(sizes, min_size=10)
         label = f"$K/Nk$ = {config.spring_stiffness / config.contacts.stiffness:g}"
         if fit is not None:
             label += rf": $\tau$ = {fit.exponent:.3f}, $s_c$ = {fit.cutoff:.3g}"

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from mesoslip.analysis.avalanche_sizes import fit_power_law
 from mesoslip.analysis import avalanches as avalanche_catalogue
+from mesoslip.analysis.avalanche_sizes import fit_power_law
 from mesoslip.plots import avalanches as avalanche_plots
 from outputs import configuration
 

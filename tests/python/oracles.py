@@ -5,7 +5,6 @@ None of them shares code with the kernels, but for Philox, which is checked by k
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -94,7 +93,7 @@ class Contacts:
         self.origin = np.zeros(count)
         self.due = np.full(count, np.nan)
         self.u = np.array([self.draw(contact) for contact in range(count)])
-        self.sense = 1.0
+        self.direction = 1.0
         self.time = 0.0
         self.birth = np.full(count, 0.0)
         ageing = contacts.ageing
@@ -166,6 +165,18 @@ class Contacts:
         over = np.abs(force) - self.thresholds
         return np.where(self.pinned, over / np.where(self.pinned, rate, 1.0), -np.inf)
 
+    def closing_rate(self) -> float:
+        """Upper limit of the speed at which displacements of breaks come nearer at rest [m/s]."""
+        contacts, ageing = self.config.contacts, self.config.contacts.ageing
+        if ageing is None or ageing.law == "log":
+            return 0.0
+        width = contacts.threshold.relative_width
+        young = ageing.young_force_ratio
+        spread = young * ageing.young_relative_width - width
+        lost = young - 1 + spread * (self.u - 1) / width
+        fall = lost * np.exp(-(self.time - self.birth) / ageing.time) / ageing.time
+        return max(0.0, float(np.max(fall / self.stiffness))) * contacts.contact_static_force
+
     def breaking_force(self, x: float) -> np.ndarray:
         """Force that breaks each contact, that of its neighbours included."""
         stretch = self.stretch(x)
@@ -177,7 +188,7 @@ class Contacts:
         contacts = self.config.contacts
         self.time = time
         if v != 0:
-            self.sense = math.copysign(1.0, v)
+            self.direction = math.copysign(1.0, v)
         broken: list[int] = []
         while True:
             excess = self.excess(x)
@@ -198,7 +209,7 @@ class Contacts:
                 self.order.remove(contact)
                 self.renewal[contact] += 1
                 self.u[contact] = self.draw(contact)
-                force = self.sense * contacts.back_force_ratio * contacts.contact_static_force
+                force = self.direction * contacts.back_force_ratio * contacts.contact_static_force
                 force += self.bonds[contact] @ self.stretch(x)
                 self.origin[contact] = x - force / (
                     self.stiffness[contact] + self.bonds[contact].sum()
@@ -329,33 +340,52 @@ def matrix(config: Config, sums: tuple[float, float, float], velocity: float) ->
 
 
 def fixed_step(config: Config, step: float) -> tuple[np.ndarray, Contacts]:
-    """The model at a fixed step, events at ends of steps; trace columns time, X_d, X, V, F_d, F."""
+    """The model at a fixed step, events at ends of steps; trace columns time, X_d, X, V, F_d, F.
+
+    Contacts are looked at only at steps at which one can break or is due.
+    """
     contacts = Contacts(config)
-    prescribed = config.slider.kind == "prescribed"
+    slider = config.slider
+    prescribed = slider.kind == "prescribed"
     ends = np.cumsum([part.duration for part in config.drive_parts])
-    velocities = [part.start_velocity for part in config.drive_parts]
+    velocities = np.array([part.start_velocity for part in config.drive_parts])
     steps = round(config.duration / step)
     every = round(config.output_interval / step)
-    x = v = w = drive = 0.0
+    parts = np.searchsorted(ends, (np.arange(steps + 1) + 0.5) * step)
+    driven = velocities[np.minimum(parts, len(ends) - 1)].tolist()
+    if not prescribed:
+        spring, mass, eta = slider.stiffness, slider.mass, slider.damping_rate
+    x = v = w = drive = room = closing = 0.0
+    due = math.inf
+    stiffness, offset, drag = contacts.sums()
+    direction = contacts.direction
     rows = []
     for number in range(steps + 1):
         time = number * step
-        v_d = velocities[min(np.searchsorted(ends, time + step / 2), len(ends) - 1)]
+        v_d = driven[number]
         if prescribed:
             x, v = drive, v_d
-        force = contacts.force(x, v)
+        force = stiffness * x - offset + drag * v
         if number % every == 0:
-            spring = force if prescribed else config.slider.stiffness * (drive - x)
-            rows.append((time, drive, x, v, spring, force))
+            rows.append((time, drive, x, v, force if prescribed else spring * (drive - x), force))
         if not prescribed:
-            slider = config.slider
-            acceleration = (slider.stiffness * (drive - x) - force) / slider.mass
-            acceleration -= slider.damping_rate * (v - w)
-            w += step * slider.damping_rate * (v - w)
+            acceleration = (spring * (drive - x) - force) / mass - eta * (v - w)
+            w += step * eta * (v - w)
             v += step * acceleration
             x += step * v
         drive += step * v_d
-        contacts.act(drive if prescribed else x, v, time + step)
+        moved = step * (v_d if prescribed else v)
+        room -= abs(moved) + step * closing
+        if v != 0:
+            direction = math.copysign(1.0, v)
+        if room <= 0 or due <= (time + step) * (1 + 1e-15):
+            contacts.direction = direction
+            at = drive if prescribed else x
+            contacts.act(at, v, time + step)
+            stiffness, offset, drag = contacts.sums()
+            room, closing = -float(np.max(contacts.excess(at))), contacts.closing_rate()
+            waiting = contacts.due[~np.isnan(contacts.due)]
+            due = float(waiting.min(initial=math.inf)) if config.contacts.reattach else math.inf
     return np.array(rows), contacts
 
 
@@ -394,33 +424,32 @@ def ageing_force(config: Config, velocity: float) -> float:
     back, least = contacts.back_force_ratio, least_configured(config)
     speed = velocity / contacts.break_stretch
 
-    def passage(u: float) -> float:
-        z = (u - 1) / width
+    def gap(time: np.ndarray) -> np.ndarray:
+        mean, spread = aged(config, time)
+        return mean + spread * z - back - speed * time
 
-        def gap(time: float) -> float:
-            mean, spread = aged(config, time)
-            return mean + spread * z - back - speed * time
-
-        end = 1.0 / speed
-        while gap(end) > 0:
-            end *= 2
-        # The first of several zeros, if the threshold grows faster than the force for a while.
-        times = np.unique(np.concatenate([np.geomspace(end * 1e-9, end, 400), [0.0]]))
-        signs = gap(times) <= 0
-        place = int(np.argmax(signs))
-        if place == 0:
-            return 0.0
-        return optimize.brentq(gap, times[place - 1], times[place], xtol=1e-300, rtol=1e-14)
-
-    lower, upper = max(least, law.ppf(1e-15)), law.isf(1e-15)
+    # Thresholds at the nodes of a quadrature.
     point, weight = np.polynomial.legendre.leggauss(20)
-    edges = np.linspace(lower, upper, 81)
-    work = time = 0.0
-    for start, end in itertools.pairwise(edges):
-        for node, share in zip(point, weight, strict=True):
-            u = (start + end) / 2 + (end - start) / 2 * node
-            last = passage(u)
-            chance = share * law.pdf(u)
-            work += chance * (back * last + speed * last**2 / 2)
-            time += chance * last
+    edges = np.linspace(max(least, law.ppf(1e-15)), law.isf(1e-15), 81)
+    half = np.diff(edges)[:, None] / 2
+    u = ((edges[:-1, None] + half) + half * point).ravel()
+    z = (u - 1) / width
+    chance = np.tile(weight, half.size) * law.pdf(u)
+    # The first of several zeros, if the threshold grows faster than the force for a while.
+    end = np.full_like(u, 1.0 / speed)
+    while np.any(gap(end) > 0):
+        end[gap(end) > 0] *= 2
+    times = end * np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 400)])[:, None]
+    first = np.argmax(gap(times) <= 0, axis=0)
+    node = np.arange(u.size)
+    low, high = times[np.maximum(first - 1, 0), node], times[first, node]
+    while np.any(high - low > 1e-15 * high):
+        middle = (low + high) / 2
+        if np.all((middle == low) | (middle == high)):
+            break
+        is_before = gap(middle) > 0
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    last = high
+    work = np.sum(chance * (back * last + speed * last**2 / 2))
+    time = np.sum(chance * last)
     return contacts.static_force * work / time

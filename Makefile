@@ -74,6 +74,8 @@ bench: $(INSTALLED) ## Measure the cost of a contact event
 FUZZ ?=
 fuzz: $(INSTALLED) ## Attack the program with some thousand cases at random
 	$(VENV)/bin/python tests/fuzz/fuzz.py $(FUZZ)
+	$(if $(FUZZ),,OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 -q -m long \
+	  --ignore=tests/python/test_documentation.py)
 
 reference: $(INSTALLED) ## Write the reference outputs of the tests anew, on purpose only
 	$(VENV)/bin/python tests/python/make_reference.py
@@ -86,7 +88,8 @@ lint: $(INSTALLED) ## Check the style of all sources
 	$(VENV)/bin/codespell
 
 # Every warning is an error, and what browsers would load from elsewhere is one.
-docs: $(INSTALLED) $(DOCUMENTATION) ## Build the documentation into out/docs
+docs: $(INSTALLED) $(DOCUMENTATION) ## Build the documentation into out/docs, and run its long pages
+	$(VENV)/bin/pytest -q -m long tests/python/test_documentation.py
 	$(VENV)/bin/python -m sphinx -b html -W --keep-going -q -d build/docs docs out/docs
 	$(VENV)/bin/python tools/self-contained out/docs
 
@@ -115,7 +118,8 @@ $(DOCUMENTATION): $(ENVIRONMENT)
 	@touch $@
 
 # The Fortran tests, without Python, in three profiles.
-build/release/build.ninja: PROFILE := --buildtype=release -Db_lto=true
+# Without link-time optimization, which each test would repeat; Python tests run it.
+build/release/build.ninja: PROFILE := --buildtype=release
 build/debug/build.ninja: PROFILE := --buildtype=debug -Dchecks=true
 build/sanitize/build.ninja: PROFILE := --buildtype=debug -Db_sanitize=address,undefined \
   -Db_lundef=false

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,15 @@ from mesoslip import Config
 from mesoslip.command_line.main import main
 
 ROOT = Path(__file__).parents[2]
+
+# A shell that starts tests in the background has them, and what they start, ignore interrupts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def long(*values: Any) -> Any:
+    """Values of a parameter whose cases are run by ``make fuzz``, not by ``make test``."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
 
 KLEIN = {
     "run": {"duration": 12.0},

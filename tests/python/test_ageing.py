@@ -281,7 +281,7 @@ def test_many_contacts_come_to_the_master_equation(klein, slider):
         # A spring stiff enough for sliding to be smooth: slips come at random times.
         changes |= {"slider__stiffness": 5000.0}
     infinite = mesoslip.run(klein(**changes, run__engine="me", run__resolution=0.1))
-    counts = np.array([100, 400, 1600, 6400])
+    counts = np.array([100, 400, 1600])
     errors = []
     for count in counts:
         many = mesoslip.run(klein(**changes, contacts__count=int(count), run__realizations=8))
@@ -289,7 +289,7 @@ def test_many_contacts_come_to_the_master_equation(klein, slider):
         errors.append(np.sqrt(np.mean(difference**2)) / STATIC)
     slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert -0.58 < slope < -0.42
-    assert errors[-1] < 0.01
+    assert errors[-1] < 0.02
 
 
 @pytest.mark.parametrize("engine", ["eq", "me"])

@@ -14,7 +14,7 @@ import netCDF4
 import numpy as np
 import pytest
 import tomli_w
-from conftest import ROOT, klein_tables
+from conftest import ROOT, klein_tables, long
 from mesoslip.output import files
 
 OLD = ROOT / "tests" / "reference" / "old.nc"
@@ -216,9 +216,10 @@ print(told)
 """
 
 
-def test_flipped_bits(tmp_path):
+@pytest.mark.parametrize("count", [8, long(200)])
+def test_flipped_bits(count, tmp_path):
     """Each use of a damaged file gives numbers or one message."""
-    arguments = [str(OLD), str(tmp_path / "in.nc"), "5", "40"]
+    arguments = [str(OLD), str(tmp_path / "in.nc"), "5", str(count)]
     result = subprocess.run(
         [sys.executable, "-c", DAMAGED, *arguments], capture_output=True, text=True, check=False
     )

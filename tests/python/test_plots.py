@@ -9,7 +9,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import ROOT
+from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.plots import run as run_plots
@@ -201,8 +201,15 @@ def overlapping(figure):
     return outside + pairs
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("x", [None, "displacement", "drive", "time"])
+@pytest.mark.parametrize(
+    ("name", "x"),
+    [(name, None) for name in NAMES]
+    + [
+        (name, x) if name in {"plain", "layered", "macroscopic"} else long(name, x)
+        for name in NAMES
+        for x in ("displacement", "drive", "time")
+    ],
+)
 def test_nothing_covers_anything_else(runs, name, x):
     """Whatever the run, no panel, label or legend reaches into another one or out of the figure."""
     assert overlapping(mesoslip.plot(runs[name], x=x)) == []

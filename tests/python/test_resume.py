@@ -389,8 +389,26 @@ def long_run(tmp_path):
     return path
 
 
-def start(path: Path, output: Path, *more: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "mesoslip", "run", str(path), "-o", str(output), *more]
+# The command, which interrupts itself twice as soon as a file is there, however busy the machine.
+INTERRUPTED = """
+import os, signal, sys, threading, time
+from mesoslip.command_line.main import main
+def interrupt(path=sys.argv.pop(1)):
+    while not os.path.exists(path):
+        time.sleep(0.002)
+    for _ in range(2):
+        os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=interrupt, daemon=True).start()
+sys.argv[0] = "mesoslip"
+main()
+"""
+
+
+def start(path: Path, output: Path, *more: str, interrupt_at: Path | None = None):
+    program = ["-m", "mesoslip"]
+    if interrupt_at is not None:
+        program = ["-c", INTERRUPTED, str(interrupt_at)]
+    command = [sys.executable, *program, "run", str(path), "-o", str(output), *more]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
 
@@ -440,10 +458,8 @@ def test_killed_runs_go_on(long_run, tmp_path):
 def test_ctrl_c_tells_how_to_go_on(long_run, tmp_path):
     """A partial file to look at, a checkpoint to go on from, exit status 130; twice is no harm."""
     output = tmp_path / "stopped.nc"
-    process = start(long_run, output, "--checkpoint-interval", "0.05")
-    wait_for(lambda: (checkpoint_folder(output) / "state.npz").exists())
-    process.send_signal(signal.SIGINT)
-    process.send_signal(signal.SIGINT)
+    state = checkpoint_folder(output) / "state.npz"
+    process = start(long_run, output, "--checkpoint-interval", "0.05", interrupt_at=state)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in told

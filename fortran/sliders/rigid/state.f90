@@ -1,0 +1,143 @@
+!> The state of a rigid slider, and the equation of its motion.
+module mesoslip_sliders_rigid_state
+   use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_motion_series, only: inverse
+   use mesoslip_sliders_scheduled, only: scheduled_slider_type
+   implicit none
+   private
+
+   public :: rigid_state_type, system_type, motion_rates_type
+   public :: constants, rates, uniform_gap, pull, pull_unevenly, arrive
+   public :: few_terms, some_terms, many_terms, long_terms
+
+   !> Terms of the series of steps from short to long. What a series leaves out is less than 1e-16 of
+   !> its two leading terms.
+   integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, long_terms = 17
+
+   !> Coefficients of the equation of motion, per mass of the slider:
+   !> V' = spring gap - (K_c X - S)/M - drag V - D and D' = eta_S (V' - D), with D = eta_S (V - W).
+   type :: system_type
+      !> One over the mass [1/kg], and K/M [1/s2]
+      real(wp) :: inverse_mass, spring
+      !> (K + K_c)/M [1/s2], C/M [1/s], and K/M times the drive's velocity at the start of a step
+      !> [m/s3] and times its acceleration [m/s4]
+      real(wp) :: stiffness, drag, driving, driving_rate
+      !> How far the drive is ahead of the slider at the start of a step [m], and its velocity [m/s]
+      real(wp) :: drive_gap, drive_velocity
+   end type system_type
+
+   !> Velocity and acceleration of the slider, and the same of the damper.
+   type :: motion_rates_type
+      !> Velocity [m/s] and acceleration [m/s2]
+      real(wp) :: velocity, acceleration
+      !> D = eta_S (V - W) [m/s2] and its rate [m/s3]
+      real(wp) :: damper, damper_rate
+   end type motion_rates_type
+
+   !> A rigid slider on a spring.
+   type, abstract, extends(scheduled_slider_type) :: rigid_state_type
+      !> Mass M [kg], stiffness of the drive's spring K [N/m], damping rate eta_S [1/s]
+      real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp, damping = 0.0_wp
+      !> Deceleration by the damper, D = eta_S (V - W), W being the mean velocity [m/s2]
+      real(wp) :: damper = 0.0_wp
+      !> Contact force during the last advance, and displacement at its start [m]
+      type(interface_law_type) :: law
+      real(wp) :: start_displacement = 0.0_wp
+      !> Taylor coefficients of the velocity in the time since then
+      integer :: terms = few_terms
+      real(wp) :: series(0:long_terms - 1) = 0.0_wp
+   end type rigid_state_type
+
+contains
+
+   !> What in the equation of motion does not change with the contacts.
+   pure function constants(self) result(system)
+      class(rigid_state_type), intent(in) :: self
+      type(system_type) :: system
+
+      system%inverse_mass = 1.0_wp / self%mass
+      system%spring = self%stiffness * system%inverse_mass
+      system%drive_velocity = self%drive%rate
+      system%driving = system%spring * self%drive%rate
+      system%driving_rate = 0.0_wp
+      system%stiffness = 0.0_wp
+      system%drag = 0.0_wp
+      system%drive_gap = 0.0_wp
+   end function constants
+
+   !> How far a drive of constant velocity is ahead of the slider.
+   pure function uniform_gap(self) result(drive_gap)
+      class(rigid_state_type), intent(in) :: self
+      !> The gap [m]
+      real(wp) :: drive_gap
+
+      drive_gap = self%drive%value - self%displacement &
+         & + self%drive%rate * (self%time - self%drive%time)
+   end function uniform_gap
+
+   !> Velocity and damper with their rates, from the equation of motion.
+   pure function rates(self, system, drive_gap) result(motion)
+      class(rigid_state_type), intent(in) :: self
+      type(system_type), intent(in) :: system
+      !> How far the drive is ahead of the slider [m]
+      real(wp), intent(in) :: drive_gap
+      type(motion_rates_type) :: motion
+
+      motion%velocity = self%velocity
+      motion%damper = self%damper
+      motion%acceleration = ((system%spring * drive_gap - system%inverse_mass &
+         & * (self%law%stiffness * self%displacement - self%law%offset)) &
+         & - system%drag * self%velocity) - self%damper
+      motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
+   end function rates
+
+   !> What there is to note at the end of any step.
+   subroutine arrive(self, system, early, drive_gap, late)
+      !> The slider, where it is at the end of the step
+      class(rigid_state_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+      !> How far the drive is ahead of the slider at the end of the step [m]
+      real(wp), intent(in) :: drive_gap
+      !> The motion at the end of the step
+      type(motion_rates_type), intent(out) :: late
+
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
+      late = rates(self, system, drive_gap)
+      self%acceleration = late%acceleration
+      self%start_acceleration = early%acceleration
+   end subroutine arrive
+
+   !> Add the drive's impulse of a step to the balance, its velocity being constant.
+   subroutine pull(self, system, step, swept)
+      class(rigid_state_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> Length of the step [s], and integral of the displacement over the time [m s]
+      real(wp), intent(in) :: step, swept
+
+      call self%drive%impulse%add(self%stiffness &
+         & * (step * (system%drive_gap + 0.5_wp * self%drive%rate * step) - swept))
+   end subroutine pull
+
+   !> Add the drive's impulse and work of a step to the balance, under an acceleration.
+   subroutine pull_unevenly(self, system, step, swept, moment)
+      class(rigid_state_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      !> Length of the step [s], integrals of the displacement [m s] and of that times the time [m s2]
+      real(wp), intent(in) :: step, swept, moment
+
+      real(wp) :: extension
+
+      associate (velocity => system%drive_velocity, acceleration => self%drive%acceleration)
+         extension = step * (system%drive_gap + step * (0.5_wp * velocity &
+            & + inverse(6) * acceleration * step)) - swept
+         call self%drive%earlier_impulse%add(self%stiffness * extension)
+         call self%drive%earlier_work%add(self%stiffness * (velocity * extension + acceleration &
+            & * (step**2 * (0.5_wp * system%drive_gap + step &
+            & * (inverse(3) * velocity + 0.125_wp * acceleration * step)) - moment)))
+      end associate
+   end subroutine pull_unevenly
+
+end module mesoslip_sliders_rigid_state

@@ -6,74 +6,35 @@
 !>
 !> Under a linear law of the contact force the motion is that of a linear system. By default it is
 !> advanced by its Taylor series, exact to rounding, over steps in units of the fastest rate; most
-!> end at an event long before. CVODE is there as the reference, and for systems so stiff that the
-!> fastest rate has no part in the motion: it starts anew after each event, and events are found in
-!> the polynomial of each of its steps.
+!> end at an event long before. CVODE is the alternative.
 module mesoslip_sliders_layered
-   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
-   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector, SUNMatrix
-   use fsunmatrix_band_mod, only: FSUNBandMatrix_Data, FSUNBandMatrix_LDim, &
-      & FSUNBandMatrix_StoredUpperBandwidth
-   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, &
-      & exchange_law, shift_slider
-   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf
+   use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, shift_slider, &
+      & slider_type
+   use mesoslip_sliders_layered_expansion, only: expand, sum_series
+   use mesoslip_sliders_layered_integrator, only: integrator_type
+   use mesoslip_sliders_layered_system, only: fastest_rate, layered_parameters_type, new_system, &
+      & solver_adams, solver_bdf, solver_series, system_type
+   use mesoslip_sliders_motion_series, only: first_end, horner, inverse, max_terms
    implicit none
    private
 
    public :: slider_layered_type, layered_parameters_type, new_slider_layered, make_slider_layered
    public :: solver_series, solver_adams, solver_bdf
 
-   !> Taylor series, and CVODE with either family of formulas
-   integer, parameter :: solver_series = 0, solver_adams = method_adams, solver_bdf = method_bdf
-
-   !> For the procedures of motion_series.inc
-   integer, parameter :: longest_series = 28
-   integer :: i
-   real(wp), parameter :: inverse(longest_series + 2) = [(1.0_wp / i, i=1, longest_series + 2)]
-   !> Longest step in units of the fastest rate
-   real(wp), parameter :: longest_step = 2.5_wp
-
-   !> Half the bandwidth of the Jacobian, with displacements and velocities in turn.
-   integer, parameter :: half_bandwidth = 3
+   !> Maximum duration of a step in units of the fastest rate
+   real(wp), parameter :: max_step = 2.5_wp
+   !> Minimum number of terms
+   integer, parameter :: min_terms = 4
    !> Layers whose series take as long as an advance of a rigid slider
    real(wp), parameter :: layers_per_cost = 4.0_wp
-   !> Steps of CVODE without an event after which it starts anew, so that a run can be put away: as
-   !> many as take about a second with very many layers, from fewest to most
-   integer, parameter :: fewest_steps = 200, most_steps = 2000, most_layer_steps = 1000000
    !> Points of the rule by which losses are integrated
    integer, parameter :: points = 12
-
-   !> What the slider is made of.
-   type :: layered_parameters_type
-      !> Number of layers
-      integer :: layers = 1
-      !> Mass [kg] and static stiffness [N/m] of the whole slider
-      real(wp) :: mass = 1.0_wp, stiffness = 1.0_wp
-      !> Rate of Kelvin-Voigt damping between layers, not on the drive's spring [1/s]
-      real(wp) :: damping = 0.0_wp
-      !> Mass of the base [kg], 0 for none, stiffness [N/m] and damping rate [1/s] of its support
-      real(wp) :: base_mass = 0.0_wp, base_stiffness = 0.0_wp, base_damping = 0.0_wp
-      !> One of the solver_ codes
-      integer :: solver = solver_series
-      !> Relative tolerance, and absolute one of displacements over 1 m, for CVODE
-      real(wp) :: relative = 1.0e-8_wp, absolute = 1.0e-17_wp
-   end type layered_parameters_type
-
-   !> A linear system: the chain, the base and the contacts.
-   type :: system_type
-      type(layered_parameters_type) :: parameters
-      type(interface_law_type) :: law
-      !> Mass of a layer [kg], stiffness [N/m] and damping [N s/m] between two
-      real(wp) :: layer_mass = 1.0_wp, spring = 1.0_wp, dashpot = 0.0_wp
-      !> Displacement [m] and velocity [m/s] of the drive at the start, and its acceleration [m/s2]
-      real(wp) :: drive = 0.0_wp, drive_velocity = 0.0_wp, drive_acceleration = 0.0_wp
-   end type system_type
 
    !> An elastic slider.
    type, extends(slider_type) :: slider_layered_type
@@ -81,29 +42,18 @@ module mesoslip_sliders_layered
       type(layered_parameters_type) :: parameters
       !> The system during the last advance
       type(system_type), pointer, private :: system => null()
+      !> CVODE, if it is the solver
+      type(integrator_type), private :: integrator
       !> Displacement and velocity of the base, then of each layer, shape (0:layers, 2)
       real(wp), allocatable, private :: state(:, :)
-      !> Taylor coefficients of both, shape (0:layers, 2, 0:longest_series)
+      !> Taylor coefficients of both, shape (0:layers, 2, 0:max_terms)
       real(wp), allocatable, private :: series(:, :, :)
       !> The same of the velocity of layer 1 relative to the base
-      real(wp), private :: sliding(0:longest_series) = 0.0_wp
+      real(wp), private :: sliding(0:max_terms) = 0.0_wp
       integer, private :: terms = 1
-      real(wp), private :: start_displacement = 0.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
-      !> Longest step of a number of terms, in units of the fastest rate
-      real(wp), private :: reach(longest_series) = 0.0_wp
-
-      type(cvode_type), private :: cvode
-      !> State in CVODE's order, and the time from which its time counts
-      real(wp), pointer, contiguous, private :: vector(:) => null()
-      real(wp), private :: start_time = 0.0_wp
-      !> CVODE's time, which has more digits than the time of the run
-      real(wp), private :: local_time = 0.0_wp
-      !> Whether CVODE has to start anew, and its steps since it did
-      logical, private :: is_stale = .true.
-      integer, private :: steps = 0
-      !> What CVODE did before the run was put away
-      integer(i8), private :: counts_before(3) = 0_i8
+      !> Maximum duration of a step of a number of terms, in units of the fastest rate
+      real(wp), private :: reach(max_terms) = 0.0_wp
    contains
       procedure :: adapt_to_drive
       procedure :: can_pause
@@ -115,8 +65,8 @@ module mesoslip_sliders_layered
       procedure :: energy
       procedure :: shift_origin
       procedure :: exchange
-      procedure, non_overridable, private :: expand, step_cvode, restart, take_back, add_work, &
-         & copy_drive
+      procedure, non_overridable, private :: take_law, expand_motion, integrate, find_end, &
+         & move_to, add_work, add_losses, copy_drive
       final :: close
    end type slider_layered_type
 
@@ -163,17 +113,14 @@ contains
       self%parameters = parameters
       self%cost = 1.0_wp + parameters%layers / layers_per_cost
       allocate (self%state(0:parameters%layers, 2), source=0.0_wp)
-      allocate (self%series(0:parameters%layers, 2, 0:longest_series), source=0.0_wp)
+      allocate (self%series(0:parameters%layers, 2, 0:max_terms), source=0.0_wp)
       call gauss_legendre(self%point, self%weight)
       ! The first term left out is below 1e-17 of what a free motion has.
-      do term = 1, longest_series
+      do term = 1, max_terms
          self%reach(term) = exp((log(1.0e-17_wp) + log_gamma(term + 1.0_wp)) / term)
       end do
       allocate (self%system)
-      self%system%parameters = parameters
-      self%system%layer_mass = parameters%mass / parameters%layers
-      self%system%spring = parameters%stiffness * parameters%layers
-      if (parameters%layers > 1) self%system%dashpot = parameters%damping * self%system%layer_mass
+      self%system = new_system(parameters)
    end subroutine new_slider_layered
 
    !> Put the slider at rest in balance with the contacts.
@@ -206,7 +153,7 @@ contains
       !> The slider
       class(slider_layered_type), intent(inout) :: self
 
-      self%is_stale = .true.
+      self%integrator%is_stale = .true.
    end subroutine adapt_to_drive
 
    !> Whether a run that is put away now goes on to the bit: the history of CVODE cannot be put
@@ -217,7 +164,7 @@ contains
       !> Whether it does
       logical :: can_pause
 
-      can_pause = self%is_stale .or. self%parameters%solver == solver_series
+      can_pause = self%integrator%is_stale .or. self%parameters%solver == solver_series
    end function can_pause
 
    !> Velocity, at the end of the last advance, of the layer that the drive's spring pulls.
@@ -248,18 +195,11 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      real(wp) :: rate, step, gap, longest, change, direction
+      real(wp) :: step, longest, direction
       logical :: ends, crosses, turns
-      integer :: term
 
-      if (self%parameters%solver /= solver_series .and. .not. self%is_stale) then
-         self%is_stale = abs(law%stiffness - self%system%law%stiffness) > 0.0_wp .or. &
-            & abs(law%offset - self%system%law%offset) > 0.0_wp .or. &
-            & abs(law%drag - self%system%law%drag) > 0.0_wp
-      end if
+      call self%take_law(law)
       self%step_time = self%time
-      self%start_displacement = self%displacement
-      self%system%law = law
       step = window%end_time - self%time
       if (.not. step > 0.0_wp) then
          self%series(:, :, 1:) = 0.0_wp
@@ -268,392 +208,167 @@ contains
       end if
 
       if (self%parameters%solver == solver_series) then
-         call self%copy_drive()
-         rate = fastest_rate(self%system)
-         ends = step * rate <= longest_step
-         if (.not. ends) step = longest_step / rate
-         ! Most steps end at a break: no need for a series that reaches farther.
-         if (self%velocity > 0.0_wp) then
-            gap = window%upper - self%displacement
-         else
-            gap = self%displacement - window%lower
-         end if
-         if (gap < 0.5_wp * abs(self%velocity) * step) then
-            step = 2.0_wp * gap / abs(self%velocity)
-            ends = .false.
-            if (.not. step > 0.0_wp) step = longest_step / rate
-         end if
-         self%terms = longest_series
-         do term = 4, longest_series
-            if (rate * step <= self%reach(term)) then
-               self%terms = term
-               exit
-            end if
-         end do
-         call self%expand()
+         call self%expand_motion(window, step, ends)
       else
-         call self%step_cvode(window%end_time, step, ends)
+         call self%integrate(window%end_time, step, ends)
          if (allocated(self%failure)) return
       end if
-
-      do term = 0, self%terms - 1
-         self%sliding(term) = (term + 1) &
-            & * (self%series(1, 1, term + 1) - self%series(0, 1, term + 1))
-      end do
       longest = step
-      crosses = .false.
-      turns = .false.
-      change = 0.0_wp
-      do term = self%terms - 1, 1, -1
-         change = (change + abs(self%sliding(term))) * step
-      end do
-      if (.not. (abs(self%sliding(0)) + change) * step < min(window%upper - self%displacement, &
-         & self%displacement - window%lower)) then
-         call first_end(self%sliding, self%terms, window%upper - self%displacement, &
-            & window%lower - self%displacement, change, step, crosses, turns, direction)
-      end if
-
-      call take_back(self, step)
-      if (crosses) then
-         self%displacement = merge(window%upper, window%lower, direction > 0.0_wp)
-         self%state(1, 1) = self%state(0, 1) + self%displacement
-         self%is_stale = .true.
-      else
-         self%displacement = self%state(1, 1) - self%state(0, 1)
-      end if
-      if (turns) then
-         self%state(1, 2) = self%state(0, 2)
-         self%is_stale = .true.
-      end if
-      self%base_velocity = self%state(0, 2)
-      self%velocity = self%state(1, 2) - self%base_velocity
-      if (step < longest) self%is_stale = .true.
+      call self%find_end(window, step, crosses, turns, direction)
+      call self%move_to(step, crosses, turns, merge(window%upper, window%lower, direction > 0.0_wp))
+      if (step < longest) self%integrator%is_stale = .true.
       if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
          self%time = window%end_time
       else
          self%time = self%time + step
       end if
-      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
-      self%acceleration = slope(self%sliding, self%terms, step)
-      self%start_acceleration = self%sliding(1)
       call self%add_work(step)
+      call self%add_losses(step)
       if (self%parameters%solver /= solver_series) then
-         self%steps = self%steps + 1
-         if (self%steps >= max(fewest_steps, min(most_steps, &
-            & most_layer_steps / self%parameters%layers))) self%is_stale = .true.
-         self%integrator_counts = self%counts_before + int(self%cvode%counts(), i8)
+         call self%integrator%end_step(self%parameters%layers, self%integrator_counts)
       end if
    end subroutine advance
 
-   !> Bound on the rates of a system.
-   pure function fastest_rate(system) result(rate)
-      type(system_type), intent(in) :: system
-      real(wp) :: rate
+   !> Take the law of the contact force; CVODE starts anew if it is another one.
+   subroutine take_law(self, law)
+      class(slider_layered_type), intent(inout) :: self
+      type(interface_law_type), intent(in) :: law
 
-      real(wp) :: base_mass
-
-      base_mass = system%parameters%base_mass
-      rate = 4.0_wp * system%spring + abs(system%law%stiffness)
-      if (system%parameters%layers == 1) rate = system%spring + abs(system%law%stiffness)
-      rate = sqrt(rate / system%layer_mass)
-      if (base_mass > 0.0_wp) then
-         rate = sqrt(rate**2 + (abs(system%law%stiffness) + system%parameters%base_stiffness) &
-            & / base_mass) + system%law%drag / base_mass + system%parameters%base_damping
+      if (self%parameters%solver /= solver_series .and. .not. self%integrator%is_stale) then
+         self%integrator%is_stale = abs(law%stiffness - self%system%law%stiffness) > 0.0_wp &
+            & .or. abs(law%offset - self%system%law%offset) > 0.0_wp &
+            & .or. abs(law%drag - self%system%law%drag) > 0.0_wp
       end if
-      rate = rate + (system%law%drag + 4.0_wp * system%dashpot) / system%layer_mass
-   end function fastest_rate
+      self%system%law = law
+   end subroutine take_law
 
-   !> Accelerations of base and layers, times a factor, without what acts from outside.
-   pure subroutine accelerate(system, factor, pull, displacement, velocity, acceleration)
-      type(system_type), intent(in) :: system
-      !> The factor, and an acceleration that the last layer has besides [m/s2]
-      real(wp), intent(in) :: factor, pull
-      real(wp), intent(in) :: displacement(0:), velocity(0:)
-      real(wp), intent(out) :: acceleration(0:)
+   !> The motion as a series, over a step that it is exact in.
+   subroutine expand_motion(self, window, step, ends)
+      class(slider_layered_type), intent(inout) :: self
+      type(window_type), intent(in) :: window
+      !> Length of the step, at first up to the end of the window
+      real(wp), intent(inout) :: step
+      !> Whether it comes to that end
+      logical, intent(out) :: ends
 
-      real(wp) :: spring, dashpot, force
-      integer :: layer, last
+      real(wp) :: rate, gap
+      integer :: term
 
-      last = system%parameters%layers
-      spring = system%spring / system%layer_mass
-      dashpot = system%dashpot / system%layer_mass
-      force = system%law%stiffness * (displacement(1) - displacement(0)) &
-         & + system%law%drag * (velocity(1) - velocity(0))
-      if (dashpot > 0.0_wp) then
-         do layer = 2, last - 1
-            acceleration(layer) = factor &
-               & * (spring * ((displacement(layer + 1) - displacement(layer)) &
-               & - (displacement(layer) - displacement(layer - 1))) &
-               & + dashpot * ((velocity(layer + 1) - velocity(layer)) &
-               & - (velocity(layer) - velocity(layer - 1))))
-         end do
+      call self%copy_drive()
+      rate = fastest_rate(self%system)
+      ends = step * rate <= max_step
+      if (.not. ends) step = max_step / rate
+      ! Most steps end at a break: no need for a series that reaches farther.
+      if (self%velocity > 0.0_wp) then
+         gap = window%upper - self%displacement
       else
-         do layer = 2, last - 1
-            acceleration(layer) = factor &
-               & * (spring * ((displacement(layer + 1) - displacement(layer)) &
-               & - (displacement(layer) - displacement(layer - 1))))
-         end do
+         gap = self%displacement - window%lower
       end if
-      acceleration(last) = -spring * displacement(last)
-      if (last > 1) then
-         acceleration(last) = acceleration(last) &
-            & - spring * (displacement(last) - displacement(last - 1)) &
-            & - dashpot * (velocity(last) - velocity(last - 1))
-         acceleration(1) = spring * (displacement(2) - displacement(1)) &
-            & + dashpot * (velocity(2) - velocity(1))
+      if (gap < 0.5_wp * abs(self%velocity) * step) then
+         step = 2.0_wp * gap / abs(self%velocity)
+         ends = .false.
+         if (.not. step > 0.0_wp) step = max_step / rate
       end if
-      acceleration(1) = acceleration(1) - force / system%layer_mass
-      acceleration(last) = factor * (acceleration(last) + pull)
-      if (last > 1) acceleration(1) = factor * acceleration(1)
-      acceleration(0) = 0.0_wp
-      if (system%parameters%base_mass > 0.0_wp) then
-         acceleration(0) = factor * ((force - system%parameters%base_stiffness * displacement(0)) &
-            & / system%parameters%base_mass - system%parameters%base_damping * velocity(0))
-      end if
-   end subroutine accelerate
-
-   !> Accelerations by the drive and the origins of contacts, at a time after the start.
-   pure subroutine push(system, time, acceleration)
-      type(system_type), intent(in) :: system
-      real(wp), intent(in) :: time
-      real(wp), intent(inout) :: acceleration(0:)
-
-      integer :: last
-
-      last = system%parameters%layers
-      acceleration(last) = acceleration(last) + system%spring * (system%drive &
-         & + (system%drive_velocity + 0.5_wp * system%drive_acceleration * time) * time) &
-         & / system%layer_mass
-      acceleration(1) = acceleration(1) + system%law%offset / system%layer_mass
-      if (system%parameters%base_mass > 0.0_wp) then
-         acceleration(0) = acceleration(0) - system%law%offset / system%parameters%base_mass
-      end if
-   end subroutine push
-
-   !> Taylor coefficients of the motion.
-   subroutine expand(self)
-      class(slider_layered_type), intent(inout) :: self
-
-      real(wp) :: pull
-      integer :: term
-
-      self%series(:, :, 0) = self%state
-      do term = 0, self%terms - 1
-         pull = 0.0_wp
-         if (term == 1) pull = self%system%spring * self%system%drive_velocity &
-            & / self%system%layer_mass
-         if (term == 2) pull = 0.5_wp * self%system%spring * self%system%drive_acceleration &
-            & / self%system%layer_mass
-         call accelerate(self%system, inverse(term + 1), pull, self%series(:, 1, term), &
-            & self%series(:, 2, term), self%series(:, 2, term + 1))
-         if (term == 0) call push(self%system, 0.0_wp, self%series(:, 2, 1))
-         self%series(:, 1, term + 1) = self%series(:, 2, term) * inverse(term + 1)
+      self%terms = max_terms
+      do term = min_terms, max_terms
+         if (rate * step <= self%reach(term)) then
+            self%terms = term
+            exit
+         end if
       end do
-   end subroutine expand
+      call expand(self%system, self%state, self%terms, self%series)
+   end subroutine expand_motion
 
-   !> The state at a time after the start of the step.
-   subroutine take_back(self, time)
+   !> A step of CVODE, as a series.
+   subroutine integrate(self, end_time, step, ends)
       class(slider_layered_type), intent(inout) :: self
-      real(wp), intent(in) :: time
-
-      call sum_series(size(self%state), self%terms, self%series, time, self%state)
-   end subroutine take_back
-
-   !> Values of many series at a time; four terms at once, to go through the values less often.
-   pure subroutine sum_series(number, terms, series, time, values)
-      !> Number of series, and of terms beyond the first
-      integer, intent(in) :: number, terms
-      real(wp), intent(in) :: series(number, 0:terms), time
-      real(wp), intent(out) :: values(number)
-
-      integer :: term
-
-      values = series(:, terms)
-      do term = terms - 1, 3, -4
-         values = (((values * time + series(:, term)) * time + series(:, term - 1)) * time &
-            & + series(:, term - 2)) * time + series(:, term - 3)
-      end do
-      do term = modulo(terms, 4) - 1, 0, -1
-         values = values * time + series(:, term)
-      end do
-   end subroutine sum_series
-
-   !> A step of CVODE, as a series from its start.
-   subroutine step_cvode(self, end_time, step, ends)
-      class(slider_layered_type), intent(inout) :: self
-      !> Time that must not be passed
+      !> Time that must not be passed [s]
       real(wp), intent(in) :: end_time
       !> Length of the step
       real(wp), intent(out) :: step
       !> Whether it comes to that time
       logical, intent(out) :: ends
 
-      real(wp), target :: values(2 * (self%parameters%layers + 1))
-      real(wp) :: reached, factor
-      integer :: order
+      if (self%integrator%is_stale) call self%copy_drive()
+      call self%integrator%step(self%system, self%state, self%time, end_time, self%terms, &
+         & self%series, step, ends, self%failure)
+   end subroutine integrate
 
-      step = 0.0_wp
-      ends = .false.
-      if (self%is_stale) call self%restart()
-      if (allocated(self%failure)) return
-      call self%cvode%step(end_time - self%start_time, reached, step, self%terms, self%failure)
-      if (allocated(self%failure)) then
-         self%failure%message = self%failure%message // "; a looser slider.solver." &
-            & // "relative_tolerance, or another slider.solver.method, may help"
-         return
-      end if
-      ends = reached >= end_time - self%start_time
-      step = reached - self%local_time
-      factor = 1.0_wp
-      self%series(:, :, self%terms + 1:) = 0.0_wp
-      do order = 0, self%terms
-         factor = factor / max(1, order)
-         call self%cvode%derivative(self%local_time, order, values, self%failure)
-         if (allocated(self%failure)) return
-         self%series(:, 1, order) = factor * values(1::2)
-         self%series(:, 2, order) = factor * values(2::2)
-      end do
-      self%local_time = reached
-   end subroutine step_cvode
-
-   !> Start CVODE anew from the state.
-   subroutine restart(self)
+   !> Shorten a step to the first time at which layer 1 leaves a window or turns round.
+   subroutine find_end(self, window, step, crosses, turns, direction)
       class(slider_layered_type), intent(inout) :: self
+      type(window_type), intent(in) :: window
+      real(wp), intent(inout) :: step
+      !> Whether it ends at an end of the window, or at a turning point
+      logical, intent(out) :: crosses, turns
+      !> Direction of the motion at first, +1 or -1
+      real(wp), intent(out) :: direction
 
-      self%start_time = self%time
-      self%local_time = 0.0_wp
-      call self%copy_drive()
-      if (.not. associated(self%vector)) allocate (self%vector(size(self%state)))
-      self%vector(1::2) = self%state(:, 1)
-      self%vector(2::2) = self%state(:, 2)
-      if (self%cvode%is_open()) then
-         call self%cvode%restart(0.0_wp, self%failure)
+      real(wp) :: above, below, change
+      integer :: term
+
+      do term = 0, self%terms - 1
+         self%sliding(term) = (term + 1) &
+            & * (self%series(1, 1, term + 1) - self%series(0, 1, term + 1))
+      end do
+      crosses = .false.
+      turns = .false.
+      direction = 1.0_wp
+      change = 0.0_wp
+      do term = self%terms - 1, 1, -1
+         change = (change + abs(self%sliding(term))) * step
+      end do
+      above = window%upper - self%displacement
+      below = window%lower - self%displacement
+      if ((abs(self%sliding(0)) + change) * step < min(above, -below)) return
+      call first_end(self%sliding, self%terms, above, below, change, step, crosses, turns, &
+         & direction)
+   end subroutine find_end
+
+   !> Move to a time after the start of the step.
+   subroutine move_to(self, step, crosses, turns, target)
+      class(slider_layered_type), intent(inout) :: self
+      real(wp), intent(in) :: step
+      !> Whether an end of the window is there, or a turning point
+      logical, intent(in) :: crosses, turns
+      !> Displacement of that end [m]
+      real(wp), intent(in) :: target
+
+      call sum_series(size(self%state), self%terms, self%series, step, self%state)
+      if (crosses) then
+         self%displacement = target
+         self%state(1, 1) = self%state(0, 1) + self%displacement
       else
-         call self%cvode%open(c_funloc(rates), c_loc(self%system), self%parameters%solver, &
-            & half_bandwidth, 0.0_wp, self%vector, self%parameters%relative, &
-            & self%parameters%absolute, self%failure)
-         if (.not. allocated(self%failure) .and. self%parameters%solver == solver_bdf) then
-            call self%cvode%set_jacobian(c_funloc(jacobian), self%failure)
-         end if
+         self%displacement = self%state(1, 1) - self%state(0, 1)
       end if
-      self%is_stale = .false.
-      self%steps = 0
-   end subroutine restart
+      if (turns) self%state(1, 2) = self%state(0, 2)
+      if (crosses .or. turns) self%integrator%is_stale = .true.
+      self%base_velocity = self%state(0, 2)
+      self%velocity = self%state(1, 2) - self%base_velocity
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
+      self%acceleration = slope(self%sliding, self%terms, step)
+      self%start_acceleration = self%sliding(1)
+   end subroutine move_to
 
-   !> Rates of the state in CVODE's order.
-   function rates(time, state, rate, user_data) bind(c, name="mesoslip_layers_rates") &
-      & result(status)
-      real(c_double), value :: time
-      type(N_Vector) :: state, rate
-      type(c_ptr), value :: user_data
-      integer(c_int) :: status
-
-      type(system_type), pointer :: system
-      real(c_double), pointer :: y(:), dy(:)
-      real(wp), allocatable :: acceleration(:)
-
-      call c_f_pointer(user_data, system)
-      y => FN_VGetArrayPointer(state)
-      dy => FN_VGetArrayPointer(rate)
-      allocate (acceleration(0:system%parameters%layers))
-      call accelerate(system, 1.0_wp, 0.0_wp, y(1::2), y(2::2), acceleration)
-      call push(system, time, acceleration)
-      dy(1::2) = y(2::2)
-      dy(2::2) = acceleration
-      status = 0
-   end function rates
-
-   !> The Jacobian of rates, a banded matrix.
-   function jacobian(time, state, rate, matrix, user_data, first, second, third) &
-      & bind(c, name="mesoslip_layers_jacobian") result(status)
-      real(c_double), value :: time
-      type(N_Vector) :: state, rate, first, second, third
-      type(SUNMatrix) :: matrix
-      type(c_ptr), value :: user_data
-      integer(c_int) :: status
-
-      type(system_type), pointer :: system
-      real(c_double), pointer :: start(:), entries(:)
-      real(wp) :: spring, dashpot, base
-      integer :: stride, upper, layer, last
-
-      call c_f_pointer(user_data, system)
-      stride = int(FSUNBandMatrix_LDim(matrix))
-      upper = int(FSUNBandMatrix_StoredUpperBandwidth(matrix))
-      last = system%parameters%layers
-      ! What SUNDIALS returns is a pointer to the first entry.
-      start => FSUNBandMatrix_Data(matrix)
-      call c_f_pointer(c_loc(start), entries, [stride * 2 * (last + 1)])
-      entries = 0.0_c_double
-      spring = system%spring / system%layer_mass
-      dashpot = system%dashpot / system%layer_mass
-      do layer = 0, last
-         call add(2 * layer + 1, 2 * layer + 2, 1.0_wp)
-      end do
-      do layer = 1, last - 1
-         call couple(layer, layer, -spring, -dashpot)
-         call couple(layer, layer + 1, spring, dashpot)
-         call couple(layer + 1, layer + 1, -spring, -dashpot)
-         call couple(layer + 1, layer, spring, dashpot)
-      end do
-      ! The spring to the drive.
-      call couple(last, last, -spring, 0.0_wp)
-      associate (law => system%law, parameters => system%parameters)
-         call couple(1, 1, -law%stiffness / system%layer_mass, -law%drag / system%layer_mass)
-         call couple(1, 0, law%stiffness / system%layer_mass, law%drag / system%layer_mass)
-         if (parameters%base_mass > 0.0_wp) then
-            base = 1.0_wp / parameters%base_mass
-            call couple(0, 1, law%stiffness * base, law%drag * base)
-            call couple(0, 0, -(law%stiffness + parameters%base_stiffness) * base, &
-               & -law%drag * base - parameters%base_damping)
-         end if
-      end associate
-      status = 0
-
-   contains
-
-      !> Derivatives of the acceleration of one by displacement and velocity of another.
-      subroutine couple(of, by, by_displacement, by_velocity)
-         integer, intent(in) :: of, by
-         real(wp), intent(in) :: by_displacement, by_velocity
-
-         call add(2 * of + 2, 2 * by + 1, by_displacement)
-         call add(2 * of + 2, 2 * by + 2, by_velocity)
-      end subroutine couple
-
-      !> Add to an entry.
-      subroutine add(row, column, value)
-         integer, intent(in) :: row, column
-         real(wp), intent(in) :: value
-
-         integer :: place
-
-         place = (column - 1) * stride + upper + row - column + 1
-         entries(place) = entries(place) + value
-      end subroutine add
-
-   end function jacobian
-
-   !> Add work and losses of a step to the energy balance.
+   !> Add impulse and work of the drive in a step to the energy balance.
    subroutine add_work(self, step)
       class(slider_layered_type), intent(inout) :: self
       real(wp), intent(in) :: step
 
-      real(wp) :: way, extension, sliding, drag, damped, velocity(0:self%parameters%layers)
-      real(wp) :: drive_velocity, drive_acceleration, drive, lever
-      integer :: last, node, term
+      real(wp) :: displacement, extension, drive_velocity, drive_acceleration, drive, lever
+      integer :: last, term
 
       last = self%parameters%layers
       drive_velocity = self%drive%rate_at(self%step_time)
       drive_acceleration = self%drive%acceleration
       drive = self%drive%at(self%step_time)
-      way = 0.0_wp
+      displacement = 0.0_wp
       do term = self%terms, 0, -1
-         way = way * step + self%series(last, 1, term) * inverse(term + 1)
+         displacement = displacement * step + self%series(last, 1, term) * inverse(term + 1)
       end do
-      way = way * step
+      displacement = displacement * step
       extension = step * (drive + step * (0.5_wp * drive_velocity &
-         & + drive_acceleration * step / 6.0_wp)) - way
+         & + drive_acceleration * step / 6.0_wp)) - displacement
       if (abs(drive_acceleration) > 0.0_wp) then
          lever = 0.0_wp
          do term = self%terms, 0, -1
@@ -667,7 +382,17 @@ contains
       else
          call self%drive%impulse%add(self%system%spring * extension)
       end if
+   end subroutine add_work
 
+   !> Add the losses by drag and damping in a step to the energy balance.
+   subroutine add_losses(self, step)
+      class(slider_layered_type), intent(inout) :: self
+      real(wp), intent(in) :: step
+
+      real(wp) :: sliding, drag, damped, velocity(0:self%parameters%layers)
+      integer :: last, node, term
+
+      last = self%parameters%layers
       drag = 0.0_wp
       damped = 0.0_wp
       do node = 1, points
@@ -686,7 +411,7 @@ contains
             & + self%parameters%base_mass * self%parameters%base_damping * velocity(0)**2)
       end do
       call self%damping_loss%add(damped)
-   end subroutine add_work
+   end subroutine add_losses
 
    !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)
@@ -775,7 +500,7 @@ contains
 
       call shift_slider(self, shift)
       self%state(1:, 1) = self%state(1:, 1) - shift
-      self%is_stale = .true.
+      self%integrator%is_stale = .true.
    end subroutine shift_origin
 
    !> Free what the slider holds.
@@ -783,8 +508,7 @@ contains
       !> The slider
       type(slider_layered_type), intent(inout) :: self
 
-      call self%cvode%close()
-      if (associated(self%vector)) deallocate (self%vector)
+      call self%integrator%close()
       if (associated(self%system)) deallocate (self%system)
    end subroutine close
 
@@ -807,15 +531,12 @@ contains
       call archive%exchange("state", state)
       if (all(shape(state) == shape(self%state))) self%state = state
       call archive%exchange("series", self%series)
-      call archive%exchange("start_displacement", self%start_displacement)
       call archive%exchange("terms", self%terms)
       call archive%exchange("steps", self%integrator_counts(1))
       call archive%exchange("evaluations", self%integrator_counts(2))
       call archive%exchange("failed_steps", self%integrator_counts(3))
       if (archive%saving) return
-      self%counts_before = self%integrator_counts
-      call self%cvode%close()
-      self%is_stale = .true.
+      call self%integrator%reset(self%integrator_counts)
    end subroutine exchange
 
    !> Derivative of a series.
@@ -831,7 +552,5 @@ contains
          slope = slope * time + term * series(term)
       end do
    end function slope
-
-   include "motion_series.inc"
 
 end module mesoslip_sliders_layered

@@ -53,6 +53,7 @@ program test_simulation
    call runs_ahead("rigid", law_exponential, 1.0_wp, 0.0_wp)
    call runs_ahead("prescribed", law_gaussian, 0.1_wp, 5.0e-4_wp)
    call runs_ahead("prescribed", law_exponential, 1.0_wp, 1.0e-5_wp)
+   call is_bounded()
    call refuses()
    call holds()
    call finish()
@@ -238,6 +239,49 @@ contains
       call simulation%avalanches%open(avalanche_parameters_type(), [real(wp) ::], count)
       simulation%max_schedule = longest
    end subroutine prepare
+
+   !> A slider so light that it needs very many steps between two samples does no more work in a
+   !> segment than it may, and the segments do not change its motion.
+   subroutine is_bounded()
+      real(wp), parameter :: work = 1000.0_wp
+      integer, parameter :: segments = 20
+      type(simulation_type) :: whole, cut
+      type(error_type), allocatable :: error
+      integer(i8) :: advances
+      integer :: segment
+
+      call lighten(cut)
+      call cut%start(initial_relaxed)
+      do segment = 1, segments
+         advances = cut%advances
+         call cut%run(forever, work, error)
+         call check(.not. allocated(error) .and. cut%advances > advances &
+            & .and. cut%advances - advances <= work, "work bounds a segment")
+      end do
+      call lighten(whole)
+      call whole%start(initial_relaxed)
+      call whole%run(cut%advances, any_work, error)
+      call check(whole%advances == cut%advances .and. .not. (whole%slider%time &
+         & > cut%slider%time .or. whole%slider%time < cut%slider%time) &
+         & .and. abs(whole%slider%displacement - cut%slider%displacement) <= 0.0_wp &
+         & .and. all(abs(whole%energy_balance() - cut%energy_balance()) <= 0.0_wp), &
+         & "segments do not change a motion of very many steps")
+   end subroutine is_bounded
+
+   !> Klein's case with a light slider.
+   subroutine lighten(simulation)
+      type(simulation_type), intent(out) :: simulation
+
+      type(parameters_type) :: parameters
+      type(error_type), allocatable :: error
+
+      call prepare(simulation, "rigid", law_gaussian, 0.1_wp, 5.0e-4_wp, max_events)
+      call new_parameters(parameters, [character(len=name_length) :: "mass", "stiffness", &
+         & "damping"], [1.0e-16_wp, 97.0_wp, 0.0_wp])
+      call make_slider(simulation%slider, "rigid", parameters, error)
+      call check(.not. allocated(error), "a light slider")
+      call set_drive(simulation, [0.03_wp, 0.05_wp, 0.15_wp])
+   end subroutine lighten
 
    !> Whether two tables are the same to the bit.
    function same(one, other)

@@ -4,8 +4,8 @@ module mesoslip_sliders_rigid_long_step
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, lever, &
       & second_integral
-   use mesoslip_sliders_rigid_state, only: arrive, long_terms, many_terms, motion_rates_type, pull, &
-      & pull_unevenly, rigid_state_type, some_terms, system_type, uniform_gap
+   use mesoslip_sliders_rigid_state, only: arrive, long_terms, many_terms, motion_rates_type, &
+      & pull, pull_unevenly, rigid_state_type, some_terms, system_type, uniform_gap
    implicit none
    private
 

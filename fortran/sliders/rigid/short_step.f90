@@ -1,10 +1,10 @@
-!> Short steps of a rigid slider, in which it keeps its pace: one in eight is none, in Klein's case.
+!> Short steps of a rigid slider, in which it keeps its pace: seven in eight, in Klein's case.
 !>
-!> With p the time in which the distance to the next break would be made at the present velocity, the
-!> series of the displacement is distance/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion
-!> gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), exact to
-!> rounding or nearly so. Other steps are for the module of long steps, as are those under a drive
-!> that accelerates.
+!> With p the time in which the distance to the next break would be made at the present velocity,
+!> the series of the displacement is distance/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its
+!> reversion gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...),
+!> exact to rounding or nearly so. Other steps are for the module of long steps, as are those under
+!> a drive that accelerates.
 module mesoslip_sliders_rigid_short_step
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: wp
@@ -73,7 +73,8 @@ contains
 
       call derive(self, system, early, derivatives)
       if (nears) then
-         call revert(self%series, early, derivatives, distance, passage, inverse_pace, step, is_done)
+         call revert(self%series, early, derivatives, distance, passage, inverse_pace, step, &
+            & is_done)
          if (.not. is_done) return
          crosses = step <= rest
          if (.not. crosses) step = rest
@@ -92,8 +93,8 @@ contains
       call move(self, system, window, early, derivatives, step, crosses, target)
    end subroutine try_short_step
 
-   !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in, and
-   !> the series of the velocity.
+   !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in,
+   !> and the series of the velocity.
    subroutine derive(self, system, early, derivatives)
       class(rigid_state_type), intent(inout) :: self
       type(system_type), intent(in) :: system

@@ -11,8 +11,8 @@ module mesoslip_sliders_rigid_state
    public :: constants, rates, uniform_gap, pull, pull_unevenly, arrive
    public :: few_terms, some_terms, many_terms, long_terms
 
-   !> Terms of the series of steps from short to long. What a series leaves out is less than 1e-16 of
-   !> its two leading terms.
+   !> Terms of the series of steps from short to long. What a series leaves out is less than 1e-16
+   !> of its two leading terms.
    integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, long_terms = 17
 
    !> Coefficients of the equation of motion, per mass of the slider:
@@ -125,7 +125,8 @@ contains
    subroutine pull_unevenly(self, system, step, swept, moment)
       class(rigid_state_type), intent(inout) :: self
       type(system_type), intent(in) :: system
-      !> Length of the step [s], integrals of the displacement [m s] and of that times the time [m s2]
+      !> Length of the step [s], integrals of the displacement [m s] and of that times the time
+      !> [m s2]
       real(wp), intent(in) :: step, swept, moment
 
       real(wp) :: extension

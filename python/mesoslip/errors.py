@@ -6,22 +6,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 # Characters of the longest value in a message.
-LONGEST = 100
+MAX_SHOWN = 100
 
 
 class MesoslipError(Exception):
-    """Anything that mesoslip itself finds wrong."""
+    """Any error that mesoslip itself finds."""
 
     exit_status = 1
 
     def __str__(self) -> str:
-        # Names of files may be no text, which no terminal could show.
-        return super().__str__().encode("utf-8", "backslashreplace").decode()
+        return "\n".join(map(printable, super().__str__().split("\n")))
+
+
+def printable(text: str) -> str:
+    """A text as a terminal may show it: characters that would steer it are escaped.
+
+    So are bytes of names of files that are not text, and characters that change the direction of
+    writing.
+    """
+    return "".join(
+        one if one.isprintable() else one.encode("unicode_escape").decode() for one in text
+    )
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong in a configuration: where, what, and what would be right."""
+    """One error in a configuration: where, what, and what would be right."""
 
     source: str
     key: str
@@ -29,24 +39,24 @@ class Problem:
     value: object = None
 
     def __str__(self) -> str:
-        place = ": ".join(part for part in (self.source, self.key) if part)
+        place = ": ".join(printable(part) for part in (self.source, self.key) if part)
         if self.value is None:
             return f"{place}: {self.message}"
         return f"{place} = {shown(self.value)}: {self.message}"
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it: not all of a long one."""
+    """A value as a message shows it, shortened if it is long."""
     try:
         text = repr(value)
     # Python writes no integer of thousands of digits, and no tables in tables without end.
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} that is too long to show"
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 10]} ... {text[-5:]}"
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 10]} ... {text[-5:]}"
 
 
 class ConfigError(MesoslipError):
-    """A configuration that cannot be run; ``problems`` holds everything that is wrong with it."""
+    """A configuration that cannot be run; ``problems`` has all its errors."""
 
     exit_status = 2
 

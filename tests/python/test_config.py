@@ -612,7 +612,7 @@ def much_too_long(path):
         (lambda path: path.symlink_to("/dev/zero"), "not a regular file"),
         (links_in_a_loop, "Too many levels"),
         (much_too_long, "128 MiB are too much"),
-        (lambda path: path.write_bytes(b"title = '\xff'"), "not a text in UTF-8"),
+        (lambda path: path.write_bytes(b"title = '\xff'"), "text in UTF-8"),
         (lambda path: path.write_text('base = "a\\u0000b"'), "name of a file"),
         (lambda path: path.write_text('base = ""'), "name of a file"),
         (lambda path: path.write_text("base = 5"), "name of a file"),

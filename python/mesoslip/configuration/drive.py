@@ -6,10 +6,8 @@ changes linearly with time. Parts of one stage have its number.
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
-import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import Field, StrictBool, model_validator
 
+from mesoslip.configuration.columns import Quantity, cells_of, places_of, values_of
 from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.table import (
     ForceRate,
@@ -31,16 +30,16 @@ from mesoslip.configuration.table import (
     Whole,
     problem,
 )
-from mesoslip.configuration.units import to_si
 from mesoslip.errors import FileError
 
 # Parts of the longest drive.
 MOST_PARTS = 1_000_000
 
-# A column of a measured history: "displacement [um]".
-COLUMN = re.compile(r"\s*(?P<name>[a-z_ ]*[a-z_])\s*\[(?P<unit>[^\]]*)\]\s*")
-# The columns that are read, with the SI unit of each.
-COLUMNS = {"time": "s", "displacement": "m"}
+# The columns of a measured history that are read.
+COLUMNS = {
+    "time": Quantity("time", "s", "time [s]"),
+    "displacement": Quantity("displacement", "m", "displacement [um]"),
+}
 
 
 class DrivePart(NamedTuple):
@@ -225,7 +224,7 @@ class History(Table):
             raise problem("file", "give either a file, or time and displacement")
         try:
             points = read_history(Path(values["file"]))
-        except (FileError, ValueError) as error:
+        except FileError as error:
             raise problem("file", str(error)) from None
         return {**{key: one for key, one in values.items() if key != "file"}, **points}
 
@@ -261,72 +260,30 @@ def read_history(path: Path) -> dict[str, list[float]]:
     Parameters
     ----------
     path
-        A CSV file. Its header names the columns with their units, ``time [s]`` first and
-        ``displacement [um]`` anywhere; others are not read.
+        A table, see `mesoslip.configuration.columns`. Its header names the columns with their
+        units, ``time [s]`` first and ``displacement [um]`` anywhere; others are not read.
 
     Raises
     ------
     FileError
-        If the file cannot be read.
-    ValueError
-        If it is no such table: which line, and what would be right.
+        If the file cannot be read, or is not such a table: which line, and what would be right.
     """
-    rows = list(csv.reader(text_of(path, "a history of the drive").splitlines()))
-    while rows and not any(cell.strip() for cell in rows[-1]):
-        rows.pop()
-    if not rows:
-        raise ValueError(f"{path}: is empty")
-    try:
-        places = _columns(rows[0])
-    except ValueError as error:
-        raise ValueError(f"{path}, line 1: {error}") from None
-    if len(rows) < 3:
-        raise ValueError(f"{path}: must have two rows of numbers at least")
-    points: dict[str, list[float]] = {name: [] for name in COLUMNS}
-    for line, row in enumerate(rows[1:], 2):
-        for name, (place, factor) in places.items():
-            cell = row[place].strip() if place < len(row) else ""
-            if not cell:
-                raise ValueError(f"{path}, line {line}: the {name} is missing")
-            try:
-                number = factor * float(cell)
-            except ValueError:
-                number = math.nan
-            if not math.isfinite(number):
-                raise ValueError(f"{path}, line {line}: the {name}, {cell!r}, is no finite number")
-            points[name].append(number)
-        times = points["time"]
-        if len(times) > 1 and not times[-1] > times[-2]:
-            raise ValueError(f"{path}, line {line}: the time must grow from row to row")
-    return points
-
-
-def _columns(header: list[str]) -> dict[str, tuple[int, float]]:
-    """Place of each column that is read, and its unit in SI."""
+    cells = cells_of(text_of(path, "a history of the drive"), str(path))
     wanted = "the header must name the columns with units, such as time [s],displacement [um]"
-    places: dict[str, tuple[int, float]] = {}
-    for place, cell in enumerate(header):
-        match = COLUMN.fullmatch(cell.strip().removeprefix("\ufeff"))
-        name = match["name"] if match else cell.strip().removeprefix("\ufeff")
-        if name not in COLUMNS:
-            continue
-        if match is None:
-            raise ValueError(f"the {name} has no unit; {wanted}")
-        if name in places:
-            raise ValueError(f"there are two columns {name}")
-        unit = match["unit"].strip()
-        try:
-            places[name] = place, to_si(f"1 {unit}", COLUMNS[name], f"1 {COLUMNS[name]}")
-        except ValueError:
-            raise ValueError(
-                f"the {name} is in {unit!r}, which is no unit of {name}; {wanted}"
-            ) from None
+    places = places_of(cells.first, COLUMNS, str(path)) if cells.has_header else {}
     for name in COLUMNS:
         if name not in places:
-            raise ValueError(f"there is no column {name}; {wanted}")
-    if places["time"][0] != 0:
-        raise ValueError("the first column must be the time")
-    return places
+            raise FileError(f"{path}: there is no column {name}; {wanted}")
+    if places["time"].column != 0:
+        raise FileError(f"{path}: the first column must be the time")
+    if len(cells.lines) < 2:
+        raise FileError(f"{path}: must have two rows of numbers at least")
+    points = values_of(cells, cells.first, places)
+    times = itertools.pairwise(points["time"])
+    for (line, _), (before, after) in zip(cells.lines[1:], times, strict=True):
+        if not after > before:
+            raise FileError(f"{path}: line {line}: the time must grow from row to row")
+    return points
 
 
 class Drive(Table):

@@ -12,7 +12,7 @@ from mesoslip.errors import FileError, shown
 PathLike: TypeAlias = str | os.PathLike[str]
 
 # Size of the longest file that is read [bytes]; a million stages take less.
-LONGEST_FILE = 2**26
+MAX_BYTES = 2**26
 
 
 def as_path(path: PathLike) -> Path:
@@ -28,7 +28,7 @@ def as_path(path: PathLike) -> Path:
     return Path(path)
 
 
-def text_of(path: Path, kind: str) -> str:
+def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
     """Text of a file.
 
     Parameters
@@ -36,7 +36,9 @@ def text_of(path: Path, kind: str) -> str:
     path
         The file.
     kind
-        What it is to be, such as "a configuration file".
+        What it should be, such as "a configuration file".
+    max_bytes
+        Size of the longest file that is read.
 
     Raises
     ------
@@ -49,10 +51,10 @@ def text_of(path: Path, kind: str) -> str:
             raise FileError(f"{path}: is a directory, not {kind}")
         if not stat.S_ISREG(state.st_mode):
             raise FileError(f"{path}: is not a regular file")
-        if state.st_size > LONGEST_FILE:
+        if state.st_size > max_bytes:
             raise FileError(
                 f"{path}: {state.st_size / 2**20:.0f} MiB are too much for {kind}, "
-                f"which may have {LONGEST_FILE / 2**20:.0f} MiB"
+                f"which may have {max_bytes / 2**20:.0f} MiB"
             )
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -60,6 +62,6 @@ def text_of(path: Path, kind: str) -> str:
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not a text in UTF-8: {error.reason}") from None
+        raise FileError(f"{path}: is not {kind} (text in UTF-8): {error.reason}") from None
     except ValueError as error:
         raise FileError(f"{path!r}: is not the name of a file: {error}") from None

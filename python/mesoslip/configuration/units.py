@@ -15,10 +15,14 @@ from functools import cache
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from mesoslip.errors import shown
+
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
 NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|nan|inf)")
+# A number with commas that may group its digits.
+GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 RECIPROCAL = re.compile(r"1\s*/")
 # A name, and an exponent as in m^2, m**2, m2, or s-1.
 FACTOR = re.compile(
@@ -55,6 +59,38 @@ SI = {
     "Hz": Unit(Decimal(1), (0, 0, -1)),
 }
 NONE = Unit(Decimal(1), (0, 0, 0))
+
+
+def number_of(text: str, decimal: str = ".") -> float:
+    """The number that a text is: of the digits 0 to 9, with a decimal point or the sign given.
+
+    Raises
+    ------
+    ValueError
+        If it is not one, with what would be right.
+    """
+    plain = text.replace(",", ".") if decimal == "," and text.count(",") <= 1 else text
+    # Python reads digits of all scripts, and underscores between them.
+    if plain.isascii() and "_" not in plain and not (decimal == "," and "." in text):
+        try:
+            return float(plain)
+        except ValueError:
+            pass
+    raise ValueError(f"{shown(text)}, is not a number{_with_comma(text, decimal)}")
+
+
+def _with_comma(text: str, decimal: str) -> str:
+    """What a number with a comma may mean."""
+    if decimal == "," and "." in text:
+        return ": other numbers here have a decimal comma"
+    pointed, joined = text.replace(",", "."), text.replace(",", "")
+    if "," not in text or not joined.isascii() or not NUMBER.fullmatch(joined):
+        return ""
+    if not GROUPED.fullmatch(text):
+        return f"; write {pointed} if its comma is a decimal one" if text.count(",") == 1 else ""
+    if text.count(",") > 1:
+        return f"; write {joined} if its commas group digits"
+    return f"; write {pointed} if its comma is a decimal one, {joined} if it groups digits"
 
 
 def to_si(value: object, unit: str, example: str) -> float:
@@ -100,13 +136,19 @@ def _parse(text: str, unit: str, wanted: str) -> float:
         or len(text) > LONGEST
         or (name and not (is_reciprocal or FACTOR.match(name)))
     ):
-        raise ValueError(f"is not one number and one unit; {wanted}")
+        raise ValueError(f"is not one number and one unit{_comma_in(text)}; {wanted}")
     given = _unit(name)
     if given is None:
         raise ValueError(f"has the unit {name!r}, which is not known; {wanted}")
     if given.dimension != _known(unit).dimension:
         raise ValueError(f"has {f'the unit {name}' if name else 'no unit'}; {wanted}")
     return float(EXACT.multiply(EXACT.create_decimal(number[0]), given.factor))
+
+
+def _comma_in(text: str) -> str:
+    """What a comma in the number of a quantity may mean."""
+    meaning = _with_comma(text.partition(" ")[0], ".")
+    return f" ({meaning.removeprefix('; ')})" if meaning else ""
 
 
 def _known(unit: str) -> Unit:

@@ -1,0 +1,217 @@
+"""Tables with units: columns of numbers under headers such as ``time [s]``, read strictly.
+
+Whatever can be read in two ways is refused, with the line and with what would be right.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from mesoslip.configuration.units import GROUPED, number_of, to_si
+from mesoslip.errors import FileError, shown
+
+# Stands for a column that is not read.
+IGNORED = "-"
+HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
+DELIMITERS = ",;\t"
+
+
+class Quantity(NamedTuple):
+    """What a column may hold: its name in messages, its SI unit, and what a good header is."""
+
+    name: str
+    unit: str
+    header: str
+
+
+class Place(NamedTuple):
+    """Where a column is, and the size of its unit in SI."""
+
+    column: int
+    size: float
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A table as text.
+
+    Attributes
+    ----------
+    source
+        Name of the file, for messages.
+    delimiter
+        Separator of columns; a blank stands for any number of blanks.
+    first
+        Cells of the first row.
+    has_header
+        Whether the first row is a header.
+    lines
+        Number and text of the lines of numbers.
+    """
+
+    source: str
+    delimiter: str
+    first: tuple[str, ...]
+    has_header: bool
+    lines: Sequence[tuple[int, str]]
+
+
+def cells_of(text: str, source: str) -> Cells:
+    """A table as text: comma, semicolon, tab or blanks between columns.
+
+    Lines that are empty or start with ``#`` are skipped.
+
+    Raises
+    ------
+    FileError
+        If it is empty, or its first row cannot be read.
+    """
+    lines = [
+        (number, line.strip(" \r"))
+        for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise FileError(f"{source}: is empty; expected columns with units, such as 'time [s]'")
+    number, line = lines[0]
+    found = {one: line.count(one) for one in DELIMITERS}
+    # A comma beside a semicolon or a tab is no separator.
+    delimiter = "," if found[","] else " "
+    if found[";"] or found["\t"]:
+        delimiter = ";" if found[";"] >= found["\t"] else "\t"
+    first = _split(line, delimiter, source, number)
+    has_header = not any(_is_number(cell, delimiter) for cell in first)
+    return Cells(source, delimiter, tuple(first), has_header, lines[has_header:])
+
+
+def _split(line: str, delimiter: str, source: str, number: int) -> list[str]:
+    """Cells of a line."""
+    if delimiter == " ":
+        # Units stand apart from names.
+        return re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", line)
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(delimiter)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=True))]
+    except csv.Error as error:
+        raise FileError(f"{source}: line {number}: cannot be read: {error}") from None
+
+
+def _is_number(cell: str, delimiter: str) -> bool:
+    try:
+        return math.isfinite(number_of(cell if delimiter == "," else cell.replace(",", ".")))
+    except ValueError:
+        return False
+
+
+def places_of(
+    headers: Sequence[str], known: Mapping[str, Quantity], source: str
+) -> dict[str, Place]:
+    """Where the known columns are, by the name of their quantity; others are not read.
+
+    Parameters
+    ----------
+    headers
+        Headers such as "time [s]".
+    known
+        Quantities by the names that headers may have, in lower case, with underscores for blanks.
+    source
+        Name of the file, for messages.
+
+    Raises
+    ------
+    FileError
+        If a column is there twice, or has no unit or a wrong one.
+    """
+    places: dict[str, Place] = {}
+    for column, header in enumerate(headers):
+        match = HEADER.fullmatch(header)
+        name = "" if match is None else match["name"].strip().lower().replace(" ", "_")
+        if match is None or name not in known:
+            continue
+        quantity = known[name]
+        if quantity.name in places:
+            raise FileError(f"{source}: has two columns of {quantity.name}")
+        right = f"write it as {quantity.header!r}"
+        if not match["unit"]:
+            raise FileError(f"{source}: column {shown(header)} has no unit; {right}")
+        try:
+            size = to_si(f"1 {match['unit'].strip()}", quantity.unit, f"1 {quantity.unit}")
+        except ValueError:
+            raise FileError(
+                f"{source}: column {shown(header)} has the unit {shown(match['unit'])}, which is "
+                f"not a unit of {quantity.name}; {right}"
+            ) from None
+        places[quantity.name] = Place(column, size)
+    return places
+
+
+def values_of(
+    cells: Cells, headers: Sequence[str], places: Mapping[str, Place], *, keep_missing: bool = False
+) -> dict[str, list[float]]:
+    """Values of columns in SI.
+
+    Parameters
+    ----------
+    cells
+        The table.
+    headers
+        Headers of all its columns.
+    places
+        The columns to read, see `places_of`.
+    keep_missing
+        Whether empty cells, and those that are not a number (NaN), are kept as NaN.
+
+    Raises
+    ------
+    FileError
+        If a row has more cells than there are headers or lacks one that is read, or a cell is not
+        one finite number that can be read in one way only.
+    """
+    values: dict[str, list[float]] = {name: [] for name in places}
+    decimal = "." if cells.delimiter == "," else _decimal_of(cells, places.values())
+    for number, line in cells.lines:
+        row = _split(line, cells.delimiter, cells.source, number)
+        where = f"{cells.source}: line {number}"
+        if len(row) > len(headers) and any(row[len(headers) :]):
+            raise FileError(f"{where}: has {len(row)} cells under {len(headers)} headers{POINT}")
+        for name, (column, size) in places.items():
+            cell = row[column] if column < len(row) else ""
+            if cell == "" and not keep_missing:
+                raise FileError(f"{where}: the {name} is missing")
+            try:
+                value = size * (math.nan if cell == "" else number_of(cell, decimal))
+            except ValueError as error:
+                raise FileError(f"{where}: the {name}, {error}") from None
+            if not math.isfinite(value) and not (keep_missing and math.isnan(value)):
+                raise FileError(f"{where}: the {name}, {shown(cell)}, is not a finite number")
+            values[name].append(value)
+    return values
+
+
+# What is said of commas where they separate columns.
+POINT = "; numbers have a decimal point, and a comma would begin another cell"
+
+
+def _decimal_of(cells: Cells, places: Iterable[Place]) -> str:
+    """The decimal sign of a table in which commas separate no columns.
+
+    A comma is one if there is a number in which it cannot group thousands, and no number has a
+    point. `number_of` refuses what is not in accordance with it.
+    """
+    columns = [place.column for place in places]
+    comma = False
+    for number, line in cells.lines:
+        if "," not in line:
+            continue
+        row = _split(line, cells.delimiter, cells.source, number)
+        numbers = [row[one] for one in columns if one < len(row)]
+        if any("." in cell for cell in numbers):
+            return "."
+        comma = comma or any("," in cell and not GROUPED.fullmatch(cell) for cell in numbers)
+    return "," if comma else "."

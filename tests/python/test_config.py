@@ -26,6 +26,8 @@ from mesoslip.configuration.units import PREFIXES, SI, to_si
 from mesoslip.theory.derived import derived
 from pydantic import ValidationError
 
+KLEIN = ROOT / "runs" / "klein.toml"
+
 LAYERED = {"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 4}
 
 
@@ -737,7 +739,7 @@ def test_nothing_breaks_the_checks(key, value, slider):
     changes = {"slider": slider} if slider else {}
     for config in (
         lambda: Config.from_dict(klein_tables(**changes)).replace({key: value}),
-        lambda: Config.from_dict(override(klein_tables(**changes), [{key: value}])),
+        lambda: Config.from_dict(override(Laid(klein_tables(**changes)), [{key: value}]).tables),
     ):
         with contextlib.suppress(ConfigError):
             checked = config()
@@ -960,3 +962,52 @@ def test_a_configuration_is_checked_however_it_is_made():
         Config(**tables)
     with pytest.raises(ValidationError):
         Config.model_validate(tables)
+
+
+def test_a_new_kind_names_the_keys_that_it_drops(command):
+    config = Config.load(KLEIN, ["slider.kind=layered", "slider.layers=4"])
+    assert config.dropped == ("slider.damping_ratio",)
+    assert Config.load(KLEIN, ["contacts.delay=1ms"]).dropped == ()
+    assert Config.load(KLEIN).replace("slider.kind=prescribed").dropped == (
+        "slider.mass",
+        "slider.stiffness",
+        "slider.damping_ratio",
+    )
+    changes = ["--set", "slider.kind=layered", "--set", "slider.layers=4"]
+    _, _, told = command("info", KLEIN, *changes)
+    assert told == 'dropped with slider.kind = "layered": slider.damping_ratio\n'
+
+
+def test_none_removes_a_key():
+    old = Config.load(KLEIN)
+    assert old.output.slip_interval is not None
+    assert Config.load(KLEIN, ["output.slip_interval=none"]).output.slip_interval is None
+    assert old.replace({"output.slip_interval": None}).output.slip_interval is None
+    # What is set after it counts; of keys that exclude each other the other one stays.
+    changes = ["slider.damping_ratio=0.1", "slider.damping=none"]
+    assert Config.load(KLEIN, changes).slider.damping_ratio == 0.1
+    changes = ["run.seed=none", "run.seed=7"]
+    assert Config.load(KLEIN, changes).run.seed == 7
+    assert Config.load(KLEIN, ["run.seed=none"]).run.seed == 1
+    assert Config.load(KLEIN, ["contacts.back_force_ratio=none"])
+    with pytest.raises(ConfigError, match="unknown key; did you mean 'delay'"):
+        Config.load(KLEIN, ["contacts.dely=none"])
+    with pytest.raises(ConfigError, match=r"contacts\.count: missing"):
+        Config.load(KLEIN, ["contacts.count=none"])
+
+
+def test_bounds_are_distinguished_from_what_exceeds_them(klein):
+    with pytest.raises(ConfigError) as error:
+        klein(output__interval=0.001, output__slip_interval=math.nextafter(0.001, 1))
+    value, bound = re.search(
+        r"= (\S+): must not exceed the interval, (\S+) s", str(error.value)
+    ).groups()
+    assert float(bound) < float(value)
+
+
+def test_control_characters_are_escaped(tmp_path, command):
+    path = tmp_path / "case.toml"
+    path.write_text('title = "x"\n"\\u001b[31mred\\u202e" = 1\n', encoding="utf-8")
+    _, _, told = command("info", path)
+    assert "\\x1b[31mred\\u202e: unknown key" in told
+    assert all(one.isprintable() or one == "\n" for one in told)

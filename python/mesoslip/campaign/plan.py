@@ -23,7 +23,7 @@ from pydantic import Field, StrictBool, StrictStr, ValidationError, model_valida
 
 from mesoslip.campaign.measures import Measure, find_measures
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import Change, on_base, override, read_toml
+from mesoslip.configuration.files import Change, Laid, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Number, Table, Whole, problem
@@ -205,12 +205,12 @@ class Plan:
             If anything in it is wrong.
         """
         path = Path(path)
-        return cls(override(read_toml(path), overrides), str(path), path.parent)
+        return cls(override(read_toml(path), overrides).tables, str(path), path.parent)
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "sweep") -> Plan:
         """Check a sweep given as nested tables; ``base`` and measures are files under them."""
-        return cls(on_base(tables, source, Path()), source, Path())
+        return cls(on_base(tables, source, Path()).tables, source, Path())
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -235,7 +235,9 @@ class Plan:
             }
             changes = {**values, "run.realizations": 1}
             try:
-                config = Config.from_dict(override(self.tables, [changes]), self._source)
+                config = Config.from_dict(
+                    override(Laid(self.tables), [changes]).tables, self._source
+                )
             except ConfigError as error:
                 wrong += 1
                 if wrong <= MOST_TOLD:
@@ -380,7 +382,7 @@ def _ends(
     )
     if len(found) > before:
         return None
-    if wanted.spacing == "logarithmic" and first * last <= 0:
+    if wanted.spacing == "logarithmic" and not (min(first, last) > 0 or max(first, last) < 0):
         message = "a logarithmic range needs both ends greater than 0, or both less"
         found.append(Problem(source, place, message))
         return None
@@ -388,6 +390,15 @@ def _ends(
         found.append(Problem(source, place, "both ends are the same"))
         return None
     return first, last
+
+
+def _between(first: float, last: float, part: float) -> float:
+    """A value of a logarithmic range, at a part of the distance from one end to the other."""
+    ratio = last / first
+    if 0 < ratio < math.inf:
+        return first * ratio**part
+    size = (1 - part) * math.log(abs(first)) + part * math.log(abs(last))
+    return math.copysign(math.exp(size), first)
 
 
 def _spread(
@@ -400,7 +411,7 @@ def _spread(
         if part in {0.0, 1.0}:
             value = last if part else first
         elif spacing == "logarithmic":
-            value = first * (last / first) ** float(part)
+            value = _between(first, last, float(part))
         else:
             value = first + (last - first) * float(part)
         values.append(round(value) if kind.is_whole else value)

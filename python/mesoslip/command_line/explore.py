@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import SetOption
+from mesoslip.command_line.options import SetOption, load
 from mesoslip.errors import FileError
 
 EXAMPLE = "klein"
@@ -44,7 +44,6 @@ def explore(
     refused to other pages.
     """
     from mesoslip.examples import example
-    from mesoslip.output.inputs import as_config
 
     if find_spec("bokeh") is None:
         raise FileError(MISSING)
@@ -54,10 +53,10 @@ def explore(
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{EXAMPLE}.toml"
             example(EXAMPLE, path)
-            start = as_config(str(path), changes or ())
+            start = load(str(path), changes)
         source = f"{EXAMPLE}.toml"
     else:
-        start = as_config(config, changes or ())
+        start = load(config, changes)
         source = config
     from mesoslip.explorer.server import serve
 

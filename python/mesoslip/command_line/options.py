@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
 
 ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
@@ -33,6 +37,23 @@ SchedulerOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
+
+
+def load(config: str, changes: Iterable[str] | None) -> Config:
+    """A configuration with changes; keys that a change of kind drops are named on stderr.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If it cannot be read or is wrong.
+    """
+    from mesoslip.output.inputs import as_config
+
+    checked = as_config(config, changes or ())
+    if checked.dropped:
+        kind = f'slider.kind = "{checked.slider.kind}"'
+        typer.echo(f"dropped with {kind}: {', '.join(checked.dropped)}", err=True)
+    return checked
 
 
 def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None:
@@ -61,13 +82,21 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def quantity(text: str, option: str, unit: str, example: str, *, positive: bool = False) -> float:
+def quantity(
+    text: str,
+    option: str,
+    unit: str,
+    example: str,
+    *,
+    positive: bool = False,
+    negative: bool = True,
+) -> float:
     """A quantity given to an option, in SI.
 
     Raises
     ------
     ConfigError
-        If it is no quantity of the unit's dimension, or not greater than 0 where it must be.
+        If it is not a quantity of the unit's dimension, or of a sign that the option refuses.
     """
     from mesoslip.configuration.units import to_si
     from mesoslip.errors import ConfigError, Problem
@@ -78,13 +107,17 @@ def quantity(text: str, option: str, unit: str, example: str, *, positive: bool 
         raise ConfigError([Problem("", option, str(error), text)]) from None
     if positive and value <= 0:
         raise ConfigError([Problem("", option, "must be greater than 0", text)])
+    if not negative and value < 0:
+        raise ConfigError([Problem("", option, "must not be negative", text)])
     return value
 
 
 def _number_or_text(text: str) -> float | str:
-    """A plain number, which is in SI; or a text that has a unit."""
+    """A plain number, which is in SI; or a string with a unit."""
+    from mesoslip.configuration.units import number_of
+
     try:
-        return float(text)
+        return number_of(text)
     except ValueError:
         return text
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import ConfigArgument, SchedulerOption, SetOption
+from mesoslip.command_line.options import ConfigArgument, SchedulerOption, SetOption, load, quantity
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.command_line.signals import Stop, stopped_by_signals
 from mesoslip.errors import FileError
@@ -37,13 +37,13 @@ def run(
         ),
     ] = False,
     checkpoint_interval: Annotated[
-        float,
+        str,
         typer.Option(
-            min=0,
-            help="Wall time between two checkpoints; 0 for none but when the run is stopped",
-            metavar="SECONDS",
+            help="Wall time between checkpoints, such as '30 s'; 0 for one only when the run is "
+            "stopped",
+            metavar="TIME",
         ),
-    ] = 60.0,
+    ] = "60 s",
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
@@ -60,10 +60,10 @@ def run(
     """
     from mesoslip import api
     from mesoslip.output import files
-    from mesoslip.output.inputs import as_config
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 
-    checked = as_config(config, changes or ())
+    checked = load(config, changes)
+    interval = quantity(checkpoint_interval, "--checkpoint-interval", "s", "30 s", negative=False)
     path = output or Path("out") / f"{Path(config).stem}.nc"
     files.check_output(path, [config])
 
@@ -72,7 +72,7 @@ def run(
 
     with (
         Checkpoint(
-            checkpoint_folder(path), checked, interval=checkpoint_interval, resume=resume, tell=tell
+            checkpoint_folder(path), checked, interval=interval, resume=resume, tell=tell
         ) as checkpoint,
         stopped_by_signals() as stop,
     ):

@@ -11,6 +11,7 @@ from mesoslip.command_line.options import (
     ConfigArgument,
     JsonOption,
     SetOption,
+    load,
     print_json,
     show,
 )
@@ -24,10 +25,9 @@ MOST_WORK = 400_000
 
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
     """Show derived quantities."""
-    from mesoslip.output.inputs import as_config
     from mesoslip.theory.derived import derived, verdict
 
-    checked = as_config(config, changes or ())
+    checked = load(config, changes)
     quantities = derived(checked)
     if as_json:
         print_json({name: one.value for name, one in quantities.items()})
@@ -50,11 +50,10 @@ def curve(
 ) -> None:
     """Force curve of the master equation, and its elastic instability."""
     from mesoslip.output import files
-    from mesoslip.output.inputs import as_config
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
     from mesoslip.theory.steady_sliding import steady_sliding, told_of_stiffness
 
-    checked = as_config(config, changes or ())
+    checked = load(config, changes)
     if output is not None:
         files.check_output(output, [config])
     _tell_without_interaction(checked)
@@ -94,10 +93,9 @@ def onset(
 ) -> None:
     """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
     from mesoslip.output import files
-    from mesoslip.output.inputs import as_config
     from mesoslip.theory import slip_onset
 
-    checked = as_config(config, changes or ())
+    checked = load(config, changes)
     if output is not None:
         files.check_output(output, [config])
     _tell_without_interaction(checked)

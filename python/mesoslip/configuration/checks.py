@@ -116,12 +116,16 @@ def output_problems(config: Setting) -> Complaints:
     output, interval = config.output, config.output_interval
     if interval > config.duration:
         yield Complaint(
-            "output.interval", f"must not exceed the duration, {config.duration:g} s", interval
+            "output.interval",
+            f"must not exceed the duration, {_below(config.duration, interval)} s",
+            interval,
         )
     finer = output.slip_interval
     if finer is not None and finer > interval:
         yield Complaint(
-            "output.slip_interval", f"must not exceed the interval, {interval:g} s", finer
+            "output.slip_interval",
+            f"must not exceed the interval, {_below(interval, finer)} s",
+            finer,
         )
     if output.layers and not config.slider.layers_recorded(config):
         named = _named(kind for kind, table in SLIDERS.items() if "layers" in table.model_fields)
@@ -224,6 +228,12 @@ def _breaks(config: Setting) -> float:
         return contacts.count
     way = math.fsum(part.way for part in config.drive_parts)
     return contacts.count * way / contacts.break_stretch
+
+
+def _below(bound: float, value: float) -> str:
+    """A bound that a value exceeds, with as many digits as distinguish them."""
+    texts = (f"{bound:.{digits}g}" for digits in range(6, 18))
+    return next(text for text in texts if float(text) < value)
 
 
 def _named_jumping() -> str:

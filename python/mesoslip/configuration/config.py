@@ -22,6 +22,7 @@ from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Int
 from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
     Change,
+    Laid,
     base_of,
     on_base,
     override,
@@ -52,6 +53,8 @@ class Config(Table):
 
     # The tables that the configuration was laid over, for those who ask what it changes.
     _base: Mapping[str, Any] | None = PrivateAttr(default=None)
+    # Keys that were dropped on the way, as another kind of slider does not have them.
+    _dropped: tuple[str, ...] = PrivateAttr(default=())
 
     def __eq__(self, other: object) -> bool:
         """Whether another configuration is of the same run, whatever they were laid over."""
@@ -70,6 +73,11 @@ class Config(Table):
             return self.model_validate(self._base)
         except ValidationError:
             return None
+
+    @property
+    def dropped(self) -> tuple[str, ...]:
+        """Dotted keys that a change of the kind of slider has dropped."""
+        return self._dropped
 
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
@@ -218,9 +226,9 @@ class Config(Table):
             If anything in it is wrong.
         """
         path, overrides = as_path(path), tuple(overrides)
-        tables = read_toml(path)
-        base = base_of(path) or (tables if overrides else None)
-        return cls._checked(override(tables, overrides), str(path), base)
+        laid = read_toml(path)
+        base = base_of(path) or (laid.tables if overrides else None)
+        return cls._checked(override(laid, overrides), str(path), base)
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
@@ -249,17 +257,16 @@ class Config(Table):
         """
         tables, overrides = parse_toml(text, source), tuple(overrides)
         below = None if base is None else parse_toml(base, source)
-        return cls._checked(override(tables, overrides), source, tables if overrides else below)
+        laid = override(Laid(tables), overrides)
+        return cls._checked(laid, source, tables if overrides else below)
 
     @classmethod
-    def _checked(
-        cls, tables: Mapping[str, Any], source: str, base: Mapping[str, Any] | None = None
-    ) -> Config:
+    def _checked(cls, laid: Laid, source: str, base: Mapping[str, Any] | None = None) -> Config:
         try:
-            config = cls.model_validate(tables)
+            config = cls.model_validate(laid.tables)
         except ValidationError as error:
             raise ConfigError(problems(error, source, cls)) from None
-        config._base = base
+        config._base, config._dropped = base, tuple(laid.dropped)
         return config
 
     def replace(self, *changes: Change, **tables: Any) -> Config:
@@ -278,7 +285,7 @@ class Config(Table):
             If anything in it is wrong.
         """
         old = self.to_dict()
-        return self._checked(override(old, (*changes, tables)), "configuration", old)
+        return self._checked(override(Laid(old), (*changes, tables)), "configuration", old)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; with other tables, if they can be run.

@@ -1,10 +1,11 @@
-"""Configuration files: TOML, laid over the files that they are based on, with changes laid over."""
+"""Configuration files: TOML, laid over the base that they name, with changes laid over both."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,29 @@ EXCLUSIVE = {
     "slider": ("damping", "damping_ratio"),
 }
 
+# Removes a key.
+NONE = "none"
+
 Change = str | Mapping[str, Any]
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+@dataclass
+class Laid:
+    """Tables laid over others.
+
+    Attributes
+    ----------
+    tables
+        All of them together.
+    dropped
+        Dotted keys that a new kind of slider does not have.
+    """
+
+    tables: dict[str, Any]
+    dropped: list[str] = field(default_factory=list)
+
+
+def read_toml(path: Path) -> Laid:
     """Tables of a file, laid over those of its base.
 
     Raises
@@ -40,10 +60,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 def base_of(path: Path) -> dict[str, Any] | None:
     """Tables of the file that a file names as its base, if it names one; see `read_toml`."""
     base = parse_toml(text_of(path, "a configuration file"), str(path)).get("base")
-    return None if base is None else _read(path.parent / base, (path,))
+    return None if base is None else _read(path.parent / base, (path,)).tables
 
 
-def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> dict[str, Any]:
+def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> Laid:
     """Tables laid over those of the file that their key ``base`` names, relative to a folder.
 
     Raises
@@ -54,7 +74,7 @@ def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> dict[str, A
     return _on_base(dict(tables), source, folder, ())
 
 
-def _read(path: Path, outer: tuple[Path, ...]) -> dict[str, Any]:
+def _read(path: Path, outer: tuple[Path, ...]) -> Laid:
     return _on_base(
         parse_toml(text_of(path, "a configuration file"), str(path)),
         str(path),
@@ -63,13 +83,11 @@ def _read(path: Path, outer: tuple[Path, ...]) -> dict[str, Any]:
     )
 
 
-def _on_base(
-    tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]
-) -> dict[str, Any]:
+def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]) -> Laid:
     base = tables.pop("base", None)
     _place_history(tables, folder)
     if base is None:
-        return tables
+        return Laid(tables)
     if not isinstance(base, str) or not base or "\0" in base:
         raise ConfigError([Problem(source, "base", "must be the name of a file", base)])
     path = folder / base
@@ -80,13 +98,13 @@ def _on_base(
 
 
 def _check_base(path: Path, source: str, base: str) -> None:
-    """Tell whose base is missing; what else is wrong with it is told by who reads it."""
+    """Make sure that a base exists; other errors of it are found when it is read."""
     try:
         path.stat()
     except FileNotFoundError:
         raise FileError(
             f"{source}: base = {base!r}: there is no such file beside it; mesoslip example writes "
-            "those that come along"
+            "an example and its base"
         ) from None
     except (OSError, ValueError):
         return
@@ -104,7 +122,7 @@ def _are_the_same(path: Path, other: Path) -> bool:
     """Whether two names are of one file, whatever links lead to it."""
     try:
         return path.samefile(other)
-    # What cannot be found or read is told by who reads it.
+    # A file that is missing or cannot be read is an error when it is read.
     except OSError:
         return False
 
@@ -127,27 +145,32 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise ConfigError([Problem(source, "", message)]) from None
 
 
-def _lay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+def _lay(base: Laid, over: Mapping[str, Any]) -> Laid:
     """Lay tables over those of a base; a slider of another kind keeps the keys that it has too."""
-    slider, change = base.get("slider"), over.get("slider")
+    tables, dropped = base.tables, []
+    slider, change = tables.get("slider"), over.get("slider")
     if isinstance(slider, Mapping) and isinstance(change, Mapping) and "kind" in change:
-        base = {**base, "slider": _of_kind(slider, change["kind"])}
-    return _merge(base, over)
+        kept = _of_kind(slider, change["kind"])
+        dropped = [f"slider.{key}" for key in slider if key not in kept and key not in change]
+        tables = {**tables, "slider": kept}
+    return Laid(_merge(tables, over), base.dropped + dropped)
 
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
-    """Merge tables; of keys that exclude each other the later one stays."""
+    """Merge tables; of keys that exclude each other the later one stays, and None removes a key."""
     merged = dict(base)
     exclusive = EXCLUSIVE.get(table, ())
-    if any(key in over for key in exclusive):
+    if any(over.get(key) is not None for key in exclusive):
         dropped = {key for key in exclusive if key not in over}
-        # What stages are repeated goes with them.
+        # The number of repetitions goes with the stages.
         dropped |= {"repeat"} if "stage" in dropped else set()
         merged = {key: value for key, value in merged.items() if key not in dropped}
     for key, value in over.items():
         below = merged.get(key)
         if isinstance(value, Mapping) and isinstance(below, Mapping):
             merged[key] = _merge(below, value, key)
+        elif value is None and key in merged:
+            del merged[key]
         else:
             merged[key] = value
     return merged
@@ -165,27 +188,39 @@ def _of_kind(slider: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
     return {key: value for key, value in slider.items() if key not in dropped}
 
 
-def override(tables: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+def override(base: Laid, changes: Iterable[Change]) -> Laid:
     """Lay changes over tables.
 
     Parameters
     ----------
-    tables
-        Nested tables.
+    base
+        The tables.
     changes
-        Texts such as "contacts.delay=1ms", or tables, whose names may be dotted.
+        Strings such as "contacts.delay=1ms", or tables, whose names may be dotted. "none", or None
+        in tables, removes a key.
 
     Raises
     ------
     ConfigError
-        If a text does not look like that.
+        If a string is not of that form.
     """
-    # All of them at once: what is set beside a new kind is not dropped with the old one's keys.
+    # All changes at once: keys set together with a new kind are not dropped.
     together: dict[str, Any] = {}
     for change in changes:
         tables_of_it = _parse_change(change) if isinstance(change, str) else _undotted(change)
-        together = _merge(together, tables_of_it)
-    return _lay(tables, together)
+        together = _together(together, tables_of_it)
+    return _lay(base, together)
+
+
+def _together(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
+    """Two changes as one; None, which removes a key, stays."""
+    merged = _merge(first, second)
+    for key, value in second.items():
+        if value is None:
+            merged[key] = None
+        elif isinstance(value, Mapping) and isinstance(first.get(key), Mapping):
+            merged[key] = _together(first[key], value)
+    return merged
 
 
 def _parse_change(text: str) -> dict[str, Any]:
@@ -194,6 +229,8 @@ def _parse_change(text: str) -> dict[str, Any]:
     key, value = key.strip(), value.strip()
     if not equals or not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", key):
         raise ConfigError([Problem("--set", text, "must look like contacts.delay=1ms")])
+    if value == NONE:
+        return _undotted({key: None})
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
     except (ValueError, RecursionError):

@@ -7,7 +7,15 @@ from functools import partial
 from numbers import Integral
 from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StrictInt, StrictStr
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    StrictInt,
+    StrictStr,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from mesoslip.configuration.units import to_si
@@ -84,6 +92,18 @@ class Table(BaseModel):
     """A table of the file: unknown keys are errors, and nothing changes after checking."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_none(cls, values: Any) -> Any:
+        """A known key that is None is as if it were not given."""
+        if not isinstance(values, Mapping):
+            return values
+        return {
+            key: value
+            for key, value in values.items()
+            if value is not None or key not in cls.model_fields
+        }
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; with other values, checked like those of any table."""

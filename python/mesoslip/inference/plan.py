@@ -63,12 +63,12 @@ class Plan:
             If anything in it is wrong.
         """
         path = Path(path)
-        return cls._checked(override(read_toml(path), overrides), str(path))
+        return cls._checked(override(read_toml(path), overrides).tables, str(path))
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Plan:
         """A fit given as nested tables; see `load`."""
-        return cls._checked(on_base(tables, source, Path()), source)
+        return cls._checked(on_base(tables, source, Path()).tables, source)
 
     @classmethod
     def _checked(cls, tables: Mapping[str, Any], source: str) -> Plan:

@@ -132,7 +132,8 @@ class LayeredSlider(InertialSlider):
             cantilever = Cantilever.model_validate(tables["cantilever"])
         except ValidationError:
             return tables
-        return {"mass": cantilever.mass, "stiffness": cantilever.stiffness, **tables}
+        given = {key: value for key, value in tables.items() if value is not None}
+        return {"mass": cantilever.mass, "stiffness": cantilever.stiffness, **given}
 
     @model_serializer(mode="wrap")
     def _without_what_follows(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

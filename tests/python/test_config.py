@@ -17,7 +17,7 @@ from conftest import ROOT, klein_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError, MesoslipError, ThresholdLaw
-from mesoslip.configuration.files import override
+from mesoslip.configuration.files import Laid, override
 from mesoslip.configuration.messages import all_keys
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
@@ -382,6 +382,7 @@ def test_units_mean_what_they_mean_to_pint():
             assert ours == pytest.approx(theirs.magnitude, rel=1e-14, abs=0)
 
 
+@settings(deadline=None)
 @given(st.text(st.sampled_from("abdehimnostuNPµ%_°"), min_size=1, max_size=6))
 def test_no_name_of_a_unit_breaks_the_library(name):
     with contextlib.suppress(ValueError):

@@ -396,7 +396,7 @@ def _between(first: float, last: float, part: float) -> float:
     """A value of a logarithmic range, at a part of the distance from one end to the other."""
     ratio = last / first
     if 0 < ratio < math.inf:
-        return first * ratio**part
+        return float(first * ratio**part)
     size = (1 - part) * math.log(abs(first)) + part * math.log(abs(last))
     return math.copysign(math.exp(size), first)
 

@@ -26,7 +26,8 @@ subroutine close_simulation(handle)
 end subroutine close_simulation
 
 !> Give a simulation its contacts.
-subroutine set_contacts(handle, kind, length, names, values, seed, realization, status, message)
+subroutine set_contacts(handle, kind, length, names, values, words, seed, realization, status, &
+   & message)
    !f2py threadsafe
    use mesoslip_contacts, only: make_contacts
    use mesoslip_boundary_handles, only: find_simulation, report
@@ -35,10 +36,10 @@ subroutine set_contacts(handle, kind, length, names, values, seed, realization, 
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Kind of the contacts, and what they are made of, each number by its name
+   !> Kind of the contacts, and what they are made of: parameters by name, numbers or words
    character(len=*), intent(in) :: kind
    integer, intent(in) :: length
-   character(len=32), intent(in) :: names(length)
+   character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)
    !> Key of the random numbers
    integer(8), intent(in) :: seed, realization
@@ -51,14 +52,14 @@ subroutine set_contacts(handle, kind, length, names, values, seed, realization, 
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
-      call new_parameters(parameters, names, values)
+      call new_parameters(parameters, names, values, words)
       call make_contacts(simulation%contacts, kind, parameters, seed, realization, error)
    end if
    call report(error, status, message)
 end subroutine set_contacts
 
 !> Give a simulation its slider.
-subroutine set_slider(handle, kind, length, names, values, status, message)
+subroutine set_slider(handle, kind, length, names, values, words, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
@@ -67,10 +68,10 @@ subroutine set_slider(handle, kind, length, names, values, status, message)
    use mesoslip_sliders, only: make_slider
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Kind of the slider, and what it is made of, each number by its name
+   !> Kind of the slider, and what it is made of: parameters by name, numbers or words
    character(len=*), intent(in) :: kind
    integer, intent(in) :: length
-   character(len=32), intent(in) :: names(length)
+   character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -81,7 +82,7 @@ subroutine set_slider(handle, kind, length, names, values, status, message)
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
-      call new_parameters(parameters, names, values)
+      call new_parameters(parameters, names, values, words)
       call make_slider(simulation%slider, kind, parameters, error)
    end if
    call report(error, status, message)
@@ -227,21 +228,25 @@ end subroutine set_avalanches
 !> Start a simulation that has all its parts.
 subroutine start_simulation(handle, initial, status, message)
    !f2py threadsafe
+   use mesoslip_contacts_mechanics, only: initial_names
    use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: choose
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Code of the initial state of the contacts
-   integer, intent(in) :: initial
+   !> Initial state of the contacts
+   character(len=*), intent(in) :: initial
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
    type(simulation_type), pointer :: simulation
    type(error_type), allocatable :: error
+   integer :: state
 
    call find_simulation(handle, .true., simulation, error)
-   if (.not. allocated(error)) call simulation%start(initial)
+   if (.not. allocated(error)) call choose("initial state", initial, initial_names, state, error)
+   if (.not. allocated(error)) call simulation%start(state)
    call report(error, status, message)
 end subroutine start_simulation
 
@@ -273,11 +278,12 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_loop_endings, only: ending_names
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Why the run is over, 0 if it is not
-   integer, intent(out) :: ending
+   !> Why the run is over, blank if it is not
+   character(len=32), intent(out) :: ending
    !> Time [s], displacement of the slider [m], breaks so far, contacts that are detached, slip in
    !> avalanches [m], estimated error of the contact force [N]
    real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip, error_estimate
@@ -289,7 +295,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    type(simulation_type), pointer :: simulation
    type(error_type), allocatable :: error
 
-   ending = 0
+   ending = ""
    time = 0.0d0
    displacement = 0.0d0
    breaks = 0.0d0
@@ -301,7 +307,7 @@ subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, 
    integrator = 0
    call find_simulation(handle, .true., simulation, error)
    if (.not. allocated(error)) then
-      ending = simulation%ending
+      ending = ending_names(simulation%ending)
       time = simulation%slider%time
       displacement = simulation%slider%origin + simulation%slider%displacement
       breaks = simulation%contacts%breaks
@@ -492,6 +498,37 @@ subroutine restore_simulation(handle, length, words, status, message)
    if (.not. allocated(error)) call simulation%restore(words, error)
    call report(error, status, message)
 end subroutine restore_simulation
+
+!> A list of names that both sides share: columns of a table, or kinds of something.
+subroutine list_names(which, room, names, count, status, message)
+   !f2py threadsafe
+   use mesoslip_boundary_handles, only: report
+   use mesoslip_boundary_names, only: find_names
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: name_length
+   implicit none
+   !> Which list
+   character(len=*), intent(in) :: which
+   !> Names for which there is room
+   integer, intent(in) :: room
+   !> The names, and their number
+   character(len=32), intent(out) :: names(room)
+   integer, intent(out) :: count
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   character(len=name_length), allocatable :: found(:)
+   type(error_type), allocatable :: error
+
+   names = ""
+   count = 0
+   call find_names(which, found, error)
+   if (.not. allocated(error)) then
+      count = min(room, size(found))
+      names(:count) = found(:count)
+   end if
+   call report(error, status, message)
+end subroutine list_names
 
 !> Version of the SUNDIALS library in use.
 subroutine sundials(version)

@@ -3,19 +3,18 @@
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
 
 !> Scales of the lives of contacts under a slider that moves forward, dimensionless.
-subroutine contact_scales(length, names, values, scales, status, message)
+subroutine contact_scales(length, names, values, words, scales, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    implicit none
-   !> What the contacts are made of, each number by its name
+   !> What the contacts are made of: parameters by name, numbers or words
    integer, intent(in) :: length
-   character(len=32), intent(in) :: names(length)
+   character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)
-   !> Shortest, longest and mean life of newborns; their stiffness and force at attaching; shortest
-   !> and longest life of a relaxed first generation; mean force of stationary sliding; mean mass
+   !> Scales in the order of the list of names "scales"
    real(8), intent(out) :: scales(9)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -25,19 +24,17 @@ subroutine contact_scales(length, names, values, scales, status, message)
    type(error_type), allocatable :: error
 
    scales = 0.0d0
-   call new_parameters(parameters, names, values)
+   call new_parameters(parameters, names, values, words)
    call make_contact_lives(lives, parameters, error)
    if (.not. allocated(error)) then
-      scales = [lives%shortest, lives%longest, lives%mean_life, lives%newborn_stiffness, &
-         & lives%newborn_force, lives%first_shortest, lives%first_longest, &
-         & lives%steady_force, lives%mean_mass]
+      scales = lives%scales()
    end if
    call report(error, status, message)
 end subroutine contact_scales
 
 !> Force curve of the master equation, dimensionless, on panels of the displacement.
-subroutine force_curve(length, names, values, start, width, panels, points, point, solution, &
-   & pinned_part, mismatch, status, message)
+subroutine force_curve(length, names, values, words, start, width, panels, points, point, breaks, &
+   & slope, force, stiffness, pinned_part, mismatch, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: report
    use mesoslip_numerics_errors, only: error_type
@@ -45,9 +42,9 @@ subroutine force_curve(length, names, values, start, width, panels, points, poin
    use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
    implicit none
-   !> What the contacts are made of, each number by its name
+   !> What the contacts are made of: parameters by name, numbers or words
    integer, intent(in) :: length
-   character(len=32), intent(in) :: names(length)
+   character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)
    !> Start of the first panel, at or below 0, and width of the panels
    real(8), intent(in) :: start, width
@@ -56,7 +53,8 @@ subroutine force_curve(length, names, values, start, width, panels, points, poin
    !> Points within a panel, from 0 to 1
    real(8), intent(out) :: point(points)
    !> Breaks over displacement, slope of the force, force, stiffness of the pinned contacts
-   real(8), intent(out) :: solution(points, panels, 4)
+   real(8), intent(out) :: breaks(points, panels), slope(points, panels), force(points, panels), &
+      & stiffness(points, panels)
    !> Part of the contacts that is pinned, at the edges of the panels
    real(8), intent(out) :: pinned_part(panels + 1)
    !> Largest difference between two ways to the force
@@ -70,18 +68,21 @@ subroutine force_curve(length, names, values, start, width, panels, points, poin
    type(error_type), allocatable :: error
 
    point = 0.0d0
-   solution = 0.0d0
+   breaks = 0.0d0
+   slope = 0.0d0
+   force = 0.0d0
+   stiffness = 0.0d0
    mismatch = 0.0d0
    pinned_part = 0.0d0
-   call new_parameters(parameters, names, values)
+   call new_parameters(parameters, names, values, words)
    call make_contact_lives(lives, parameters, error)
    if (.not. allocated(error)) then
       call solve_renewal(lives, start, width, panels, points, renewal)
       point = renewal%point
-      solution(:, :, 1) = renewal%breaks
-      solution(:, :, 2) = renewal%slope
-      solution(:, :, 3) = renewal%force
-      solution(:, :, 4) = renewal%stiffness
+      breaks = renewal%breaks
+      slope = renewal%slope
+      force = renewal%force
+      stiffness = renewal%stiffness
       pinned_part = renewal%pinned
       mismatch = renewal%mismatch
    end if
@@ -94,15 +95,16 @@ subroutine onset(equation, coefficients, damping, drag, end_displacement, interv
    !f2py threadsafe
    use mesoslip_boundary_handles, only: report
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_theory_onset, only: integrate_onset, onset_type
+   use mesoslip_numerics_parameters, only: choose
+   use mesoslip_theory_onset, only: equation_names, integrate_onset, onset_type
    implicit none
-   !> 1 for S46, 2 for S47
-   integer, intent(in) :: equation
+   !> "sequential", S46, or "melting", S47
+   character(len=*), intent(in) :: equation
    !> D0 to D3; eta_S/Omega_S, eta/Omega_S; displacement at which S46 ends
    real(8), intent(in) :: coefficients(4), damping, drag, end_displacement
    !> Interval of samples, and relative tolerance of the integration
    real(8), intent(in) :: interval, tolerance
-   !> Samples of time, displacement, velocity and its running mean, and how many were filled
+   !> Samples in the order of the list of names "onset", and how many were filled
    integer, intent(in) :: capacity
    real(8), intent(inout) :: samples(4, capacity)
    integer, intent(out) :: length
@@ -115,12 +117,16 @@ subroutine onset(equation, coefficients, damping, drag, end_displacement, interv
    type(error_type), allocatable :: error
    logical :: is_over
 
-   equations%equation = equation
+   length = 0
+   is_over = .false.
+   call choose("equation", equation, equation_names, equations%equation, error)
    equations%D = coefficients
    equations%damping = damping
    equations%drag = drag
    equations%end_displacement = end_displacement
-   call integrate_onset(equations, interval, tolerance, samples, length, is_over, error)
+   if (.not. allocated(error)) then
+      call integrate_onset(equations, interval, tolerance, samples, length, is_over, error)
+   end if
    ended = merge(1, 0, is_over .and. .not. allocated(error))
    call report(error, status, message)
 end subroutine onset

@@ -12,12 +12,14 @@ module mesoslip_contacts_ageing_law
    implicit none
    private
 
-   public :: ageing_law_type, take_ageing_law, ageing_relax, ageing_log
+   public :: ageing_law_type, take_ageing_law, ageing_relax, ageing_log, ageing_names
 
    !> Mean and width relax from those of the young to those of the old
    integer, parameter :: ageing_relax = 1
    !> They grow with the logarithm of the age
    integer, parameter :: ageing_log = 2
+   !> Names of the ageing_ codes
+   character(len=*), parameter :: ageing_names(2) = [character(len=5) :: "relax", "log"]
 
    !> Ages over tau_a beyond which nothing relaxes any more, as exp(-40) is below rounding.
    real(wp), parameter :: old = 40.0_wp
@@ -93,7 +95,7 @@ contains
 
       real(wp) :: force_ratio, width, narrowing, minimum
 
-      call parameters%take("ageing", self%kind, error)
+      call parameters%take("ageing", ageing_names, self%kind, error)
       call parameters%take("ageing_time", self%time, error)
       call parameters%take("initial_age", self%initial_age, error)
       if (allocated(error)) return

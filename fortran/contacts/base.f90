@@ -7,10 +7,10 @@ module mesoslip_contacts_base
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
-   use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_contacts_mechanics, only: coupling_scaled
+   use mesoslip_numerics_parameters, only: name_length, parameters_type
+   use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_contacts_threshold_laws, only: law_name, make_threshold_law
+   use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_schedule, only: schedule_type
    implicit none
@@ -19,15 +19,22 @@ module mesoslip_contacts_base
    public :: contacts_type, contact_parameters_type
    public :: take_contact_parameters, exchange_contacts
    public :: extent_length, snapshot_length, contact_record_length
+   public :: extent_columns, snapshot_columns, contact_columns
 
    !> Numbers of an avalanche's extent: contacts that broke, columns and rows around them,
    !> generations
-   integer, parameter :: extent_length = 4
+   character(len=*), parameter :: extent_columns(*) = [character(len=name_length) :: &
+      & "area", "width", "height", "generations"]
+   integer, parameter :: extent_length = size(extent_columns)
    !> Numbers of a contact in a snapshot: stretch, force over threshold, generation
-   integer, parameter :: snapshot_length = 3
+   character(len=*), parameter :: snapshot_columns(*) = [character(len=name_length) :: &
+      & "stretch", "load", "generation"]
+   integer, parameter :: snapshot_length = size(snapshot_columns)
    !> Numbers that tell what a contact is: origin [m], stiffness [N/m], 0 while it is detached,
    !> breaking stretch [m], number of renewals
-   integer, parameter :: contact_record_length = 4
+   character(len=*), parameter :: contact_columns(*) = [character(len=name_length) :: &
+      & "origin", "stiffness", "break_stretch", "renewals"]
+   integer, parameter :: contact_record_length = size(contact_columns)
 
    !> What the contacts are made of.
    type :: contact_parameters_type
@@ -282,7 +289,7 @@ contains
       !> Set if a number is missing, or the law of thresholds is none
       type(error_type), allocatable, intent(inout) :: error
 
-      integer :: law
+      character(len=name_length) :: law
 
       self%seed = seed
       self%realization = realization
@@ -292,11 +299,11 @@ contains
       call parameters%take("drag", self%drag, error)
       call parameters%take("delay", self%delay, error)
       call parameters%take("back_force_ratio", self%back_force_ratio, error)
-      call parameters%take("coupling", self%coupling, error)
+      call parameters%take("coupling", coupling_names, self%coupling, error)
       call parameters%take("reattach", self%reattach, error)
-      call parameters%take("law", law, error)
+      call parameters%take("threshold_law", law, error)
       if (allocated(error)) return
-      call make_threshold_law(self%law, law_name(law), parameters, self%back_force_ratio, error)
+      call make_threshold_law(self%law, law, parameters, self%back_force_ratio, error)
    end subroutine take_contact_parameters
 
 end module mesoslip_contacts_base

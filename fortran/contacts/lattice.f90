@@ -19,7 +19,7 @@ module mesoslip_contacts_lattice
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set, snapshot_set
    use mesoslip_contacts_record, only: record_length, row_limit, row_origin, row_stiffness
-   use mesoslip_contacts_neighbours, only: coordination, find_neighbours
+   use mesoslip_contacts_neighbours, only: coordination, find_neighbours, lattice_names
    implicit none
    private
 
@@ -122,7 +122,7 @@ contains
       type(interaction_type) :: interaction
 
       call parameters%take("bond", interaction%bond, error)
-      call parameters%take("lattice", interaction%lattice, error)
+      call parameters%take("lattice", lattice_names, interaction%lattice, error)
       call parameters%take("columns", interaction%columns, error)
       call parameters%take("rows", interaction%rows, error)
       call parameters%finish(error)

@@ -8,14 +8,16 @@ module mesoslip_contacts_mechanics
    implicit none
    private
 
-   public :: coupling_scaled, coupling_equal
-   public :: initial_relaxed, initial_steady, initial_uniform
+   public :: coupling_scaled, coupling_equal, coupling_names
+   public :: initial_relaxed, initial_steady, initial_uniform, initial_names
    public :: stiffness_of, breaking_distance, broken_threshold, broken_threshold_slope
 
    !> k_i = k u^(1/2), m_i = m u
    integer, parameter :: coupling_scaled = 1
    !> k_i = k, m_i = m
    integer, parameter :: coupling_equal = 2
+   !> Names of the coupling_ codes
+   character(len=*), parameter :: coupling_names(2) = [character(len=6) :: "scaled", "equal"]
 
    !> All stretches are zero
    integer, parameter :: initial_relaxed = 1
@@ -23,6 +25,9 @@ module mesoslip_contacts_mechanics
    integer, parameter :: initial_steady = 2
    !> Stretches are uniform between zero and the breaking stretch
    integer, parameter :: initial_uniform = 3
+   !> Names of the initial_ codes
+   character(len=*), parameter :: initial_names(3) = [character(len=7) :: "relaxed", "steady", &
+      & "uniform"]
 
 contains
 

@@ -3,13 +3,15 @@ module mesoslip_contacts_neighbours
    implicit none
    private
 
-   public :: lattice_triangular, lattice_square
+   public :: lattice_triangular, lattice_square, lattice_names
    public :: coordination, find_neighbours
 
    !> Six neighbours; odd rows are half a place to the right of even ones, counted from 0
    integer, parameter :: lattice_triangular = 1
    !> Four neighbours
    integer, parameter :: lattice_square = 2
+   !> Names of the lattice_ codes
+   character(len=*), parameter :: lattice_names(2) = [character(len=10) :: "triangular", "square"]
 
 contains
 

@@ -12,10 +12,10 @@ module mesoslip_contacts_threshold_laws
    implicit none
    private
 
-   public :: make_threshold_law, new_threshold_law, law_name
+   public :: make_threshold_law, new_threshold_law, law_names
 
-   !> Names in the order of their codes at the boundary
-   character(len=11), parameter :: law_name(5) = [character(len=11) :: "gaussian", "uniform", &
+   !> Names of the laws
+   character(len=11), parameter :: law_names(5) = [character(len=11) :: "gaussian", "uniform", &
       & "lognormal", "weibull", "exponential"]
 
 contains

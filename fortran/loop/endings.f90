@@ -2,6 +2,7 @@
 module mesoslip_loop_endings
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: name_length
    use mesoslip_schedule, only: schedule_type
    use mesoslip_sliders_base, only: slider_type
    implicit none
@@ -9,7 +10,7 @@ module mesoslip_loop_endings
 
    public :: stop_type
    public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides, &
-      & ending_slips, ending_displacement, ending_steady
+      & ending_slips, ending_displacement, ending_steady, ending_names
 
    !> Why a run is over: it is not; the drive came to its end; there were as many avalanches as
    !> wanted; no contact is left to break; contacts break under a force without end; there were as
@@ -17,6 +18,9 @@ module mesoslip_loop_endings
    integer, parameter :: ending_none = 0, ending_drive = 1, ending_avalanches = 2, &
       & ending_broken = 3, ending_slides = 4, ending_slips = 5, ending_displacement = 6, &
       & ending_steady = 7
+   !> Names of the ending_ codes
+   character(len=*), parameter :: ending_names(0:7) = [character(len=name_length) :: "", "drive", &
+      & "avalanches", "broken", "slides", "slips", "displacement", "steady"]
 
    !> What stops a run: a number of slips, a displacement.
    type :: stop_type

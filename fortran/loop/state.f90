@@ -5,6 +5,7 @@ module mesoslip_loop_state
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_avalanches, only: avalanche_recorder_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_type
@@ -16,11 +17,14 @@ module mesoslip_loop_state
    private
 
    public :: state_type
-   public :: energy_length
+   public :: energy_columns, energy_length
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
    !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
-   integer, parameter :: energy_length = 8
+   character(len=*), parameter :: energy_columns(*) = [character(len=name_length) :: &
+      & "drive_work", "slider_energy", "contact_energy", "damping_loss", "drag_loss", &
+      & "break_loss", "birth_gain", "residual"]
+   integer, parameter :: energy_length = size(energy_columns)
 
    !> A slider, which has its drive, on contacts, and what is recorded of it.
    type :: state_type
@@ -128,8 +132,8 @@ contains
          buffer => self%recorder%layers
       case ("avalanches")
          buffer => self%avalanches%catalogue
-      case ("snapshot_places")
-         buffer => self%avalanches%places
+      case ("snapshot_events")
+         buffer => self%avalanches%events
       case ("snapshots")
          buffer => self%avalanches%snapshots
       case default

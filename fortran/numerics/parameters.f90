@@ -1,4 +1,4 @@
-!> Named numbers that a kind of slider or of contacts is made from.
+!> Named parameters, numbers or words, that a kind of slider or of contacts is made from.
 !>
 !> Whoever is made takes what it needs by name. A name that is missing, or that nobody has taken, is
 !> an error: so a misspelt or superfluous parameter is found at once.
@@ -8,41 +8,85 @@ module mesoslip_numerics_parameters
    implicit none
    private
 
-   public :: parameters_type, new_parameters
+   public :: parameters_type, new_parameters, choose
    public :: name_length
 
-   !> Characters of a name
+   !> Characters of a name, and of a word
    integer, parameter :: name_length = 32
 
-   !> Numbers by name.
+   !> Numbers and words by name.
    type :: parameters_type
       private
       character(len=name_length), allocatable :: name(:)
       real(wp), allocatable :: value(:)
+      !> Words; blank for a number
+      character(len=name_length), allocatable :: word(:)
       logical, allocatable :: is_taken(:)
    contains
-      !> Take the number of a name
-      generic :: take => take_real, take_integer, take_logical
-      !> Make sure that each number was taken
+      !> Take the parameter of a name: a number, a word, or a word that is one of some choices
+      generic :: take => take_real, take_integer, take_logical, take_word, take_choice
+      !> Add a word
+      procedure, non_overridable :: add_word
+      !> Make sure that each parameter was taken
       procedure, non_overridable :: finish
-      procedure, non_overridable, private :: take_real, take_integer, take_logical
+      procedure, non_overridable, private :: take_real, take_integer, take_logical, take_word, &
+         & take_choice, find
    end type parameters_type
 
 contains
 
    !> Set up a table.
-   subroutine new_parameters(self, name, value)
+   pure subroutine new_parameters(self, name, value, word)
       !> The table
       type(parameters_type), intent(out) :: self
-      !> Names, shape (number)
+      !> Names, shape (parameters)
       character(len=*), intent(in) :: name(:)
-      !> Their values, shape (number)
+      !> Their values, shape (parameters)
       real(wp), intent(in) :: value(:)
+      !> Words that stand for numbers, shape (parameters); blank for a number, by default all
+      character(len=*), intent(in), optional :: word(:)
 
       self%name = name
       self%value = value
+      allocate (self%word(size(name)))
+      self%word = ""
+      if (present(word)) self%word = word
       allocate (self%is_taken(size(name)), source=.false.)
    end subroutine new_parameters
+
+   !> Add a word.
+   pure subroutine add_word(self, name, word)
+      !> The table
+      class(parameters_type), intent(inout) :: self
+      !> Its name, and the word
+      character(len=*), intent(in) :: name, word
+
+      self%name = [character(len=name_length) :: self%name, name]
+      self%value = [self%value, 0.0_wp]
+      self%word = [character(len=name_length) :: self%word, word]
+      self%is_taken = [self%is_taken, .false.]
+   end subroutine add_word
+
+   !> The place of a name in the table, which is taken; 0 if there is none.
+   subroutine find(self, name, place, error)
+      class(parameters_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(out) :: place
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: parameter_place
+
+      place = 0
+      if (allocated(error)) return
+      do parameter_place = 1, size(self%name)
+         if (self%name(parameter_place) == name) place = parameter_place
+      end do
+      if (place == 0) then
+         call raise(error, status_invalid, "parameter '" // name // "' is missing")
+         return
+      end if
+      self%is_taken(place) = .true.
+   end subroutine find
 
    subroutine take_real(self, name, value, error)
       class(parameters_type), intent(inout) :: self
@@ -53,15 +97,12 @@ contains
       integer :: place
 
       value = 0.0_wp
+      call self%find(name, place, error)
       if (allocated(error)) return
-      do place = 1, size(self%name)
-         if (self%name(place) == name) then
-            value = self%value(place)
-            self%is_taken(place) = .true.
-            return
-         end if
-      end do
-      call raise(error, status_invalid, "parameter '" // name // "' is missing")
+      value = self%value(place)
+      if (self%word(place) == "") return
+      call raise(error, status_invalid, "parameter '" // name // "' must be a number, not '" &
+         & // trim(self%word(place)) // "'")
    end subroutine take_real
 
    subroutine take_integer(self, name, value, error)
@@ -94,7 +135,35 @@ contains
       value = number /= 0
    end subroutine take_logical
 
-   !> Make sure that each number was taken.
+   subroutine take_word(self, name, word, error)
+      class(parameters_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      character(len=name_length), intent(out) :: word
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: place
+
+      word = ""
+      call self%find(name, place, error)
+      if (.not. allocated(error)) word = self%word(place)
+   end subroutine take_word
+
+   !> Take a word as its position among some choices.
+   subroutine take_choice(self, name, choices, position, error)
+      class(parameters_type), intent(inout) :: self
+      character(len=*), intent(in) :: name, choices(:)
+      integer, intent(out) :: position
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: place
+
+      position = 0
+      call self%find(name, place, error)
+      if (allocated(error)) return
+      call choose(name, self%word(place), choices, position, error)
+   end subroutine take_choice
+
+   !> Make sure that each parameter was taken.
    subroutine finish(self, error)
       !> The table
       class(parameters_type), intent(in) :: self
@@ -112,5 +181,26 @@ contains
          end if
       end do
    end subroutine finish
+
+   !> The position of a word among some choices.
+   subroutine choose(name, word, choices, position, error)
+      !> What is chosen, for the error
+      character(len=*), intent(in) :: name
+      !> The word, and what it can be
+      character(len=*), intent(in) :: word, choices(:)
+      !> Its position, from 1; 0 if it is not one of them
+      integer, intent(out) :: position
+      !> Set if it is not one of them
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: candidate
+
+      position = 0
+      do candidate = 1, size(choices)
+         if (word == choices(candidate)) position = candidate
+      end do
+      if (position == 0) call raise(error, status_invalid, "unknown " // name // " '" &
+         & // trim(word) // "'")
+   end subroutine choose
 
 end module mesoslip_numerics_parameters

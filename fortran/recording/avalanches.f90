@@ -5,21 +5,27 @@
 module mesoslip_recording_avalanches
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
-   use mesoslip_contacts_base, only: contacts_type, extent_length, snapshot_length
+   use mesoslip_contacts_base, only: contacts_type, extent_columns, extent_length, &
+      & snapshot_length
    use mesoslip_interface_law, only: interface_law_type
    use mesoslip_sliders_base, only: motion_type, slider_type
    implicit none
    private
 
    public :: avalanche_recorder_type, avalanche_parameters_type
-   public :: avalanche_length, snapshot_place_length
+   public :: avalanche_columns, snapshot_event_columns
 
-   !> Numbers of an avalanche: time, displacement at its start, breaks, contact force before it and
-   !> its drop, slip, and extent
-   integer, parameter :: avalanche_length = 6 + extent_length
-   !> Numbers that tell where a snapshot was taken: time, displacement, size of the avalanche or 0
-   integer, parameter :: snapshot_place_length = 3
+   !> Columns of the catalogue of avalanches: time and displacement are those of the start, forces
+   !> those of the contacts, the size is the number of breaks
+   character(len=*), parameter :: avalanche_columns(*) = [character(len=name_length) :: "time", &
+      & "displacement", "size", "force_before", "force_drop", "slip", extent_columns]
+   !> Columns of the list of snapshots; the size of an avalanche is 0 if there was none
+   character(len=*), parameter :: snapshot_event_columns(*) = [character(len=name_length) :: &
+      & "time", "displacement", "size"]
+   integer, parameter :: avalanche_length = size(avalanche_columns)
+   integer, parameter :: snapshot_event_length = size(snapshot_event_columns)
 
    !> Avalanches for which there is room at first; avalanches, and numbers in snapshots, that wait
    !> before the run pauses to have them taken away
@@ -39,8 +45,8 @@ module mesoslip_recording_avalanches
    type :: avalanche_recorder_type
       !> What to record
       type(avalanche_parameters_type) :: parameters
-      !> Avalanches, where snapshots were taken, and the snapshots, all contacts of one in a row
-      type(buffer_type) :: catalogue, places, snapshots
+      !> Avalanches, when snapshots were taken, and the snapshots, all contacts of one in a row
+      type(buffer_type) :: catalogue, events, snapshots
       !> Avalanches so far, and breaks in all of them
       integer(i8) :: avalanches = 0
       !> Breaks in the present avalanche
@@ -99,7 +105,7 @@ contains
       call self%catalogue%open(avalanche_length, room)
       room = 0
       if (parameters%snapshot_size > 0.0_wp .or. size(snapshot_time) > 0) room = 1
-      call self%places%open(snapshot_place_length, room)
+      call self%events%open(snapshot_event_length, room)
       call self%snapshots%open(snapshot_length * contacts, room)
       self%many = max(1, many_numbers / max(1, snapshot_length * contacts))
    end subroutine open
@@ -231,7 +237,7 @@ contains
 
       allocate (values(snapshot_length, contacts%followed()))
       call contacts%snapshot(relative, values)
-      call self%places%add([time, displacement, self%size])
+      call self%events%add([time, displacement, self%size])
       call self%snapshots%add(reshape(values, [size(values)]))
    end subroutine take_snapshot
 
@@ -252,7 +258,7 @@ contains
       call archive%exchange("displacement", self%displacement)
       call archive%exchange("force", self%force)
       call self%catalogue%exchange("catalogue", archive)
-      call self%places%exchange("places", archive)
+      call self%events%exchange("events", archive)
       call self%snapshots%exchange("snapshots", archive)
    end subroutine exchange
 

@@ -26,6 +26,7 @@
 module mesoslip_recording_recorder
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type, slider_type
    use mesoslip_step_filter, only: step_filter_type
@@ -33,16 +34,22 @@ module mesoslip_recording_recorder
    private
 
    public :: recorder_type, recorder_parameters_type
-   public :: trace_length, slip_trace_length, slip_length, most_samples_in_step
+   public :: trace_columns, slip_trace_columns, slip_columns, most_samples_in_step
 
-   !> Numbers in a sample: time, displacement of the drive, displacement, velocity, spring force,
-   !> contact force, detached contacts, elastic force, displacement of the base
-   integer, parameter :: trace_length = 9
+   !> Columns of a trace
+   character(len=*), parameter :: trace_columns(*) = [character(len=name_length) :: "time", &
+      & "drive_displacement", "displacement", "velocity", "spring_force", "contact_force", &
+      & "detached_contacts", "elastic_force", "base_displacement"]
    !> A sample of a slip trace has the number of the slip as well
-   integer, parameter :: slip_trace_length = trace_length + 1
-   !> Numbers of a slip: its number, start time, end time, spring force before and after, peak
-   !> velocity, contacts broken
-   integer, parameter :: slip_length = 7
+   character(len=*), parameter :: slip_trace_columns(*) = [character(len=name_length) :: &
+      & trace_columns, "slip"]
+   !> Columns of the catalogue of slips; forces are those of the spring
+   character(len=*), parameter :: slip_columns(*) = [character(len=name_length) :: "slip", &
+      & "start_time", "end_time", "force_before", "force_after", "peak_velocity", &
+      & "contacts_broken"]
+   integer, parameter :: trace_length = size(trace_columns)
+   integer, parameter :: slip_trace_length = size(slip_trace_columns)
+   integer, parameter :: slip_length = size(slip_columns)
    !> Steps must be shorter than this many samples of either trace.
    integer, parameter :: most_samples_in_step = 1000
    !> Samples of either trace, and slips, that wait before the run pauses to have them taken away

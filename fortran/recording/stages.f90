@@ -6,17 +6,22 @@
 module mesoslip_recording_stages
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type, slider_type
    implicit none
    private
 
-   public :: stage_recorder_type, stage_length
+   public :: stage_recorder_type, stage_columns
 
-   !> Numbers of a stage: its number, start time, end time, velocity of the drive at both, spring
-   !> force at both, displacement at both, displacement of the drive at the start; greatest spring
-   !> force, its time, displacement then; the same of the least; mean spring force
-   integer, parameter :: stage_length = 17
+   !> Columns of the stages that are over; forces are those of the spring
+   character(len=*), parameter :: stage_columns(*) = [character(len=name_length) :: &
+      & "stage_number", "stage_start_time", "stage_end_time", "drive_start_velocity", &
+      & "drive_end_velocity", "start_force", "end_force", "start_displacement", &
+      & "end_displacement", "drive_start_displacement", "greatest_force", "greatest_force_time", &
+      & "greatest_force_displacement", "least_force", "least_force_time", &
+      & "least_force_displacement", "mean_force"]
+   integer, parameter :: stage_length = size(stage_columns)
    !> Stages that wait before the run pauses to have them taken away
    integer, parameter :: many_stages = 2000
 

@@ -19,13 +19,12 @@ module mesoslip_sliders_layered
    use mesoslip_sliders_layered_expansion, only: expand, sum_series
    use mesoslip_sliders_layered_integrator, only: integrator_type
    use mesoslip_sliders_layered_system, only: fastest_rate, layered_parameters_type, new_system, &
-      & solver_adams, solver_bdf, solver_series, system_type
+      & solver_codes, solver_names, solver_series, system_type
    use mesoslip_sliders_motion_series, only: first_end, horner, inverse, max_terms
    implicit none
    private
 
    public :: slider_layered_type, layered_parameters_type, new_slider_layered, make_slider_layered
-   public :: solver_series, solver_adams, solver_bdf
 
    !> Maximum duration of a step in units of the fastest rate
    real(wp), parameter :: max_step = 2.5_wp
@@ -83,6 +82,7 @@ contains
 
       type(slider_layered_type), allocatable :: self
       type(layered_parameters_type) :: values
+      integer :: solver
 
       call parameters%take("layers", values%layers, error)
       call parameters%take("mass", values%mass, error)
@@ -91,11 +91,12 @@ contains
       call parameters%take("base_mass", values%base_mass, error)
       call parameters%take("base_stiffness", values%base_stiffness, error)
       call parameters%take("base_damping", values%base_damping, error)
-      call parameters%take("solver", values%solver, error)
+      call parameters%take("solver", solver_names, solver, error)
       call parameters%take("relative_tolerance", values%relative, error)
       call parameters%take("absolute_tolerance", values%absolute, error)
       call parameters%finish(error)
       if (allocated(error)) return
+      values%solver = solver_codes(solver)
       allocate (self)
       call new_slider_layered(self, values)
       call move_alloc(self, slider)

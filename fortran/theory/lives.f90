@@ -4,19 +4,27 @@
 !> from its attaching, a contact of the first generation from the start of the motion.
 module mesoslip_theory_lives
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_parameters, only: name_length, parameters_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, &
-      & broken_threshold_slope, coupling_equal, initial_relaxed, initial_steady, &
-      & initial_uniform, stiffness_of
+      & broken_threshold_slope, coupling_equal, coupling_names, initial_names, initial_relaxed, &
+      & initial_steady, initial_uniform, stiffness_of
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
-   use mesoslip_contacts_threshold_laws, only: law_name, make_threshold_law
+   use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
    public :: contact_lives_type, new_contact_lives, make_contact_lives
+   public :: scale_names
+
+   !> Scales of the lives: shortest, longest and mean life of newborns; their stiffness and force at
+   !> attaching; shortest and longest life of a relaxed first generation; mean force of stationary
+   !> sliding; mean mass
+   character(len=*), parameter :: scale_names(*) = [character(len=name_length) :: "shortest", &
+      & "longest", "mean_life", "newborn_stiffness", "newborn_force", "first_shortest", &
+      & "first_longest", "steady_force", "mean_mass"]
 
    !> Exponents of the partial moments in use, and their places
    real(wp), parameter :: exponents(7) = [0.0_wp, 0.5_wp, 1.0_wp, 1.5_wp, 2.0_wp, -0.5_wp, -1.0_wp]
@@ -63,6 +71,8 @@ module mesoslip_theory_lives
       procedure, non_overridable :: first_rates
       !> What is left of the first generation
       procedure, non_overridable :: first_state
+      !> The scales by name
+      procedure, non_overridable :: scales
    end type contact_lives_type
 
    abstract interface
@@ -136,30 +146,43 @@ contains
    subroutine make_contact_lives(self, parameters, error)
       !> The contacts
       type(contact_lives_type), intent(out) :: self
-      !> Codes of law, coupling and initial state; relative width, back force and spread of the
+      !> Law, coupling and initial state; relative width, back force and spread of the
       !> stretch of newborns; whether contacts attach again
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or superfluous, or the law does not exist
       type(error_type), allocatable, intent(out) :: error
 
       class(threshold_law_type), allocatable :: threshold_law
-      integer :: law, coupling, initial
+      character(len=name_length) :: law
+      integer :: coupling, initial
       real(wp) :: back_force, newborn_width
       logical :: reattach
 
-      call parameters%take("law", law, error)
-      call parameters%take("coupling", coupling, error)
+      call parameters%take("threshold_law", law, error)
+      call parameters%take("coupling", coupling_names, coupling, error)
       call parameters%take("back_force_ratio", back_force, error)
       call parameters%take("newborn_width", newborn_width, error)
       call parameters%take("reattach", reattach, error)
-      call parameters%take("initial", initial, error)
+      call parameters%take("initial", initial_names, initial, error)
       if (allocated(error)) return
-      call make_threshold_law(threshold_law, law_name(law), parameters, back_force, error)
+      call make_threshold_law(threshold_law, law, parameters, back_force, error)
       call parameters%finish(error)
       if (allocated(error)) return
       call new_contact_lives(self, threshold_law, coupling, back_force, newborn_width, reattach, &
          & initial)
    end subroutine make_contact_lives
+
+   !> Scales of the lives.
+   pure function scales(self)
+      !> The contacts
+      class(contact_lives_type), intent(in) :: self
+      !> Scales in the order of scale_names
+      real(wp) :: scales(size(scale_names))
+
+      scales = [self%shortest, self%longest, self%mean_life, self%newborn_stiffness, &
+         & self%newborn_force, self%first_shortest, self%first_longest, self%steady_force, &
+         & self%mean_mass]
+   end function scales
 
    !> Integrals of the newborns' state over their lives.
    subroutine integrate_life(self, mean_life, stretching)

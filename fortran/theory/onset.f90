@@ -4,20 +4,24 @@ module mesoslip_theory_onset
    use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: name_length
    use mesoslip_numerics_sundials_cvode, only: cvode_type, method_bdf
    implicit none
    private
 
    public :: onset_type, integrate_onset
-   public :: onset_length, equation_sequential, equation_melting
+   public :: onset_columns, equation_sequential, equation_melting, equation_names
 
    !> Contacts break one after another, S46
    integer, parameter :: equation_sequential = 1
    !> The whole film melts at once, S47
    integer, parameter :: equation_melting = 2
+   !> Names of the equation_ codes
+   character(len=*), parameter :: equation_names(2) = [character(len=10) :: "sequential", "melting"]
 
-   !> Numbers of a sample: time, displacement, velocity, running mean of the velocity
-   integer, parameter :: onset_length = 4
+   !> Columns of the samples; the mean velocity is the running mean
+   character(len=*), parameter :: onset_columns(*) = [character(len=name_length) :: "time", &
+      & "displacement", "velocity", "mean_velocity"]
 
    !> An equation of the onset of slip.
    type :: onset_type
@@ -40,7 +44,7 @@ contains
       type(onset_type), intent(in), target :: onset
       !> Interval of the samples, and relative tolerance of the integration
       real(wp), intent(in) :: interval, tolerance
-      !> Samples, the last one at the end, shape (onset_length, capacity)
+      !> Samples, the last one at the end, shape (numbers in a sample, capacity)
       real(wp), intent(out) :: samples(:, :)
       !> Number of samples
       integer, intent(out) :: count

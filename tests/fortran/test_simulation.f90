@@ -3,8 +3,8 @@
 program test_simulation
    use mesoslip_contacts, only: make_contacts
    use mesoslip_contacts_base, only: contact_record_length
-   use mesoslip_contacts_mechanics, only: coupling_equal, coupling_scaled, initial_relaxed, &
-      & initial_steady
+   use mesoslip_contacts_mechanics, only: coupling_equal, coupling_names, coupling_scaled, &
+      & initial_relaxed, initial_steady
    use mesoslip_boundary_handles, only: close_handle, find_simulation, open_handle
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
@@ -17,42 +17,39 @@ program test_simulation
    use mesoslip_loop_simulation, only: simulation_type
    use mesoslip_loop_state, only: energy_length
    use mesoslip_sliders, only: make_slider
-   use mesoslip_sliders_layered, only: solver_adams, solver_bdf, solver_series
    use testing, only: check, check_close, finish
    implicit none
 
-   !> Codes of threshold laws at the boundary
-   integer, parameter :: law_gaussian = 1, law_exponential = 5
 
    integer, parameter :: count = 200, columns = 20, layers = 6
    integer(i8), parameter :: forever = 1000000000_i8
    real(wp), parameter :: any_work = 1.0e18_wp
 
-   call closes("gaussian", "rigid", law_gaussian, 0.01_wp, coupling_scaled, initial_relaxed)
-   call closes("exponential", "rigid", law_exponential, 1.0_wp, coupling_equal, initial_steady)
-   call closes("prescribed", "prescribed", law_exponential, 1.0_wp, coupling_scaled, initial_steady)
-   call elastic("series", solver_series, 1.0e-11_wp)
-   call elastic("Adams", solver_adams, 1.0e-4_wp)
-   call elastic("BDF", solver_bdf, 1.0e-3_wp)
-   call goes_on("ensemble", "rigid", solver_series)
-   call goes_on("ensemble", "prescribed", solver_series)
-   call goes_on("ensemble", "layered", solver_series)
-   call goes_on("ensemble", "layered", solver_adams)
-   call goes_on("ensemble", "layered", solver_bdf)
-   call goes_on("ensemble", "quasistatic", solver_series)
-   call goes_on("lattice", "rigid", solver_series)
-   call goes_on("lattice", "quasistatic", solver_series)
-   call goes_on("populations", "rigid", solver_series)
-   call goes_on("populations", "layered", solver_series)
-   call goes_on("ageing", "rigid", solver_series)
-   call goes_on("ageing", "prescribed", solver_series)
-   call goes_on("ageing", "quasistatic", solver_series)
-   call goes_on("ageing populations", "rigid", solver_series)
-   call runs_ahead("rigid", law_gaussian, 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("rigid", law_exponential, 1.0_wp, 5.0e-4_wp)
-   call runs_ahead("rigid", law_exponential, 1.0_wp, 0.0_wp)
-   call runs_ahead("prescribed", law_gaussian, 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("prescribed", law_exponential, 1.0_wp, 1.0e-5_wp)
+   call closes("gaussian", "rigid", "gaussian", 0.01_wp, coupling_scaled, initial_relaxed)
+   call closes("exponential", "rigid", "exponential", 1.0_wp, coupling_equal, initial_steady)
+   call closes("prescribed", "prescribed", "exponential", 1.0_wp, coupling_scaled, initial_steady)
+   call elastic("series", "series", 1.0e-11_wp)
+   call elastic("Adams", "adams", 1.0e-4_wp)
+   call elastic("BDF", "bdf", 1.0e-3_wp)
+   call goes_on("ensemble", "rigid", "series")
+   call goes_on("ensemble", "prescribed", "series")
+   call goes_on("ensemble", "layered", "series")
+   call goes_on("ensemble", "layered", "adams")
+   call goes_on("ensemble", "layered", "bdf")
+   call goes_on("ensemble", "quasistatic", "series")
+   call goes_on("lattice", "rigid", "series")
+   call goes_on("lattice", "quasistatic", "series")
+   call goes_on("populations", "rigid", "series")
+   call goes_on("populations", "layered", "series")
+   call goes_on("ageing", "rigid", "series")
+   call goes_on("ageing", "prescribed", "series")
+   call goes_on("ageing", "quasistatic", "series")
+   call goes_on("ageing populations", "rigid", "series")
+   call runs_ahead("rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("rigid", "exponential", 1.0_wp, 5.0e-4_wp)
+   call runs_ahead("rigid", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call is_bounded()
    call refuses()
    call holds()
@@ -63,14 +60,15 @@ contains
    !> Energy is balanced and contacts are conserved, forward, in a hold, and back.
    subroutine closes(name, slider, law, width, coupling, initial)
       character(len=*), intent(in) :: name, slider
-      integer, intent(in) :: law, coupling, initial
+      character(len=*), intent(in) :: law
+      integer, intent(in) :: coupling, initial
       real(wp), intent(in) :: width
 
       type(simulation_type) :: simulation
       type(error_type), allocatable :: error
       real(wp) :: energy(energy_length), record(contact_record_length, count)
 
-      call build(simulation, "ensemble", slider, law, width, coupling, solver_series)
+      call build(simulation, "ensemble", slider, law, width, coupling, "series")
       call simulation%start(initial)
       call simulation%run(forever, any_work, error)
       energy = simulation%energy_balance()
@@ -89,14 +87,14 @@ contains
    !> Layers on a base, damped, close the energy balance as well as their solver does.
    subroutine elastic(name, solver, tolerance)
       character(len=*), intent(in) :: name
-      integer, intent(in) :: solver
+      character(len=*), intent(in) :: solver
       real(wp), intent(in) :: tolerance
 
       type(simulation_type) :: simulation
       type(error_type), allocatable :: error
       real(wp) :: energy(energy_length)
 
-      call build(simulation, "ensemble", "layered", law_gaussian, 0.1_wp, coupling_scaled, solver)
+      call build(simulation, "ensemble", "layered", "gaussian", 0.1_wp, coupling_scaled, solver)
       call simulation%start(initial_relaxed)
       call simulation%run(forever, any_work, error)
       call check(.not. allocated(error) .and. simulation%ending == ending_drive, &
@@ -105,7 +103,7 @@ contains
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, tolerance, &
          & "energy balance of layers: " // name)
       call check(simulation%contacts%breaks > count, "contacts break under layers: " // name)
-      call check(all(simulation%slider%integrator_counts > 0) .neqv. solver == solver_series, &
+      call check(all(simulation%slider%integrator_counts > 0) .neqv. solver == "series", &
          & "CVODE counts its steps: " // name)
       associate (recorder => simulation%recorder)
          call check(recorder%layers%count == recorder%trace%count &
@@ -120,7 +118,7 @@ contains
    !> bit: its energy, all that it recorded, and what its integrator did.
    subroutine goes_on(contacts, slider, solver)
       character(len=*), intent(in) :: contacts, slider
-      integer, intent(in) :: solver
+      character(len=*), intent(in) :: solver
 
       type(simulation_type) :: whole
       type(simulation_type), allocatable :: now, next
@@ -133,14 +131,14 @@ contains
       character(len=10), parameter :: tables(7) = [character(len=10) :: &
          & "trace", "slip_trace", "slips", "layers", "avalanches", "snapshots", "stages"]
 
-      name = contacts // ", " // slider // ", solver " // achar(iachar("0") + solver)
-      call build(whole, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+      name = contacts // ", " // slider // ", solver " // solver
+      call build(whole, contacts, slider, "gaussian", 0.1_wp, coupling_scaled, solver)
       call set_drive(whole, short)
       call whole%start(initial_relaxed)
       call whole%run(forever, any_work, error)
 
       allocate (now)
-      call build(now, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+      call build(now, contacts, slider, "gaussian", 0.1_wp, coupling_scaled, solver)
       call set_drive(now, short)
       call now%start(initial_relaxed)
       do segment = 1, 100000
@@ -151,7 +149,7 @@ contains
          allocate (words(length))
          if (.not. allocated(error)) call now%fetch(words, error)
          allocate (next)
-         call build(next, contacts, slider, law_gaussian, 0.1_wp, coupling_scaled, solver)
+         call build(next, contacts, slider, "gaussian", 0.1_wp, coupling_scaled, solver)
          call set_drive(next, short)
          if (.not. allocated(error)) call next%restore(words, error)
          deallocate (words)
@@ -175,7 +173,7 @@ contains
    !> wherever it is cut, put away and taken up again.
    subroutine runs_ahead(slider, law, width, delay)
       character(len=*), intent(in) :: slider
-      integer, intent(in) :: law
+      character(len=*), intent(in) :: law
       real(wp), intent(in) :: width, delay
 
       integer, parameter :: lengths(6) = [1, 2, 7, 32, 64, 64]
@@ -231,10 +229,11 @@ contains
    subroutine prepare(simulation, slider, law, width, delay, longest)
       type(simulation_type), intent(out) :: simulation
       character(len=*), intent(in) :: slider
-      integer, intent(in) :: law, longest
+      character(len=*), intent(in) :: law
+      integer, intent(in) :: longest
       real(wp), intent(in) :: width, delay
 
-      call build(simulation, "ensemble", slider, law, width, coupling_scaled, solver_series)
+      call build(simulation, "ensemble", slider, law, width, coupling_scaled, "series")
       simulation%contacts%parameters%delay = delay
       call simulation%avalanches%open(avalanche_parameters_type(), [real(wp) ::], count)
       simulation%max_schedule = longest
@@ -275,7 +274,7 @@ contains
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
 
-      call prepare(simulation, "rigid", law_gaussian, 0.1_wp, 5.0e-4_wp, max_events)
+      call prepare(simulation, "rigid", "gaussian", 0.1_wp, 5.0e-4_wp, max_events)
       call new_parameters(parameters, [character(len=name_length) :: "mass", "stiffness", &
          & "damping"], [1.0e-16_wp, 97.0_wp, 0.0_wp])
       call make_slider(simulation%slider, "rigid", parameters, error)
@@ -299,7 +298,7 @@ contains
       integer(i8), allocatable :: words(:)
       integer(i8) :: length
 
-      call build(rigid, "ensemble", "rigid", law_gaussian, 0.1_wp, coupling_scaled, solver_series)
+      call build(rigid, "ensemble", "rigid", "gaussian", 0.1_wp, coupling_scaled, "series")
       call rigid%start(initial_relaxed)
       call rigid%run(100_i8, any_work, error)
       call rigid%save(length, error)
@@ -308,12 +307,12 @@ contains
       call check(.not. allocated(error), "a state is fetched")
       call rigid%fetch(words, error)
       call check(allocated(error), "a state is fetched once")
-      call build(other, "ensemble", "prescribed", law_gaussian, 0.1_wp, coupling_scaled, &
-         & solver_series)
+      call build(other, "ensemble", "prescribed", "gaussian", 0.1_wp, coupling_scaled, &
+         & "series")
       call other%restore(words, error)
       call check(allocated(error), "a state of another slider is refused")
-      call build(shorter, "ensemble", "rigid", law_gaussian, 0.1_wp, coupling_scaled, &
-         & solver_series)
+      call build(shorter, "ensemble", "rigid", "gaussian", 0.1_wp, coupling_scaled, &
+         & "series")
       call shorter%restore(words(:length - 1), error)
       call check(allocated(error), "a state that is not whole is refused")
       call rigid%restore(words, error)
@@ -344,31 +343,31 @@ contains
    subroutine build(simulation, contacts, slider, law, width, coupling, solver)
       type(simulation_type), intent(out) :: simulation
       character(len=*), intent(in) :: contacts, slider
-      integer, intent(in) :: law, coupling, solver
+      character(len=*), intent(in) :: law, solver
+      integer, intent(in) :: coupling
       real(wp), intent(in) :: width
 
-      character(len=name_length), parameter :: common(10) = [character(len=name_length) :: &
-         & "count", "static_force", "stiffness", "drag", "delay", "back_force_ratio", "coupling", &
-         & "reattach", "law", "relative_width"]
-      character(len=name_length), parameter :: ageing(5) = [character(len=name_length) :: &
-         & "ageing", "ageing_time", "initial_age", "young_force_ratio", "young_relative_width"]
+      character(len=name_length), parameter :: common(8) = [character(len=name_length) :: &
+         & "count", "static_force", "stiffness", "drag", "delay", "back_force_ratio", &
+         & "reattach", "relative_width"]
+      character(len=name_length), parameter :: ageing(4) = [character(len=name_length) :: &
+         & "ageing_time", "initial_age", "young_force_ratio", "young_relative_width"]
       ! Some thresholds fall, as the young are spread widely.
-      real(wp), parameter :: relax(5) = [1.0_wp, 3.0e-3_wp, 0.0_wp, 0.9_wp, 0.3_wp]
+      real(wp), parameter :: relax(4) = [3.0e-3_wp, 0.0_wp, 0.9_wp, 0.3_wp]
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
       type(recorder_parameters_type) :: recorder
-      real(wp) :: values(10), delay
+      real(wp) :: values(8), delay
 
       delay = 5.0e-4_wp
       if (slider == "quasistatic") delay = 0.0_wp
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
-         & 0.1_wp, real(merge(coupling_equal, coupling, contacts(:6) == "ageing"), wp), 1.0_wp, &
-         & real(law, wp), width]
+         & 0.1_wp, 1.0_wp, width]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &
-            & "bond", "lattice"], [values, real(columns, wp), real(count / columns, wp), &
-            & 100.0_wp / count, 1.0_wp])
+            & "bond"], [values, real(columns, wp), real(count / columns, wp), 100.0_wp / count])
+         call parameters%add_word("lattice", "triangular")
       case ("ageing")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & "slider_jumps"], [values, relax, merge(1.0_wp, 0.0_wp, slider == "quasistatic")])
@@ -382,6 +381,10 @@ contains
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", &
             & "rows"], [values, 0.0_wp, 0.0_wp])
       end select
+      call parameters%add_word("threshold_law", law)
+      call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
+         & contacts(:6) == "ageing"))))
+      if (contacts(:6) == "ageing") call parameters%add_word("ageing", "relax")
       call make_contacts(simulation%contacts, contacts, parameters, 1_i8, 0_i8, error)
       call check(.not. allocated(error), "contacts: " // contacts)
 
@@ -394,9 +397,10 @@ contains
       case ("layered")
          recorder%layers = layers
          call new_parameters(parameters, [character(len=name_length) :: "layers", "mass", &
-            & "stiffness", "damping", "base_mass", "base_stiffness", "base_damping", "solver", &
+            & "stiffness", "damping", "base_mass", "base_stiffness", "base_damping", &
             & "relative_tolerance", "absolute_tolerance"], [real(layers, wp), 1.47e-3_wp, 97.0_wp, &
-            & 20.0_wp, 5.0e-3_wp, 1.0e4_wp, 10.0_wp, real(solver, wp), 1.0e-8_wp, 1.0e-21_wp])
+            & 20.0_wp, 5.0e-3_wp, 1.0e4_wp, 10.0_wp, 1.0e-8_wp, 1.0e-21_wp])
+         call parameters%add_word("solver", solver)
       case ("quasistatic")
          call new_parameters(parameters, [character(len=name_length) :: "stiffness"], [97.0_wp])
       case default

@@ -4,7 +4,7 @@ program test_threshold_law
    use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal, coupling_scaled
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_contacts_threshold_laws, only: law_name, new_threshold_law
+   use mesoslip_contacts_threshold_laws, only: law_names, new_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_contacts_threshold_laws_gaussian, only: inverse_normal
    use testing, only: check, check_close, finish
@@ -16,21 +16,21 @@ program test_threshold_law
    type(error_type), allocatable :: error
    integer :: kind, width
 
-   do kind = 1, size(law_name)
+   do kind = 1, size(law_names)
       do width = 1, size(widths)
-         call new_threshold_law(law, law_name(kind), widths(width), 0.0_wp, error)
-         call check(.not. allocated(error), "a law: " // law_name(kind))
-         call moments(law, widths(width), trim(law_name(kind)))
-         call consistency(law, trim(law_name(kind)))
-         call new_threshold_law(law, law_name(kind), widths(width), 0.8_wp, error)
-         call consistency(law, trim(law_name(kind)) // " above a minimum")
+         call new_threshold_law(law, law_names(kind), widths(width), 0.0_wp, error)
+         call check(.not. allocated(error), "a law: " // law_names(kind))
+         call moments(law, widths(width), trim(law_names(kind)))
+         call consistency(law, trim(law_names(kind)))
+         call new_threshold_law(law, law_names(kind), widths(width), 0.8_wp, error)
+         call consistency(law, trim(law_names(kind)) // " above a minimum")
          call check(law%quantile(1.0_wp - 2.0_wp**(-53)) > 0.8_wp, "thresholds exceed the minimum")
       end do
       do width = 1, size(wide)
-         if (law_name(kind) == "uniform" .and. wide(width) > 0.57_wp) cycle
-         if (law_name(kind) == "exponential" .and. wide(width) > 1.0_wp) cycle
-         call carried(law_name(kind), wide(width), 0.0_wp, "")
-         call carried(law_name(kind), wide(width), 0.5_wp, " above a minimum")
+         if (law_names(kind) == "uniform" .and. wide(width) > 0.57_wp) cycle
+         if (law_names(kind) == "exponential" .and. wide(width) > 1.0_wp) cycle
+         call carried(law_names(kind), wide(width), 0.0_wp, "")
+         call carried(law_names(kind), wide(width), 0.5_wp, " above a minimum")
       end do
    end do
 
@@ -56,11 +56,11 @@ contains
       logical :: agree
 
       probability = [(real(place, wp) / (number + 1), place=1, number)]**3
-      do kind = 1, size(law_name)
-         call new_threshold_law(law, law_name(kind), 0.3_wp, 0.2_wp, error)
+      do kind = 1, size(law_names)
+         call new_threshold_law(law, law_names(kind), 0.3_wp, 0.2_wp, error)
          call law%quantiles(probability, threshold)
          call check(all(abs(threshold - law%quantile(probability)) <= 0.0_wp), &
-            & "quantiles of several probabilities: " // law_name(kind))
+            & "quantiles of several probabilities: " // law_names(kind))
          ! From the tail at small probabilities through the middle to the other tail.
          agree = .true.
          do length = 1, 70
@@ -70,7 +70,7 @@ contains
             agree = agree .and. all(abs(threshold(:length) - law%quantile(asked)) <= 0.0_wp)
             agree = agree .and. all(threshold(length + 1:) < 0.0_wp)
          end do
-         call check(agree, "quantiles of 1 to 70 probabilities: " // law_name(kind))
+         call check(agree, "quantiles of 1 to 70 probabilities: " // law_names(kind))
       end do
    end subroutine several
 

@@ -120,7 +120,7 @@ def _wrong_trace(tree: xr.DataTree, config: Config) -> Iterator[str]:
     duration, interval = config.duration, config.output_interval
     if time[-1] > duration * (1 + ROUNDING):
         yield f"trace: goes on to {time[-1]:g} s, beyond {duration:g} s"
-    if tree.attrs["ending"] == ENDINGS[1] and time[-1] < duration - interval * (1 + 1e-6):
+    if tree.attrs["ending"] == ENDINGS["drive"] and time[-1] < duration - interval * (1 + 1e-6):
         yield f"trace: ends at {time[-1]:g} s, before {duration:g} s"
     detached, count = tree["detached_contacts"].values, config.contacts.count
     slack = 0 if config.contact_kind.is_discrete else ROUNDING * count
@@ -214,7 +214,7 @@ def _wrong_avalanches(tree: xr.DataTree, config: Config) -> Iterator[str]:
         if np.any(size < least):
             yield "avalanches: one is too small"
         breaks = int(tree["breaks"].values[number])
-        is_endless = ENDINGS[4] in tree.attrs["ending"]
+        is_endless = ENDINGS["slides"] in tree.attrs["ending"]
         if size.sum() > breaks or (least == 1 and not is_endless and size.sum() != breaks):
             yield f"avalanches: {size.sum()} breaks of {breaks}"
         if least == 1 and len(size) != tree["avalanche_count"].values[number]:

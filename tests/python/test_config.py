@@ -911,9 +911,9 @@ def test_what_the_kernel_is_told_of_contacts(klein):
         "drag": pytest.approx(956 * 1e-10 / 4080 * 3.5e-9 * 2e11),
         "delay": 5e-4,
         "back_force_ratio": 0.1,
-        "coupling": 1,
+        "coupling": "scaled",
         "reattach": 1,
-        "law": 1,
+        "threshold_law": "gaussian",
         "relative_width": 0.01,
     }
     config = klein()
@@ -930,7 +930,7 @@ def test_what_the_kernel_is_told_of_contacts(klein):
     kind = config.contact_kind
     assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("lattice", True, True)
     bond = 3 * 0.3 * 18e-6 / 4080 / math.sqrt(1e-10 / 4080)
-    places = {"bond": pytest.approx(bond), "lattice": 2, "columns": 60, "rows": 68}
+    places = {"bond": pytest.approx(bond), "lattice": "square", "columns": 60, "rows": 68}
     assert kind.kernel_parameters(config) == common | places
 
     config = klein(run__engine="me")

@@ -8,10 +8,13 @@ module mesoslip_sliders_layered_system
 
    public :: layered_parameters_type, system_type
    public :: accelerate, fastest_rate, new_system, push
-   public :: solver_series, solver_adams, solver_bdf
+   public :: solver_series, solver_adams, solver_bdf, solver_names, solver_codes
 
    !> Taylor series, and CVODE with either family of formulas
    integer, parameter :: solver_series = 0, solver_adams = method_adams, solver_bdf = method_bdf
+   !> Names of the solver_ codes, in the order of solver_codes
+   character(len=*), parameter :: solver_names(3) = [character(len=6) :: "series", "adams", "bdf"]
+   integer, parameter :: solver_codes(3) = [solver_series, solver_adams, solver_bdf]
 
    !> What the slider is made of.
    type :: layered_parameters_type

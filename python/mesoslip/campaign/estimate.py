@@ -99,4 +99,4 @@ def _trace_bytes(combination: Combination) -> float:
     """Size of the trace of a run, without the finer ones around slips."""
     config = combination.config
     samples = config.expected_duration / config.output_interval + 1
-    return 8.0 * samples * (COLUMNS["trace"] + config.slider.layers_recorded(config))
+    return 8.0 * samples * (len(COLUMNS["trace"]) + config.slider.layers_recorded(config))

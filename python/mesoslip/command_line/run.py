@@ -153,5 +153,5 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
         say(f"{path}: warning: {told['audit']}")
     if config.unreached_drive is not None:
         say(f"{path}: warning: {config.unreached_drive}")
-    if told["ending"] != ENDINGS[1]:
+    if told["ending"] != ENDINGS["drive"]:
         say(f"{path}: the run ended as follows: {told['ending']}")

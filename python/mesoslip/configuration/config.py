@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from mesoslip.configuration import checks
 from mesoslip.configuration.contacts import contact_kind
 from mesoslip.configuration.contacts.base import ContactKind
-from mesoslip.configuration.contacts.tables import INITIAL_STATES, Contacts, Interaction
+from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
     Change,
@@ -108,11 +108,6 @@ class Config(Table):
     def contact_kind(self) -> ContactKind:
         """The kind of contacts."""
         return contact_kind(self.run, self.contacts, self.interaction)
-
-    @property
-    def initial_code(self) -> int:
-        """The kernel's code of the initial state of the contacts."""
-        return INITIAL_STATES[self.contacts.initial]
 
     @property
     def curve_length(self) -> float:

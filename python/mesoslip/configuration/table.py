@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import partial
 from numbers import Integral
 from typing import Annotated, Any, NamedTuple, Self
@@ -118,8 +118,8 @@ def problem(key: str, message: str) -> PydanticCustomError:
     return PydanticCustomError("table", "{message}", {"key": key, "message": message})
 
 
-def choice(names: Mapping[str, object]) -> Any:
-    """Check that a value is one of the names of a mapping, which says what each stands for."""
+def choice(names: Collection[str]) -> Any:
+    """Check that a value is one of the names."""
     *others, last = (f"'{name}'" for name in names)
     expected = f"{', '.join(others)} or {last}"
 

@@ -51,7 +51,7 @@ class RealizationResults(Protocol):
     """What came out of a realization.
 
     Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
-    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_places",
+    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_events",
     and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
     """
 
@@ -241,7 +241,7 @@ DIMENSIONS = {
     "stages": "stage",
     "slip_trace": "sample",
     "avalanches": "avalanche",
-    "snapshot_places": "snapshot",
+    "snapshot_events": "snapshot",
     "snapshots": "snapshot",
 }
 
@@ -307,8 +307,8 @@ def _snapshots(results: RunResults) -> GroupLayout:
     config, lattice = results.config, results.config.interaction
     assert lattice is not None
     assert config.contacts.area is not None
-    writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_places")
-    how: dict[str, Any] = {"table": "snapshot_places"}
+    writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_events")
+    how: dict[str, Any] = {"table": "snapshot_events"}
     writer.add("snapshot_time", ("snapshot",), is_coordinate=True, pick=column(0), **how)
     writer.add("displacement", ("snapshot",), pick=column(1), **how)
     writer.add("avalanche_size", ("snapshot",), pick=column(2), **how)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -16,15 +16,18 @@ from mesoslip.errors import RunError
 Array = NDArray[np.float64]
 Words = NDArray[np.int64]
 
-# Characters of the name of a parameter, see fortran/numerics/parameters.f90.
+Names = NDArray[np.bytes_]
+
+# Characters of a name, see fortran/numerics/parameters.f90, and names in a list at most.
 NAME_LENGTH = 32
+MAX_NAMES = 64
 
 
 class Progress(NamedTuple):
     """How far a simulation has come."""
 
-    ending: int
-    """Why it is over; 0 if it is not."""
+    ending: str
+    """Why it is over; empty if it is not."""
     time: float
     """Time [s]."""
     displacement: float
@@ -106,13 +109,13 @@ class Kernel:
         self.__copy__()
 
     def set_contacts(
-        self, kind: str, parameters: Mapping[str, float], seed: int, realization: int
+        self, kind: str, parameters: Mapping[str, float | str], seed: int, realization: int
     ) -> None:
-        """Make the contacts of a kind from named numbers."""
+        """Make the contacts of a kind from named parameters."""
         self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
-    def set_slider(self, kind: str, parameters: Mapping[str, float]) -> None:
-        """Make the slider of a kind from named numbers."""
+    def set_slider(self, kind: str, parameters: Mapping[str, float | str]) -> None:
+        """Make the slider of a kind from named parameters."""
         self._call(_core.set_slider, kind, *named(parameters))
 
     def set_drive(
@@ -171,7 +174,7 @@ class Kernel:
         """What to record of avalanches; 0 for what is not recorded, and for no most number."""
         self._call(_core.set_avalanches, least_size, snapshot_size, most_avalanches, snapshot_times)
 
-    def start(self, initial: int) -> None:
+    def start(self, initial: str) -> None:
         """Draw the contacts in an initial state, and put the slider in balance with them."""
         self._call(_core.start_simulation, initial)
 
@@ -184,7 +187,8 @@ class Kernel:
 
     def ask(self) -> Progress:
         """How far it has come."""
-        return Progress(*self._call(_core.ask_simulation))
+        ending, *numbers = self._call(_core.ask_simulation)
+        return Progress(ending.decode().strip(), *numbers)
 
     def energy(self) -> Array:
         """Terms of the energy balance [J]."""
@@ -216,10 +220,26 @@ class Kernel:
         self._call(_core.restore_simulation, words)
 
 
-def named(parameters: Mapping[str, float]) -> tuple[Any, Array]:
-    """Named numbers as a kernel takes them: names, and values."""
-    names = [name.ljust(NAME_LENGTH).encode() for name in parameters]
-    # Of two arrays of one length f2py refuses the second if that is 0.
-    values = np.zeros(max(1, len(names)))
-    values[: len(names)] = list(parameters.values())
-    return np.array(names, dtype=f"S{NAME_LENGTH}"), values
+def named(parameters: Mapping[str, float | str]) -> tuple[Names, Array, Names]:
+    """Parameters as a kernel takes them: names, numbers, and words where there are no numbers."""
+    # Of arrays of one length f2py refuses all but the first if that is 0.
+    room = max(1, len(parameters))
+    values, words = np.zeros(room), [""] * room
+    for number, value in enumerate(parameters.values()):
+        if isinstance(value, str):
+            words[number] = value
+        else:
+            values[number] = value
+    return _padded(parameters), values, _padded(words)
+
+
+def _padded(words: Iterable[str]) -> Names:
+    """Words with blanks behind, as Fortran compares them."""
+    padded = [word.ljust(NAME_LENGTH).encode() for word in words]
+    return np.array(padded, dtype=f"S{NAME_LENGTH}")
+
+
+def name_list(which: str) -> tuple[str, ...]:
+    """Names that the kernels state once: the columns of a table, or the kinds of something."""
+    names, count = checked(_core.list_names(which, MAX_NAMES))
+    return tuple(str(name) for name in np.char.strip(np.char.decode(names[:count])))

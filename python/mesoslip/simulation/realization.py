@@ -18,6 +18,7 @@ from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.tables import (
     COLUMNS,
+    CONTACT_COLUMNS,
     ENERGY_COLUMNS,
     SNAPSHOT_NUMBERS,
     TABLES,
@@ -28,14 +29,17 @@ from mesoslip.simulation.tables import (
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
+# Why a run is over, by the kernel's names.
 ENDINGS = {
-    1: "the drive came to its end",
-    2: "as many avalanches as wanted",
-    3: "no contact is left to break",
-    4: "contacts break under the force without end; breaks of this slide are in no avalanche",
-    5: "as many slips as wanted",
-    6: "the slider came to its displacement",
-    7: "the state is steady",
+    "": "",
+    "drive": "the drive came to its end",
+    "avalanches": "as many avalanches as wanted",
+    "broken": "no contact is left to break",
+    "slides": "contacts break under the force without end; breaks of this slide are in no "
+    "avalanche",
+    "slips": "as many slips as wanted",
+    "displacement": "the slider came to its displacement",
+    "steady": "the state is steady",
 }
 
 # Work of the drive over the energy of all contacts about to break, below which it does not count.
@@ -178,7 +182,7 @@ class Realization:
             kernel.restore(self._words)
             self._words = None
         else:
-            kernel.start(config.initial_code)
+            kernel.start(config.contacts.initial)
         self._kernel = kernel
         return kernel
 
@@ -229,7 +233,7 @@ class Realization:
             self.displacement = progress.displacement
             self.force_error = progress.force_error
             self.integrator_counts = progress.integrator_counts.copy()
-            self.ending = ENDINGS.get(progress.ending, "")
+            self.ending = ENDINGS[progress.ending]
             self._energy = kernel.energy() if self.ending else None
 
     def close(self) -> None:
@@ -289,12 +293,13 @@ class Realization:
         """
         if self.finished and self._kernel is None:
             raise RunError(f"realization {self.number}: the run is over, and its contacts are gone")
-        names = ("origin", "stiffness", "break_stretch", "renewals")
-        return dict(zip(names, self._open().contacts(self.config.contacts.count), strict=True))
+        return dict(
+            zip(CONTACT_COLUMNS, self._open().contacts(self.config.contacts.count), strict=True)
+        )
 
     def rows(self, table: str) -> Rows | FirstRows | SnapshotRows:
         """What was recorded of a table, see `TABLES`: without samples of what came to no slip."""
-        rows = self._tables.get(table) or Rows(COLUMNS[table])
+        rows = self._tables.get(table) or Rows(len(COLUMNS[table]))
         if table == "slip_trace":
             return FirstRows(rows, self._slip_samples(rows))
         if table == "snapshots":
@@ -327,9 +332,9 @@ class Realization:
         return self.rows("avalanches").read()
 
     @property
-    def snapshot_places(self) -> Array:
+    def snapshot_events(self) -> Array:
         """When and where snapshots were taken, columns `SNAPSHOT_COLUMNS`."""
-        return self.rows("snapshot_places").read()
+        return self.rows("snapshot_events").read()
 
     @property
     def snapshots(self) -> Array:

@@ -12,86 +12,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import RunError
+from mesoslip.simulation.kernel import name_list
 
 Array = NDArray[np.float64]
 
-TRACE_COLUMNS = (
-    "time",
-    "drive_displacement",
-    "displacement",
-    "velocity",
-    "spring_force",
-    "contact_force",
-    "detached_contacts",
-    "elastic_force",
-    "base_displacement",
-)
-SLIP_COLUMNS = (
-    "slip",
-    "start_time",
-    "end_time",
-    "force_before",
-    "force_after",
-    "peak_velocity",
-    "contacts_broken",
-)
-STAGE_COLUMNS = (
-    "stage_number",
-    "stage_start_time",
-    "stage_end_time",
-    "drive_start_velocity",
-    "drive_end_velocity",
-    "start_force",
-    "end_force",
-    "start_displacement",
-    "end_displacement",
-    "drive_start_displacement",
-    "greatest_force",
-    "greatest_force_time",
-    "greatest_force_displacement",
-    "least_force",
-    "least_force_time",
-    "least_force_displacement",
-    "mean_force",
-)
-AVALANCHE_COLUMNS = (
-    "time",
-    "displacement",
-    "size",
-    "force_before",
-    "force_drop",
-    "slip",
-    "area",
-    "width",
-    "height",
-    "generations",
-)
-SNAPSHOT_COLUMNS = ("time", "displacement", "size")
-# Of each contact of a snapshot.
-SNAPSHOT_NUMBERS = ("stretch", "load", "generation")
-ENERGY_COLUMNS = (
-    "drive_work",
-    "slider_energy",
-    "contact_energy",
-    "damping_loss",
-    "drag_loss",
-    "break_loss",
-    "birth_gain",
-    "residual",
-)
+# The columns of the tables, as the kernels state them.
+TRACE_COLUMNS = name_list("trace")
+SLIP_COLUMNS = name_list("slips")
+STAGE_COLUMNS = name_list("stages")
+AVALANCHE_COLUMNS = name_list("avalanches")
+SNAPSHOT_COLUMNS = name_list("snapshot_events")
+# Of each contact of a snapshot, and of each contact as it is.
+SNAPSHOT_NUMBERS = name_list("snapshots")
+CONTACT_COLUMNS = name_list("contacts")
+ENERGY_COLUMNS = name_list("energy")
 
-# The tables of the kernel with the numbers in a row, but for those that depend on the run. A sample
-# of a slip trace has the number of its slip behind the columns of the trace; the displacements of
-# layers go with the samples of the trace.
-COLUMNS = {
-    "trace": len(TRACE_COLUMNS),
-    "slip_trace": len(TRACE_COLUMNS) + 1,
-    "slips": len(SLIP_COLUMNS),
-    "stages": len(STAGE_COLUMNS),
-    "layers": 0,
-    "avalanches": len(AVALANCHE_COLUMNS),
-    "snapshot_places": len(SNAPSHOT_COLUMNS),
-    "snapshots": 0,
+# Tables with named columns; a row of the others depends on the run: the displacements of the layers
+# at a sample of the trace, all contacts of a snapshot.
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "trace": TRACE_COLUMNS,
+    "slip_trace": name_list("slip_trace"),
+    "slips": SLIP_COLUMNS,
+    "stages": STAGE_COLUMNS,
+    "layers": (),
+    "avalanches": AVALANCHE_COLUMNS,
+    "snapshot_events": SNAPSHOT_COLUMNS,
+    "snapshots": (),
 }
 TABLES = tuple(COLUMNS)
 

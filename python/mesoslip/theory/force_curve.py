@@ -112,11 +112,12 @@ def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
     return BPoly(np.linalg.solve(bernstein, values), edges, extrapolate=False)
 
 
-def _solve(parameters: Mapping[str, float], start: float, width: float, panels: int) -> _Solution:
-    point, solution, pinned, mismatch = checked(
+def _solve(
+    parameters: Mapping[str, float | str], start: float, width: float, panels: int
+) -> _Solution:
+    point, breaks, slope, force, stiffness, pinned, mismatch = checked(
         _core.force_curve(*named(parameters), start, width, panels, POINTS)
     )
-    breaks, slope, force, stiffness = np.moveaxis(solution, -1, 0)
     edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
     return _Solution(
         edges,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from mesoslip import _core
-from mesoslip.configuration.contacts.tables import COUPLINGS
 from mesoslip.simulation.kernel import checked, named
 
 if TYPE_CHECKING:
@@ -26,16 +25,16 @@ class Scales(NamedTuple):
     mean_mass: float
 
 
-def law_parameters(config: Config, newborn_width: float = 0.0) -> dict[str, float]:
+def law_parameters(config: Config, newborn_width: float = 0.0) -> dict[str, float | str]:
     """What the kernels of the master equation are told of contacts; ``newborn_width`` in m."""
     contacts = config.contacts
     return {
         **contacts.threshold.kernel_parameters,
-        "coupling": COUPLINGS[contacts.coupling],
+        "coupling": contacts.coupling,
         "back_force_ratio": contacts.back_force_ratio,
         "newborn_width": newborn_width * contacts.stiffness / contacts.static_force,
         "reattach": int(contacts.reattach),
-        "initial": config.initial_code,
+        "initial": contacts.initial,
     }
 
 

@@ -49,7 +49,7 @@ SUMMARY = {
     "expansion_end_time": ("1", "tau at which it comes there"),
 }
 
-EQUATIONS = {"sequential": 1, "melting": 2}
+EQUATIONS = ("sequential", "melting")
 # S46 describes the contacts as long as its force is off by less than this part of F_s.
 EXPANSION_ERROR = 0.02
 TOLERANCE = 1e-10
@@ -118,7 +118,7 @@ def solve(
         interval = scale / SAMPLES
     samples = np.zeros((4, MOST_SAMPLES), order="F")
     count, ended, status, message = _core.onset(
-        EQUATIONS[equation],
+        equation,
         np.array(coefficients),
         damping,
         drag,

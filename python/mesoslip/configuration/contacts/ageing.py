@@ -54,7 +54,7 @@ class AgeingContacts(ContactKind):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
         return run.engine == "eq" and contacts.ageing is not None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         return (
             common_parameters(config)
             | ageing_of(config).kernel_parameters()
@@ -74,7 +74,7 @@ class AgeingPopulations(PopulationContacts):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
         return run.engine == "me" and contacts.ageing is not None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
 
     def problems(self, config: Setting) -> Complaints:

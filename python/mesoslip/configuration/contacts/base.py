@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from mesoslip.configuration.contacts.tables import COUPLINGS, Contacts, Interaction
+from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -80,7 +80,7 @@ class ContactKind(ABC):
         return self.interaction is not None
 
     @abstractmethod
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         """What the kernel is told of the contacts, in SI; forces and stiffness of one contact."""
 
     @abstractmethod
@@ -88,7 +88,7 @@ class ContactKind(ABC):
         """The combinations that this kind refuses."""
 
 
-def common_parameters(config: Setting) -> dict[str, float]:
+def common_parameters(config: Setting) -> dict[str, float | str]:
     """What the kernel is told of contacts of every kind."""
     contacts = config.contacts
     ignores_delay = config.slider.ignores_delay
@@ -99,7 +99,7 @@ def common_parameters(config: Setting) -> dict[str, float]:
         "drag": 0.0 if ignores_delay else contacts.contact_drag,
         "delay": 0.0 if ignores_delay else contacts.delay,
         "back_force_ratio": contacts.back_force_ratio,
-        "coupling": COUPLINGS[contacts.coupling],
+        "coupling": contacts.coupling,
         "reattach": int(contacts.reattach),
         **contacts.threshold.kernel_parameters,
     }

@@ -25,7 +25,7 @@ class EnsembleContacts(ContactKind):
     def bytes_per_contact(self) -> int:
         return 260 if self.on_lattice else 150
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         columns = rows = 0
         if self.interaction is not None:
             columns, rows = self.interaction.columns, self.interaction.rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import LATTICES, Contacts, Interaction
+from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -24,10 +24,10 @@ class LatticeContacts(ContactKind):
             return False
         return run.engine == "eq" and interaction is not None and interaction.strength > 0
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         return common_parameters(config) | {
             "bond": self.interaction.bond_stiffness(config.contacts),
-            "lattice": LATTICES[self.interaction.lattice],
+            "lattice": self.interaction.lattice,
             "columns": self.interaction.columns,
             "rows": self.interaction.rows,
         }

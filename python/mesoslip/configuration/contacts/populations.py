@@ -29,7 +29,7 @@ class PopulationContacts(ContactKind):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
         return run.engine == "me" and contacts.ageing is None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         return common_parameters(config) | {"resolution": config.run.resolution}
 
     def problems(self, config: Setting) -> Complaints:

@@ -31,11 +31,11 @@ from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
 
 Array = NDArray[np.float64]
 
-# Choices, and their codes in the kernels.
-COUPLINGS = {"scaled": 1, "equal": 2}
-AGEING_LAWS = {"relax": 1, "log": 2}
-INITIAL_STATES = {"relaxed": 1, "steady": 2, "uniform": 3}
-LATTICES = {"triangular": 1, "square": 2}
+# Choices, by the names that the kernels know.
+COUPLINGS = ("scaled", "equal")
+AGEING_LAWS = ("relax", "log")
+INITIAL_STATES = ("relaxed", "steady", "uniform")
+LATTICES = ("triangular", "square")
 
 # Neighbours of a contact on each lattice.
 NEIGHBOURS = {"triangular": 6, "square": 4}
@@ -74,10 +74,9 @@ class Threshold(Table):
         return LAWS[self.law]
 
     @property
-    def kernel_parameters(self) -> dict[str, float]:
+    def kernel_parameters(self) -> dict[str, float | str]:
         """What the kernel is told of the law."""
-        code = list(LAWS).index(self.law) + 1
-        return {"law": code, **self.kind.kernel_parameters(self)}
+        return {"threshold_law": self.law, **self.kind.kernel_parameters(self)}
 
     def probability_above(self, threshold: float) -> float:
         """Probability that a draw of the law is above a relative threshold."""
@@ -125,10 +124,10 @@ class Ageing(Table):
             return self.initial_age
         return ALWAYS if self.law == "relax" else 0.0
 
-    def kernel_parameters(self) -> dict[str, float]:
+    def kernel_parameters(self) -> dict[str, float | str]:
         """What the kernel is told of the law."""
         return {
-            "ageing": AGEING_LAWS[self.law],
+            "ageing": self.law,
             "ageing_time": self.time,
             "initial_age": self.start_age,
             **{key: getattr(self, key) for key in AGEING_KEYS[self.law]},

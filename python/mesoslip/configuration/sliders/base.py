@@ -99,7 +99,7 @@ class SliderTable(Table):
         return self.kind
 
     @abstractmethod
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         """What the kernel is told of the slider, in SI."""
 
     @property

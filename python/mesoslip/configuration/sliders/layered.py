@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from mesoslip.configuration.sliders.base import Complex
 
 # Methods of integration, and their codes in the kernel.
-SOLVERS = {"series": 0, "adams": 1, "bdf": 2}
+SOLVERS = ("series", "adams", "bdf")
 AUTOMATIC = "auto"
 
 # Work of a run by series, steps times layers, beyond which stiff formulas take over.
@@ -59,7 +59,7 @@ class Base(Table):
 class Solver(Table):
     """How layers are integrated: by series, exact to rounding, or by CVODE's formulas."""
 
-    method: Annotated[str, choice({AUTOMATIC: None, **SOLVERS})] = AUTOMATIC
+    method: Annotated[str, choice((AUTOMATIC, *SOLVERS))] = AUTOMATIC
     """`series` is exact to rounding; `adams` and `bdf` are formulas of CVODE; `auto` takes the
     series unless that would take hours."""
     relative_tolerance: Annotated[Number, Field(ge=1e-13, le=1e-2)] = 1e-8
@@ -161,7 +161,7 @@ class LayeredSlider(InertialSlider):
             return setup
         return max(setup, math.pi * math.sqrt((self.base.mass + self.mass) / self.base.stiffness))
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         relative = self.solver.relative_tolerance
         base = self.base
         return {
@@ -172,7 +172,7 @@ class LayeredSlider(InertialSlider):
             "base_mass": 0.0 if base is None else base.mass,
             "base_stiffness": 0.0 if base is None else base.stiffness,
             "base_damping": 0.0 if base is None else base.damping,
-            "solver": SOLVERS[self.solver_name(config)],
+            "solver": self.solver_name(config),
             "relative_tolerance": relative,
             "absolute_tolerance": relative
             * TINY_STRETCH

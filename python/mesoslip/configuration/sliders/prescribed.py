@@ -18,5 +18,5 @@ class PrescribedSlider(SliderTable):
     def spring_stiffness(self) -> float:
         return math.inf
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:  # noqa: ARG002
         return {}

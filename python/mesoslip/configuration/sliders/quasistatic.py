@@ -35,7 +35,7 @@ class QuasistaticSlider(SliderTable):
     def kernel_kind(self) -> str:
         return "quasistatic_force" if self.stiffness is None else self.kind
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:  # noqa: ARG002
         return {} if self.stiffness is None else {"stiffness": self.stiffness}
 
     def problems(self, config: Setting) -> Complaints:

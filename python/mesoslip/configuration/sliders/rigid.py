@@ -38,7 +38,7 @@ class RigidSlider(InertialSlider):
             return self.damping
         return (self.damping_ratio or 0.0) * self.omega_s
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float]:  # noqa: ARG002
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:  # noqa: ARG002
         return {"mass": self.mass, "stiffness": self.stiffness, "damping": self.damping_rate}
 
     @property

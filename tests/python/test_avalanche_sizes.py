@@ -27,6 +27,7 @@ from mesoslip.analysis.avalanche_sizes import (
     power_law,
     sums,
 )
+from mesoslip.analysis.avalanche_sizes.tally import tally_of
 from mesoslip.errors import MesoslipError
 from mesoslip.plots import avalanches as avalanche_plots
 from scipy import optimize, special, stats
@@ -228,6 +229,16 @@ def test_true_laws_are_accepted(count):
         for seed in range(40)
     ]
     assert stats.kstest(p_values, "uniform").pvalue > 0.02
+
+
+def test_chi_squared_of_a_fitted_law_has_its_degrees_of_freedom():
+    """The probability of a larger one is uniform, for a bin of each of few sizes."""
+    agreements = []
+    for seed in range(400):
+        tally = tally_of(draw(600, seed, 1.5, last=8))
+        agreements.append(goodness.misfit(laws.uncut_law(tally, 1, 8), tally).agreement)
+    assert stats.kstest(agreements, "uniform").pvalue > 0.02
+    assert np.mean(agreements) == pytest.approx(0.5, abs=0.04)
 
 
 def test_a_choice_does_not_spoil_the_test():

@@ -19,7 +19,7 @@ from mesoslip.inference.sampler import draw, r_hat
 from mesoslip.inference.simulations import Simulations, StoppedError
 from mesoslip.inference.summaries import Feature, Summarizer
 from mesoslip.simulation.stop import StopFlag
-from scipy.stats import kstest
+from scipy.stats import kstest, norm
 
 FREE = {
     "contacts.static_force": {"from": "5 uN", "to": "40 uN", "prior": "logarithmic"},
@@ -194,6 +194,30 @@ def test_the_likelihood_learns_means_widths_and_tails():
         density = -0.5 * np.sum(away**2, axis=1) - 2 * at[:, 0]
         learnt = surrogate.log_likelihood(statistics, at)
         assert learnt[0] - learnt[1] == pytest.approx(density[0] - density[1], rel=0.2)
+
+
+def test_the_uncertainty_of_the_mean_is_part_of_the_likelihood():
+    """Of a straight line through few simulations, as in any table of regression: 1 + x (X'X)^-1 x
+    times the variance, also far from the simulations."""
+    known = np.array([-1.5, -0.5, 0.0, 0.5, 1.5])
+    terms = np.stack([np.ones(5), known], axis=1)
+    surrogate = likelihood.Surrogate(
+        powers=((), (0,)),
+        centre=np.zeros(1),
+        spread=np.ones(1),
+        coefficients=np.array([[2.0], [3.0]]),
+        inverse=np.linalg.inv(terms.T @ terms),
+        log_scale=np.array([[np.log(0.1)], [0.0]]),
+        log_range=np.array([[-9.0], [9.0]]),
+        root=np.eye(1),
+        freedom=np.inf,
+        validity=None,
+    )
+    at = np.array([0.0, 1.0, 4.0])
+    width = 0.1 * np.sqrt(1 + 1 / 5 + at**2 / np.sum(known**2))
+    expected = norm.logpdf(2.5, 2 + 3 * at, width)
+    found = surrogate.log_likelihood(np.array([2.5]), at[:, None])
+    np.testing.assert_allclose(found - found[0], expected - expected[0], rtol=1e-12)
 
 
 def test_summaries_that_few_simulations_have_lower_the_likelihood_where_they_have_not():

@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables
+from kinds import configuration
 from mesoslip import api
 from mesoslip.output import files, layout
+from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.tables import FirstRows
 
 QUICK = {
@@ -128,7 +130,7 @@ def test_rows_of_the_kernel_become_variables(results):
         tables = {
             "slip_traces": ("slip_trace", {"sample_time": 0, "velocity": 3, "slip": -1}),
             "avalanches": ("avalanches", {"start_time": 0, "size": 2, "force_drop": 4}),
-            "snapshots": ("snapshot_events", {"snapshot_time": 0, "avalanche_size": 2}),
+            "snapshots": ("snapshot_places", {"snapshot_time": 0, "avalanche_size": 2}),
         }
         for group in tables.keys() & tree.children.keys():
             table, columns = tables[group]
@@ -317,3 +319,21 @@ def test_what_a_killed_process_left_behind_is_removed(tmp_path):
         one.touch()
     files.check_writable(path)
     assert sorted(tmp_path.iterdir()) == sorted(others)
+
+
+def test_samples_of_a_slip_come_with_the_slip():
+    """In the midst of a slip its samples are not yet those of one."""
+    sliding = {"drive": {"velocity": 1e-5}, "run__duration": 0.1, "output__slip_interval": 1e-4}
+    realization = Realization(configuration("rigid", **sliding), 0)
+    times, counts = [], []
+    while not realization.finished:
+        realization.advance(1)
+        owners = realization.slip_trace[:, -1]
+        assert np.all(owners < len(realization.slips))
+        times.append(realization.time)
+        counts.append(len(owners))
+    assert len(realization.slips) > 1
+    # It was looked at in the midst of each.
+    for start, end in realization.slips[:, 1:3]:
+        assert np.sum((np.array(times) > start) & (np.array(times) < end)) > 2
+    assert counts[-1] == len(realization.slip_trace) > 0

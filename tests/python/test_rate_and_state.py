@@ -11,6 +11,7 @@ from mesoslip.analysis import rate_and_state as fitting
 from mesoslip.theory.rate_and_state import LAWS, Loading, RateAndState, spring_slider
 from response_coverage import NOISE, STAGES, STIFFNESS, TRUTH, departure, synthetic_fit
 from scipy.integrate import solve_ivp
+from scipy.special import lambertw
 
 STEP = (Loading(10, 1e-6, 1e-6), Loading(50, 1e-5, 1e-5))
 
@@ -76,6 +77,55 @@ def test_the_motion_solves_the_equations_as_they_are_written(name):
     moved = load - (found.force - law.reference_force) / stiffness
     good = np.isfinite(moved)
     np.testing.assert_allclose(found.displacement[good], moved[good], atol=1e-11)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("mass", [0.0, 100.0])
+def test_damping_is_a_force_of_the_velocity(name, mass):
+    """Against V from F = F_0 + a ln V/V_0 + b ln V_0 θ/D_c + η V by Lambert's function, and with a
+    mass against Newton's law in V."""
+    law, stiffness, damping = law_of(name), 6e3, 2e3
+    stages = (Loading(3, 1e-6, 1e-6), Loading(4, 1e-5, 1e-5))
+    times = np.linspace(0, 7, 200)
+
+    def friction(velocity, state):
+        ratio = velocity / law.reference_velocity
+        evolved = law.b * np.log(law.reference_velocity * state / law.slip_distance)
+        return law.reference_force + law.a * np.log(ratio) + evolved + damping * velocity
+
+    def velocity_of(force, state):
+        evolved = law.b * np.log(law.reference_velocity * state / law.slip_distance)
+        driven = (force - law.reference_force - evolved) / law.a
+        scale = damping * law.reference_velocity / law.a
+        return law.a / damping * lambertw(scale * np.exp(driven)).real
+
+    def derivative(_, at, load):
+        force, state = at[:2]
+        v = at[2] if mass else velocity_of(force, state)
+        ratio = v * state / law.slip_distance
+        change = 1 - ratio if name == "ageing" else -ratio * np.log(ratio)
+        rates = [stiffness * (load - v), change]
+        return [*rates, (force - friction(v, state)) / mass] if mass else rates
+
+    force = law.reference_force + damping * 1e-6
+    at = [force, law.slip_distance / 1e-6, *([1e-6] if mass else [])]
+    at[0] = friction(1e-6, at[1])
+    found = spring_slider(law, stages, times, stiffness, damping=damping, mass=mass)
+    for begin, stage in zip((0.0, 3.0), stages, strict=True):
+        inside = (times > begin) & (times <= begin + stage.duration)
+        solved = solve_ivp(
+            derivative,
+            (0, stage.duration),
+            at,
+            "Radau",
+            dense_output=True,
+            args=(stage.start_velocity,),
+            rtol=1e-9,
+            atol=[1e-11, 1e-9, 1e-15][: len(at)],
+        )
+        expected = solved.sol(times[inside] - begin)[0]
+        np.testing.assert_allclose(found.force[inside], expected, atol=1e-6)
+        at = solved.y[:, -1]
 
 
 @pytest.mark.parametrize("name", LAWS)

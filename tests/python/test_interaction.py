@@ -268,7 +268,7 @@ def test_segments_and_snapshots_do_not_change_a_run(klein, slider):
     assert column(whole, "size").max() >= 20
     assert abs(whole.energy_residual) < 1e-12
 
-    places, snapshots = watched.snapshot_places, watched.snapshots
+    places, snapshots = watched.snapshot_events, watched.snapshots
     assert tuple(places[places[:, 2] == 0, 0]) == times
     sizes = column(whole, "size")
     np.testing.assert_array_equal(places[places[:, 2] > 0, 2], sizes[sizes >= 20])

@@ -130,7 +130,7 @@ def test_rows_of_the_kernel_become_variables(results):
         tables = {
             "slip_traces": ("slip_trace", {"sample_time": 0, "velocity": 3, "slip": -1}),
             "avalanches": ("avalanches", {"start_time": 0, "size": 2, "force_drop": 4}),
-            "snapshots": ("snapshot_places", {"snapshot_time": 0, "avalanche_size": 2}),
+            "snapshots": ("snapshot_events", {"snapshot_time": 0, "avalanche_size": 2}),
         }
         for group in tables.keys() & tree.children.keys():
             table, columns = tables[group]

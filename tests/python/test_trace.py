@@ -9,7 +9,9 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT, klein_tables
+from mesoslip.configuration.columns import cells_of, places_of, values_of
 from mesoslip.measured.slips import estimated_period, find_slips, noise_level
+from mesoslip.measured.table import COLUMNS
 
 HIDDEN = {
     "slider__stiffness": 140.0,
@@ -234,9 +236,9 @@ def test_rates_columns_and_gaps(tmp_path):
         (SINE.replace("time [s]", "clock"), [], "--rate"),
         (SINE.replace("time [s]", "force [nN]"), [], "two columns of force"),
         (SINE.replace("0.010,", "0.009,"), [], "line 12: the time 0.009 s does not come after"),
-        (SINE.replace("0.010,", "0.0x0,"), [], "line 12: '0.0x0' is no number"),
-        (SINE.replace("0.010,", "nan,"), [], "line 12: 'nan' is not a finite number"),
-        (SINE.replace("0.010,", ""), [], "line 12: has 1 columns"),
+        (SINE.replace("0.010,", "0.0x0,"), [], "line 12: the time, '0.0x0', is not a number"),
+        (SINE.replace("0.010,", "nan,"), [], "line 12: the time, 'nan', is not a finite number"),
+        (SINE.replace("0.010,", ""), [], "line 12: the force is missing"),
         (SINE.replace("0.049,", "0.074,"), [], "line 51: a gap of 0.026 s after 0.048 s"),
         (SINE.replace("0.049,", "0.074,"), ["--largest-gap", "5 ms"], "line 51: a gap"),
         ("", [], "is empty"),
@@ -286,3 +288,35 @@ def test_a_cell_that_counts_the_other_way(tmp_path, klein, command):
     assert "inf" not in told
     with pytest.raises(mesoslip.FileError, match="has times, so no rate"):
         mesoslip.read_trace(table, rate=100.0)
+
+
+# Rows of which the numbers can be read in two ways, or are written otherwise than with 0 to 9.
+AMBIGUOUS = [
+    (",", "1,5,08", "line 3: has 3 cells under 2 headers"),
+    (",", "1_50,2", "the time, '1_50', is not a number"),
+    (",", "١,2", "the time, '١', is not a number"),
+    (",", "0x1p3,2", "is not a number"),
+    ("\t", "1,500\t2", "write 1.500 if its comma is a decimal one, 1500 if it groups digits"),
+    ("\t", "1,500,000\t2", "write 1500000 if its commas group digits"),
+    (";", "1,500;2", "write 1.500 if its comma is a decimal one, 1500 if it groups digits"),
+    (";", "1,5;2.5", "write 1.5 if its comma is a decimal one"),
+    (",", "5" * 200_000 + "x,2", "is not a number"),
+    (",", '"' + "5" * 200_000 + 'x",2', "larger than field limit"),
+    (",", '"1,2', "line 3: cannot be read"),
+]
+
+
+@pytest.mark.parametrize(("delimiter", "row", "wanted"), AMBIGUOUS)
+def test_numbers_are_read_in_one_way(tmp_path, command, delimiter, row, wanted):
+    table = tmp_path / "table.csv"
+    table.write_text(f"time [ms]{delimiter}force [uN]\n0{delimiter}1\n{row}\n", encoding="utf-8")
+    status, _, errors = command("trace", table, "-o", tmp_path / "out.nc")
+    assert status == 2
+    assert wanted in errors
+    assert len(errors) < 600
+
+
+def test_decimal_commas_that_can_be_nothing_else():
+    cells = cells_of("time [ms];force [uN]\n0,5;1,500\n2;-3,25\n", "table")
+    places = places_of(cells.first, COLUMNS, "table")
+    assert values_of(cells, cells.first, places)["force"] == pytest.approx([1.5e-6, -3.25e-6])

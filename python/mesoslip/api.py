@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem, RunError
-from mesoslip.output import layout
 from mesoslip.output.inputs import OutputLike, as_config, as_run
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import Results, checked_workers, run_realizations
 from mesoslip.simulation.stop import StopFlag
@@ -63,7 +63,7 @@ def run(
         If the run fails.
     """
     results = simulate(as_config(config), workers=workers, scheduler=scheduler, progress=progress)
-    return layout.build_tree(results)
+    return build_tree(results)
 
 
 def simulate(

@@ -6,7 +6,7 @@ import json
 
 from claims import CLAIMS, judge
 from claims.page import as_markdown, as_table, as_text
-from mesoslip.output.files import check_writable, written_whole
+from mesoslip.output.targets import check_writable, written_whole
 from scripts import parser_of, reporting_mistakes
 
 

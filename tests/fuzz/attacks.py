@@ -31,7 +31,7 @@ from conftest import klein_tables
 from invariants import broken, differences, energy_residual, left_over, promised_residual
 from kinds import FAST, KINDS
 from mesoslip import Config
-from mesoslip.output import layout
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results, run_realizations
@@ -152,7 +152,7 @@ def _kind(config: Config) -> str:
 
 def _other_segments(config: Config, tree: xr.DataTree, random: Random, folder: Path) -> list[str]:
     """Whether a run that is cut into segments, put away and taken up again, is the same."""
-    whole = layout.build_tree(run_realizations(config, workers=random.choice([1, 2])))
+    whole = build_tree(run_realizations(config, workers=random.choice([1, 2])))
     problems = [f"file and memory: {one} differs" for one in differences(tree, whole)]
     advances = int(whole.attrs["advance_count"])
     told: list[str] = []
@@ -161,7 +161,7 @@ def _other_segments(config: Config, tree: xr.DataTree, random: Random, folder: P
         problems += found
     results, found = advanced(config, folder, None, told, work=10 ** random.uniform(2.5, 5))
     problems += found
-    again = layout.build_tree(results)
+    again = build_tree(results)
     return problems + [f"resumed: {one} differs" for one in differences(whole, again)]
 
 
@@ -391,7 +391,7 @@ def checkpoints(name: str, folder: Path) -> Report:
     wanted = {"case.toml", "out.checkpoint"}
     if told.status == 0:
         wanted = {"case.toml", "out.nc"}
-        whole = layout.build_tree(run_realizations(config))
+        whole = build_tree(run_realizations(config))
         found = differences(read(output), whole)
         report.problems += [f"resumed: {one} differs" for one in found]
     report.problems += [f"left over: {one}" for one in left_over(folder, wanted)]

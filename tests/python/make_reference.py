@@ -6,7 +6,7 @@ What differs from the old ones is told; why is then to be said in the commit tha
 from __future__ import annotations
 
 import mesoslip
-from mesoslip.output import files
+from mesoslip.output import writing
 from reference import CASES, FOLDER, report
 
 if __name__ == "__main__":
@@ -16,7 +16,7 @@ if __name__ == "__main__":
         told = report(name, mesoslip.open_output(path), tree) if path.exists() else f"{name}: new"
         print(told or f"{name}: as it was")
         if told:
-            files.write(tree, path)
+            writing.write(tree, path)
     for path in sorted(FOLDER.glob("*.nc")):
         if path.stem not in CASES and path.stem != "old":
             print(f"{path.stem}: not a case any more; remove {path}")

@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 from kinds import KINDS, configuration
 from mesoslip import Config, ConfigError
-from mesoslip.output import layout
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import run_realizations
 from mesoslip.theory.ageing import mean_life, restart_peak, steady_force
@@ -46,7 +46,7 @@ def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
     if law == "log":
         same = {"law": "log", "time": 1e-3, "growth": 0.0}
     one, other = (
-        layout.build_tree(
+        build_tree(
             run_realizations(configuration(kind, contacts__coupling="equal", **ageing), workers=1)
         )
         for ageing in ({}, {"contacts__ageing": same})

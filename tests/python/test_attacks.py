@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import tomli_w
 from conftest import ROOT, klein_tables, long
-from mesoslip.output import files
+from mesoslip.output import targets
 
 OLD = ROOT / "tests" / "reference" / "old.nc"
 
@@ -125,7 +125,7 @@ def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
     table.write_text("old")
 
     def fill():
-        with files.written_whole(table) as part:
+        with targets.written_whole(table) as part:
             part.write_text("half")
             raise OSError(28, "No space left on device")
 
@@ -133,8 +133,8 @@ def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
         fill()
     assert told.value.exit_status == 1
     # netCDF says other things of a full disk.
-    monkeypatch.setattr(files.shutil, "disk_usage", lambda _: Free())
-    with pytest.raises(mesoslip.MesoslipError, match="no space"), files.written_whole(table):
+    monkeypatch.setattr(targets.shutil, "disk_usage", lambda _: Free())
+    with pytest.raises(mesoslip.MesoslipError, match="no space"), targets.written_whole(table):
         raise PermissionError(13, "Permission denied")
     assert table.read_text() == "old"
     assert list(tmp_path.iterdir()) == [table]

@@ -13,7 +13,7 @@ from conftest import klein_tables
 from mesoslip import Config
 from mesoslip.analysis.avalanche_sizes import EXPONENTIAL_CUTOFF, fit_power_law
 from mesoslip.analysis.avalanches import failures
-from mesoslip.output import files
+from mesoslip.output import writing
 from scipy import integrate, special, stats
 
 
@@ -176,7 +176,7 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_told(command, tmp_path):
     assert summary["breaks_outside"] + summary["breaks"] == tree["breaks"].item()
     assert "breaks_outside" not in mesoslip.avalanche_summary(tree, after=1e-9)
     path = tmp_path / "slide.nc"
-    files.write(tree, path)
+    writing.write(tree, path)
     assert "in sliding without end" in command("avalanches", path)[1]
 
 

@@ -14,7 +14,7 @@ from claims import CLAIMS, Verdict, judge
 from claims.page import as_markdown, as_table
 from conftest import ROOT
 from figures import FIGURES
-from mesoslip.output import files
+from mesoslip.output import files, writing
 from outputs import configuration
 
 SOURCE = ROOT / "runs" / "source"
@@ -28,14 +28,14 @@ def outputs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("outputs")
     (folder / "claims").mkdir()
     short = ["run.duration=8s", "run.realizations=3", "contacts.count=500"]
-    files.write(
+    writing.write(
         mesoslip.run(mesoslip.Config.load(ROOT / "runs" / "klein.toml", short)),
         folder / "claims" / "klein.nc",
     )
-    files.write(mesoslip.curve(SOURCE / "S18.toml"), folder / "S18.curve.nc")
+    writing.write(mesoslip.curve(SOURCE / "S18.toml"), folder / "S18.curve.nc")
     for name in ("S19a", "S19b"):
         tree = mesoslip.onset(SOURCE / f"{name}.toml")
-        files.write(tree, folder / f"{name}.onset.nc")
+        writing.write(tree, folder / f"{name}.onset.nc")
     return folder
 
 

@@ -16,7 +16,8 @@ import xarray as xr
 from conftest import ROOT, klein_tables
 from kinds import configuration
 from mesoslip import api
-from mesoslip.output import files, layout
+from mesoslip.output import files, filling, targets, writing
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.tables import FirstRows
 
@@ -97,9 +98,9 @@ def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
 
 def test_both_ways_to_write_give_the_same(results, tmp_path):
     """Block by block or as a tree: the same values to the bit, attributes, types and encodings."""
-    tree = layout.build_tree(results)
-    files.write_results(results, tmp_path / "streamed.nc")
-    files.write(tree, tmp_path / "built.nc")
+    tree = build_tree(results)
+    writing.write_results(results, tmp_path / "streamed.nc")
+    writing.write(tree, tmp_path / "built.nc")
     streamed, built = files.read(tmp_path / "streamed.nc"), files.read(tmp_path / "built.nc")
     assert_same(tree, streamed)
     assert_same(built, streamed)
@@ -117,7 +118,7 @@ def test_both_ways_to_write_give_the_same(results, tmp_path):
 
 def test_rows_of_the_kernel_become_variables(results):
     """Each row of each table stands in its place, with its realization."""
-    tree = layout.build_tree(results)
+    tree = build_tree(results)
     for place, one in enumerate(results.realizations):
         trace = one.rows("trace").read()
         force = tree["spring_force"].values[place]
@@ -151,10 +152,10 @@ def test_rows_of_the_kernel_become_variables(results):
 @pytest.mark.parametrize("rows", [1, 7])
 def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
     """Blocks that end anywhere, within and between realizations."""
-    tree = layout.build_tree(results)
-    monkeypatch.setattr(layout, "BLOCK_ROWS", rows)
+    tree = build_tree(results)
+    monkeypatch.setattr(filling, "BLOCK_ROWS", rows)
     if max(len(one.rows("trace")) for one in results.realizations) < 1000:
-        files.write_results(results, tmp_path / "out.nc")
+        writing.write_results(results, tmp_path / "out.nc")
         assert_same(tree, files.read(tmp_path / "out.nc"))
 
 
@@ -181,8 +182,8 @@ def test_interrupted_realizations_of_different_length(klein, tmp_path):
             Cut(one, length) for one, length in zip(results.realizations, (3, 50, 20), strict=True)
         ],
     )
-    tree = layout.build_tree(partial)
-    files.write_results(partial, tmp_path / "out.nc")
+    tree = build_tree(partial)
+    writing.write_results(partial, tmp_path / "out.nc")
     assert_same(tree, files.read(tmp_path / "out.nc"))
     force = tree["spring_force"].values
     assert tree.attrs["complete"] == "false"
@@ -195,7 +196,7 @@ MANY = """
 import resource, sys
 import mesoslip
 import numpy as np
-from mesoslip.output import files
+from mesoslip.output import targets, writing
 from pathlib import Path
 import subprocess
 import sys
@@ -223,7 +224,7 @@ one = SimpleNamespace(
 config = mesoslip.Config.load(sys.argv[1])
 results = SimpleNamespace(config=config, complete=True, wall_seconds=1.0, realizations=[one])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-files.write_results(results, Path(sys.argv[2]))
+writing.write_results(results, Path(sys.argv[2]))
 print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 """
 
@@ -240,7 +241,7 @@ def test_a_long_run_is_written_in_little_memory(tmp_path):
 
 
 def test_no_group_hides_a_coordinate_of_its_parent(results):
-    tree = layout.build_tree(results)
+    tree = build_tree(results)
     for child in tree.children.values():
         own = child.to_dataset(inherit=False)
         assert not set(own.variables) & set(tree.coords)
@@ -254,7 +255,7 @@ def test_no_group_hides_a_coordinate_of_its_parent(results):
 def test_methods_of_a_tree_work_on_the_whole(results, tmp_path):
     """As a user reads a file, without our reader."""
     path = tmp_path / "out.nc"
-    files.write_results(results, path)
+    writing.write_results(results, path)
     with xr.open_datatree(path, engine="netcdf4") as tree:
         assert "slips" in tree._repr_html_()
         assert tree.isel(realization=0)["spring_force"].dims == ("time",)
@@ -317,7 +318,7 @@ def test_what_a_killed_process_left_behind_is_removed(tmp_path):
     ]
     for one in (left, *others):
         one.touch()
-    files.check_writable(path)
+    targets.check_writable(path)
     assert sorted(tmp_path.iterdir()) == sorted(others)
 
 

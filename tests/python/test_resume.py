@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from invariants import differences
 from kinds import KINDS, configuration
 from mesoslip import Config, FileError, RunError
-from mesoslip.output import layout
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.kernel import Kernel
 from mesoslip.simulation.realization import Realization
@@ -32,7 +32,7 @@ ONCE = {}
 def whole(kind: str) -> xr.DataTree:
     """The output of a run that was never stopped."""
     if kind not in ONCE:
-        ONCE[kind] = layout.build_tree(run_realizations(configuration(kind), workers=1))
+        ONCE[kind] = build_tree(run_realizations(configuration(kind), workers=1))
     return ONCE[kind]
 
 
@@ -74,7 +74,7 @@ def test_a_run_cut_anywhere_is_the_same(kind, data, tmp_path_factory):
     results = advanced(config, folder, None, told)
     assert len(told) == 1
     assert "no checkpoint" in told[0]
-    assert_same(whole(kind), layout.build_tree(results))
+    assert_same(whole(kind), build_tree(results))
 
 
 @pytest.mark.parametrize("kind", ["rigid, lattice", "layered, bdf", "rigid, three realizations"])
@@ -82,14 +82,14 @@ def test_a_chain_of_ten_resumes(kind, tmp_path):
     config, told = configuration(kind), []
     for advances in range(10, 110, 10):
         advanced(config, tmp_path, advances, told)
-    assert_same(whole(kind), layout.build_tree(advanced(config, tmp_path, None, told)))
+    assert_same(whole(kind), build_tree(advanced(config, tmp_path, None, told)))
 
 
 def test_workers_and_stops_do_not_matter(tmp_path):
     """Stopped again and again by another thread, on two threads and on one."""
     config, expected = configuration("rigid, three realizations"), None
     config = Config.from_dict(config.to_dict() | {"output": {"interval": 1e-5}})
-    expected = layout.build_tree(run_realizations(config, workers=1))
+    expected = build_tree(run_realizations(config, workers=1))
     for attempt in range(100):
         stop = threading.Event()
         timer = threading.Timer(0.02, stop.set)
@@ -102,7 +102,7 @@ def test_workers_and_stops_do_not_matter(tmp_path):
         if results.complete:
             break
     assert results.complete
-    assert_same(expected, layout.build_tree(results))
+    assert_same(expected, build_tree(results))
     checkpoint.remove()
     assert not (tmp_path / "c").exists()
 
@@ -120,7 +120,7 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
             checkpoint.visit(one)
             checkpoint.look([one])
             assert sum(rows.waiting_bytes for _, rows in one.waiting) <= 1000
-    assert_same(whole("rigid, lattice"), layout.build_tree(Results(config, [one], True, 0.0)))
+    assert_same(whole("rigid, lattice"), build_tree(Results(config, [one], True, 0.0)))
 
 
 def test_a_full_disk_does_not_stop_a_run(tmp_path):
@@ -132,7 +132,7 @@ def test_a_full_disk_does_not_stop_a_run(tmp_path):
         assert not checkpoint.write(results.realizations)
         assert len(told) == 1
         assert "No space left" in told[0]
-        assert_same(whole("rigid"), layout.build_tree(results))
+        assert_same(whole("rigid"), build_tree(results))
         # Once there is room again, there is a checkpoint.
         (tmp_path / "trace.rows").unlink()
         assert checkpoint.write(results.realizations)
@@ -157,7 +157,7 @@ def test_a_realization_may_end_while_a_checkpoint_is_written(tmp_path, monkeypat
         assert checkpoint.write([one])
     results = advanced(config, tmp_path, None, told)
     assert told == []
-    assert_same(whole("rigid"), layout.build_tree(results))
+    assert_same(whole("rigid"), build_tree(results))
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty", "no rows"])
@@ -182,7 +182,7 @@ def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
     # Nothing is thrown away: what was damaged may be of use to somebody.
     kept = tmp_path.with_name(f"{tmp_path.name}.old") if damage == "no rows" else tmp_path
     assert (kept / "damaged.state.npz").exists()
-    assert_same(whole("rigid"), layout.build_tree(results))
+    assert_same(whole("rigid"), build_tree(results))
 
 
 def test_whatever_damage_a_state_has_the_one_before_is_taken(tmp_path):
@@ -225,7 +225,7 @@ def test_rows_that_were_changed_are_told(tmp_path):
     data = path.read_bytes()
     path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
     with pytest.raises(RunError, match=r"trace\.rows: damaged"):
-        layout.build_tree(advanced(config, tmp_path, None, told))
+        build_tree(advanced(config, tmp_path, None, told))
 
 
 def test_another_configuration_or_program_is_refused(tmp_path, monkeypatch):
@@ -263,7 +263,7 @@ def test_a_run_that_starts_anew_keeps_what_was_there(tmp_path):
     assert "c.old" in told[-1]
     (tmp_path / "c.old").rename(folder)
     told.clear()
-    assert_same(whole("rigid"), layout.build_tree(advanced(config, folder, None, told)))
+    assert_same(whole("rigid"), build_tree(advanced(config, folder, None, told)))
     assert told == []
     with Checkpoint(folder, config) as checkpoint:
         checkpoint.remove()
@@ -317,7 +317,7 @@ def test_states_are_whole_at_any_moment(tmp_path):
     told.clear()
     results = advanced(config, tmp_path, None, told)
     assert told == []
-    assert_same(whole("rigid"), layout.build_tree(results))
+    assert_same(whole("rigid"), build_tree(results))
 
 
 def test_handles(klein):

@@ -150,10 +150,10 @@ def test_finer_traces_begin_with_their_slips(klein):
 
 def test_times_are_in_the_table(tmp_path, command):
     from conftest import klein_tables
-    from mesoslip.output import files
+    from mesoslip.output import writing
 
     output, table = tmp_path / "out.nc", tmp_path / "slips.csv"
-    files.write(mesoslip.run(klein_tables(drive__velocity=1e-6, run__duration=1.0)), output)
+    writing.write(mesoslip.run(klein_tables(drive__velocity=1e-6, run__duration=1.0)), output)
     status, told, _ = command("slips", output, "--csv", table, "--json")
     assert status == 0
     with table.open() as file:

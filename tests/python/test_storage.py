@@ -11,7 +11,7 @@ import netCDF4
 import pytest
 from conftest import ROOT
 from mesoslip import FileError
-from mesoslip.output import files
+from mesoslip.output import files, targets
 
 OLD = ROOT / "tests" / "reference" / "eq-rigid-scaled.nc"
 
@@ -48,7 +48,7 @@ def test_a_file_system_without_locks_is_told(output, monkeypatch):
     before = output.read_bytes()
     with (
         pytest.raises(FileError, match=r"no locks \(No locks available\).*LOCKING=FALSE"),
-        files.written_whole(output),
+        targets.written_whole(output),
     ):
         fail()
     assert output.read_bytes() == before

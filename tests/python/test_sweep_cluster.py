@@ -18,7 +18,7 @@ from mesoslip import Config, FileError, RunError
 from mesoslip.campaign import ensemble
 from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.store import Store
-from mesoslip.output import layout
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import run_realizations
 from mesoslip.simulation.stop import StopFlag
@@ -196,7 +196,7 @@ def test_a_checkpoint_keeps_realizations_of_a_cluster(tmp_path, monkeypatch):
             )
             == 1
         )
-        tree = layout.build_tree(whole)
+        tree = build_tree(whole)
     for group in expected.groups:
         assert_same_numbers(
             expected[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),

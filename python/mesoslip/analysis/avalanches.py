@@ -18,8 +18,8 @@ from mesoslip.analysis.avalanche_sizes import (
 from mesoslip.analysis.slips import write_table
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
+from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.layout import group_of
 
 NO_AVALANCHES = (
     "the output has no avalanches: they are recorded with [interaction] or "

@@ -15,7 +15,7 @@ from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import ConfigError, FileError
-from mesoslip.output.layout import group_of
+from mesoslip.output.access import group_of
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
+from mesoslip.output.access import config_of, group_of
 from mesoslip.output.inputs import OutputLike, opened_run
-from mesoslip.output.layout import RunResults, config_of, group_of
+from mesoslip.output.results import RunResults
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.quantities import percent
 from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mesoslip.output.files import written_whole
+from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.layout import group_of
+from mesoslip.output.targets import written_whole
 
 if TYPE_CHECKING:
     import xarray as xr

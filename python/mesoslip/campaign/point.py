@@ -15,8 +15,9 @@ from mesoslip import _build
 from mesoslip.campaign.measures import RunView, measure_of, measured
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
-from mesoslip.output import files, layout
+from mesoslip.output import writing
 from mesoslip.output.provenance import version
+from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import TOO_MUCH, Results
 from mesoslip.simulation.stop import StopFlag
@@ -150,7 +151,7 @@ def _compute(task: Task, stop: StopFlag) -> Outcome:
     finally:
         realization.close()
     results = Results(config, [realization], True, realization.kernel_seconds)
-    tree = layout.build_tree(results)
+    tree = build_tree(results)
     run = RunView(tree, task.discard * realization.time)
     measures = {one[0]: measured(run, measure_of(*one)) for one in task.measures}
     return Outcome(measures, trace=_output(results) if task.trace else None)
@@ -160,5 +161,5 @@ def _output(results: Results) -> bytes:
     """The output file of a run."""
     with _HDF5, tempfile.TemporaryDirectory(prefix="mesoslip-") as folder:
         path = Path(folder) / "point.nc"
-        files.write_results(results, path)
+        writing.write_results(results, path)
         return path.read_bytes()

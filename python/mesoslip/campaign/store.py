@@ -21,7 +21,7 @@ from typing import Any, Self
 
 from mesoslip.campaign.point import FORMAT, Outcome, Task
 from mesoslip.errors import FileError
-from mesoslip.output.files import written_whole
+from mesoslip.output.targets import written_whole
 
 LOCK, MANIFEST = "lock", "sweep.json"
 

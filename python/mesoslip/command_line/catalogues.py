@@ -30,10 +30,10 @@ def slips(
 ) -> None:
     """Show the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogue
-    from mesoslip.output import files
+    from mesoslip.output import files, targets
 
     if table is not None:
-        files.check_writable(table, [output])
+        targets.check_writable(table, [output])
     tree = files.read_run(output)
     if table is not None:
         catalogue.write_csv(tree, table)
@@ -93,10 +93,10 @@ def avalanches(
     """Show sizes of avalanches: their distribution, and the law that fits it."""
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
-    from mesoslip.output import files
+    from mesoslip.output import files, targets
 
     if table is not None:
-        files.check_writable(table, [output])
+        targets.check_writable(table, [output])
     tree = files.read_run(output)
     start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, min_force_ratio=min_force_ratio)

@@ -54,13 +54,13 @@ def fit(
     from mesoslip.inference.plan import Plan
     from mesoslip.inference.posterior import table
     from mesoslip.inference.simulations import StoppedError
-    from mesoslip.output import files
+    from mesoslip.output import files, targets, writing
 
     if Path(config).suffix == ".nc":
         raise FileError(f"{config}: is an output; a fit needs a TOML file with a table [fit.free]")
     plan = Plan.load(config, changes or ())
     path = posterior or Path("out") / f"{output.stem}.posterior.nc"
-    files.check_output(path, [output, config])
+    targets.check_output(path, [output, config])
     store = path.with_name(f"{path.stem}.simulations.npz")
     trace = files.read_run(output)
     with stopped_by_signals() as stop:
@@ -72,7 +72,7 @@ def fit(
         except StoppedError:
             say(f"{path}: interrupted; the same command goes on from {store}")
             raise typer.Exit(stop.exit_status) from None
-    files.write(tree, path)
+    writing.write(tree, path)
     store.unlink(missing_ok=True)
     rows = table(tree)
     notes = [one for one in str(tree.attrs["warnings"]).split("\n") if one]

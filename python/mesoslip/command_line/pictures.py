@@ -68,14 +68,14 @@ def plot(
     ] = None,
 ) -> None:
     """Draw an output, or several over each other."""
-    from mesoslip.output import files
+    from mesoslip.output import targets
     from mesoslip.plots import plot as plots
 
     first = outputs[0]
     path = figure or first.parent / f"{first.stem or 'output'}.png"
     there = [one for one in outputs if one.is_file()]
     if there:
-        files.check_writable(path, there)
+        targets.check_writable(path, there)
     plots.plot(
         outputs,
         path,

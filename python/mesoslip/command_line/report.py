@@ -20,13 +20,13 @@ def report(
     ] = None,
 ) -> None:
     """Write a page about an output, or about several of one command side by side."""
-    from mesoslip.output import files
+    from mesoslip.output import targets
     from mesoslip.reports import report as reports
 
     first = outputs[0]
     path = page or first.parent / f"{first.stem or 'output'}.html"
     there = [one for one in outputs if one.is_file()]
     if there:
-        files.check_writable(path, there)
+        targets.check_writable(path, there)
     reports.report(outputs, path)
     typer.echo(str(path), err=True)

@@ -38,11 +38,11 @@ def response(
     from mesoslip.analysis import response as responses
     from mesoslip.analysis import response_tables
     from mesoslip.analysis.response import rows_of, scalars_of, write_csv
-    from mesoslip.output import files
+    from mesoslip.output import targets
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
-        files.check_writable(table, outputs)
+        targets.check_writable(table, outputs)
     tree = responses.response(outputs, normal_force=scale, fit=fit, free_stiffness=free_stiffness)
     if table is not None:
         write_csv(tree, table)

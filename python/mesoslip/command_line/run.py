@@ -59,13 +59,13 @@ def run(
     stopped by Ctrl-C, SIGTERM or SIGHUP; the same command with --resume goes on from it.
     """
     from mesoslip import api
-    from mesoslip.output import files
+    from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 
     checked = load(config, changes)
     interval = quantity(checkpoint_interval, "--checkpoint-interval", "s", "30 s", negative=False)
     path = output or Path("out") / f"{Path(config).stem}.nc"
-    files.check_output(path, [config])
+    targets.check_output(path, [config])
 
     def tell(text: str) -> None:
         say(f"{path}: {text}")
@@ -89,7 +89,7 @@ def run(
             raise typer.Exit(_keep(results, path, stop, checkpoint))
         replaces = files.is_of_another(path, checked)
         try:
-            files.write_results(results, path)
+            writing.write_results(results, path)
         except FileError as error:
             if checkpoint.write(results.realizations):
                 raise FileError(
@@ -113,7 +113,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     """Tell what is kept of a run that was stopped; the exit status."""
     import signal
 
-    from mesoslip.output import files, layout
+    from mesoslip.output import layout, writing
 
     told = str(layout.attributes(results)["comment"])
     is_kept = checkpoint.saved_time is not None
@@ -122,7 +122,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     # Who is being shut down has no time for a file that the checkpoint makes superfluous.
     if stop.signal in {None, signal.SIGINT} or not is_kept:
         try:
-            files.write_results(results, _partial(path))
+            writing.write_results(results, _partial(path))
             told += f"; what there is, is in {_partial(path)}"
         except FileError as error:
             told += f"; {error}"

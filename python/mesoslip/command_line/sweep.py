@@ -56,7 +56,7 @@ def sweep(
     """
     from mesoslip import api
     from mesoslip.campaign.store import Store, store_folder
-    from mesoslip.output import files
+    from mesoslip.output import targets
 
     plan = api.as_plan(file, changes or ())
     path = output or Path("out") / f"{file.stem}.nc"
@@ -66,7 +66,7 @@ def sweep(
         return
     # All of them are checked before anything is made.
     _ = plan.combinations
-    files.check_output(path, [file])
+    targets.check_output(path, [file])
     with Store(folder) as store, stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
@@ -94,10 +94,10 @@ def _write(done: Sweep, path: Path, stop: Stop) -> int:
     """Write the dataset, under another name if points are missing; the exit status."""
     import xarray as xr
 
-    from mesoslip.output import files
+    from mesoslip.output import writing
 
     partial = path.with_name(f"{path.stem}.partial{path.suffix}")
-    files.write(xr.DataTree(done.dataset), path if done.complete else partial)
+    writing.write(xr.DataTree(done.dataset), path if done.complete else partial)
     if done.complete:
         partial.unlink(missing_ok=True)
         return FAILED if done.failures else 0

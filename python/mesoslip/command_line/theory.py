@@ -49,17 +49,17 @@ def curve(
     as_json: JsonOption = False,
 ) -> None:
     """Force curve of the master equation, and its elastic instability."""
-    from mesoslip.output import files
+    from mesoslip.output import targets, writing
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
     from mesoslip.theory.steady_sliding import steady_sliding, told_of_stiffness
 
     checked = load(config, changes)
     if output is not None:
-        files.check_output(output, [config])
+        targets.check_output(output, [config])
     _tell_without_interaction(checked)
     force_curve = ForceCurve(checked)
     if output is not None:
-        files.write(force_curve.to_tree(), output)
+        writing.write(force_curve.to_tree(), output)
     summary = force_curve.summary()
     if as_json:
         print_json(summary)
@@ -92,16 +92,16 @@ def onset(
     as_json: JsonOption = False,
 ) -> None:
     """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
-    from mesoslip.output import files
+    from mesoslip.output import targets, writing
     from mesoslip.theory import slip_onset
 
     checked = load(config, changes)
     if output is not None:
-        files.check_output(output, [config])
+        targets.check_output(output, [config])
     _tell_without_interaction(checked)
     tree = slip_onset.onset(checked)
     if output is not None:
-        files.write(tree, output)
+        writing.write(tree, output)
     summary = {name: tree.attrs[name] for name in slip_onset.SUMMARY if name in tree.attrs}
     summary["stable"] = tree.attrs["stable"] == "true"
     if as_json:

@@ -68,11 +68,11 @@ def trace(
 ) -> None:
     """Read a measured trace, find its slips, and write an output like that of a run."""
     from mesoslip.measured.trace import read_trace
-    from mesoslip.output import files
+    from mesoslip.output import targets, writing
     from mesoslip.quantities import with_unit
 
     path = output or Path("out") / f"{table.stem}.nc"
-    files.check_output(path, [table, *([] if config is None else [config])])
+    targets.check_output(path, [table, *([] if config is None else [config])])
     tree = read_trace(
         table,
         columns=columns,
@@ -84,7 +84,7 @@ def trace(
         noise=quantity_or_none(noise, "--noise", "N", "0.1 uN"),
         period=quantity_or_none(period, "--period", "s", "25 ms", positive=True),
     )
-    files.write(tree, path)
+    writing.write(tree, path)
     time, known = tree.to_dataset()["time"].values, tree.attrs
     told = [
         f"{time.size} samples",

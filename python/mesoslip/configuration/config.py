@@ -24,6 +24,7 @@ from mesoslip.configuration.files import (
     Change,
     Laid,
     base_of,
+    check_no_files,
     on_base,
     override,
     parse_toml,
@@ -248,10 +249,13 @@ class Config(Table):
     ) -> Config:
         """Check a configuration given as the text of a TOML file, with changes laid over it.
 
-        Without changes, it is taken to have been laid over ``base``, if that is given.
+        Without changes, it is taken to have been laid over ``base``, if that is given. Both are
+        from an output and name no files; changes may.
         """
         tables, overrides = parse_toml(text, source), tuple(overrides)
         below = None if base is None else parse_toml(base, source)
+        for one in (tables, below or {}):
+            check_no_files(one, source)
         laid = override(Laid(tables), overrides)
         return cls._checked(laid, source, tables if overrides else below)
 

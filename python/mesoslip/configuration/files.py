@@ -145,6 +145,22 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise ConfigError([Problem(source, "", message)]) from None
 
 
+def check_no_files(tables: Mapping[str, Any], source: str, place: str = "") -> None:
+    """Make sure that tables of an output name no files: they hold what was read.
+
+    Raises
+    ------
+    ConfigError
+        If a key ``file`` stands in a table.
+    """
+    for key, value in tables.items():
+        where = f"{place}{key}"
+        if isinstance(value, Mapping):
+            check_no_files(value, source, f"{where}.")
+        elif key == "file":
+            raise ConfigError([Problem(source, where, "is not read from an output", value)])
+
+
 def _lay(base: Laid, over: Mapping[str, Any]) -> Laid:
     """Lay tables over those of a base; a slider of another kind keeps the keys that it has too."""
     tables, dropped = base.tables, []

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from mesoslip.analysis.regime import judgements, regimes
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
-from mesoslip.output.layout import build_tree, group_of
+from mesoslip.output.access import group_of
+from mesoslip.output.tree import build_tree
 from mesoslip.plots.run import (
     NAMES,
     UNITS,

@@ -29,7 +29,7 @@ from mesoslip.explorer.following import Worker, explored, follow
 from mesoslip.explorer.knobs import PLAIN, RED, ControlView, set_changed
 from mesoslip.explorer.pictures import Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
-from mesoslip.output.files import write_results
+from mesoslip.output.writing import write_results
 from mesoslip.simulation.runner import Results
 from mesoslip.simulation.stop import StopFlag
 

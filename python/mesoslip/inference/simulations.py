@@ -16,7 +16,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.inference.prior import Prior
 from mesoslip.inference.summaries import Summarizer
-from mesoslip.output.files import written_whole
+from mesoslip.output.targets import written_whole
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.stop import StopFlag
 

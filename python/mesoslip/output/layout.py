@@ -1,103 +1,34 @@
 """The layout of the output of a run: its groups, and how rows of the kernel become variables.
 
-`describe` says once what an output holds; `build_tree` puts it together in memory, and
-`mesoslip.output.files.write_results` writes it to a file piece by piece.
+`describe` states once what an output holds; `mesoslip.output.tree` puts it together in memory, and
+`mesoslip.output.writing` writes it to a file piece by piece.
 
-Rows of catalogues tell their realization by a ``realization_index``, as CF's indexed ragged arrays
+Rows of catalogues name their realization by a ``realization_index``, as CF's indexed ragged arrays
 do, and no variable of a group has the name of a coordinate of the root.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Interaction
-from mesoslip.errors import ConfigError, FileError
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
+from mesoslip.output.results import RunResults
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation import tables
 from mesoslip.simulation.audit import failed_promises
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 Array = NDArray[Any]
+
 # What a variable takes from rows of a table, given the places of their realizations.
 Pick = Callable[[Array, Array], Array]
-
-# Numbers in a block of rows, which is what is held at a time of what is written.
-BLOCK_NUMBERS = 2**19
-BLOCK_ROWS = 2**16
-
-
-class Rows(Protocol):
-    """A table of rows that need not be in memory as a whole."""
-
-    def __len__(self) -> int: ...
-
-    def blocks(self, most: int) -> Iterator[Array]:
-        """The rows one after another, at most so many at a time, shape (rows, ...)."""
-        ...
-
-
-class RealizationResults(Protocol):
-    """What came out of a realization.
-
-    Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
-    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_events",
-    and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
-    """
-
-    @property
-    def number(self) -> int: ...
-    @property
-    def time(self) -> float: ...
-    @property
-    def ending(self) -> str: ...
-    @property
-    def breaks(self) -> float: ...
-    @property
-    def advances(self) -> int: ...
-    @property
-    def kernel_seconds(self) -> float: ...
-    @property
-    def avalanche_count(self) -> int: ...
-    @property
-    def avalanche_slip(self) -> float: ...
-    @property
-    def displacement(self) -> float: ...
-    @property
-    def energy(self) -> Array: ...
-    @property
-    def energy_residual(self) -> float: ...
-    @property
-    def force_error(self) -> float: ...
-    @property
-    def integrator_counts(self) -> Array: ...
-
-    def rows(self, table: str) -> Rows:
-        """A table."""
-        ...
-
-
-class RunResults(Protocol):
-    """What came out of a run."""
-
-    @property
-    def config(self) -> Config: ...
-    @property
-    def complete(self) -> bool: ...
-    @property
-    def wall_seconds(self) -> float: ...
-    @property
-    def realizations(self) -> Sequence[RealizationResults]: ...
 
 
 @dataclass(frozen=True)
@@ -189,11 +120,6 @@ def recorded(config: Config) -> tuple[str, ...]:
 
 def _count(results: RunResults, table: str) -> int:
     return sum(len(one.rows(table)) for one in results.realizations)
-
-
-def longest(results: RunResults) -> int:
-    """Place of the realization with the longest trace, which has the times of all."""
-    return int(np.argmax([len(one.rows("trace")) for one in results.realizations]))
 
 
 def _root(results: RunResults) -> GroupLayout:
@@ -388,151 +314,3 @@ def attributes(results: RunResults) -> dict[str, Any]:
             "wall_seconds": results.wall_seconds,
         }
     )
-
-
-class Values(Protocol):
-    """What takes the values of a variable: an array, or a variable of a file."""
-
-    def __setitem__(self, where: Any, values: Any) -> None: ...
-
-
-def fill(
-    results: RunResults,
-    layout: Mapping[str, GroupLayout],
-    taken: Mapping[str, Mapping[str, Values]],
-) -> None:
-    """Hand the values of an output, block by block, to what takes them, by group and name."""
-    timekeeper = longest(results)
-    for group, form in layout.items():
-        for name, entry in form.entries.items():
-            if not entry.table and np.size(entry.values):
-                taken[group][name][...] = np.asarray(entry.values, dtype=entry.dtype)
-        for table in dict.fromkeys(entry.table for entry in form.entries.values() if entry.table):
-            wanted = {name: one for name, one in form.entries.items() if one.table == table}
-            pieces = _ragged(results, table) if table in DIMENSIONS else _padded(results, table)
-            for where, rows, owners in pieces:
-                for name, entry in wanted.items():
-                    assert entry.pick is not None
-                    place = where if entry.is_padded else where[-1:]
-                    # The times are those of the longest trace.
-                    if entry.is_padded or len(where) == 1 or where[0] == timekeeper:
-                        values = entry.pick(rows, owners)
-                        taken[group][name][place] = values.astype(entry.dtype, copy=False)
-
-
-def _block_rows(results: RunResults, table: str) -> int:
-    """Most rows of a table that are held at a time."""
-    width = 1
-    if table == "snapshots":
-        width = 3 * results.config.contacts.count
-    elif table == "layers":
-        width = results.config.slider.layer_count
-    return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
-
-
-def _padded(results: RunResults, table: str) -> Iterator[tuple[tuple[Any, ...], Array, Array]]:
-    """Blocks of a table realization by realization: where they belong, rows, their realizations."""
-    for place, one in enumerate(results.realizations):
-        start = 0
-        for rows in one.rows(table).blocks(_block_rows(results, table)):
-            yield (place, slice(start, start + len(rows))), rows, np.full(len(rows), place)
-            start += len(rows)
-
-
-def _ragged(results: RunResults, table: str) -> Iterator[tuple[tuple[Any, ...], Array, Array]]:
-    """Blocks of a table one after another, those of short realizations put together."""
-    most, start = _block_rows(results, table), 0
-    held: list[Array] = []
-    owners: list[Array] = []
-    count = 0
-
-    def piece() -> tuple[tuple[Any, ...], Array, Array]:
-        where = (slice(start, start + count),)
-        return where, np.concatenate(held), np.concatenate(owners)
-
-    for place, one in enumerate(results.realizations):
-        for block in one.rows(table).blocks(most):
-            left = block
-            while len(left):
-                part, left = left[: most - count], left[most - count :]
-                held.append(part)
-                owners.append(np.full(len(part), place))
-                count += len(part)
-                if count == most:
-                    yield piece()
-                    start, count = start + count, 0
-                    held.clear()
-                    owners.clear()
-    if count:
-        yield piece()
-
-
-def build_tree(results: RunResults) -> xr.DataTree:
-    """Put the results of a run together in memory, as an output file holds them.
-
-    Returns
-    -------
-    xarray.DataTree
-        Root: the trace, dimensions (realization, time), and figures for each realization. Groups:
-        ``slips`` (slip), ``slip_traces`` (sample), ``avalanches`` (avalanche), ``snapshots``
-        (snapshot, row, column), ``energy`` (realization). What an interrupted run did not come to
-        is NaN in the trace.
-    """
-    import xarray as xr
-
-    layout = describe(results)
-    sizes = layout[""].sizes
-    arrays: dict[str, dict[str, Array]] = {}
-    for group, form in layout.items():
-        all_sizes = {**sizes, **form.sizes}
-        arrays[group] = {
-            name: np.full([all_sizes[one] for one in entry.dimensions], np.nan, dtype=entry.dtype)
-            if entry.dtype.kind == "f"
-            else np.zeros([all_sizes[one] for one in entry.dimensions], dtype=entry.dtype)
-            for name, entry in form.entries.items()
-        }
-    fill(results, layout, arrays)
-    datasets = {}
-    for group, form in layout.items():
-        made = {
-            name: xr.Variable(entry.dimensions, arrays[group][name], entry.meaning.attributes)
-            for name, entry in form.entries.items()
-        }
-        for name, entry in form.entries.items():
-            made[name].encoding = {"_FillValue": entry.fill_value}
-        coordinates = {name: made[name] for name in made if form.entries[name].is_coordinate}
-        others = {name: made[name] for name in made if name not in coordinates}
-        datasets["/" + group] = xr.Dataset(others, coordinates, form.attributes)
-    return xr.DataTree.from_dict(datasets)
-
-
-def is_measured(tree: xr.DataTree) -> bool:
-    """Whether an output is a measured trace, and no run."""
-    return bool(tree.attrs.get("origin") == "measured")
-
-
-def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
-    """The configuration of an output.
-
-    Raises
-    ------
-    FileError
-        If it has none of a run, as a measured trace of which less is known.
-    """
-    try:
-        return Config.from_toml(tree.attrs["configuration"])
-    except ConfigError:
-        raise FileError(
-            f"{name}: has no configuration of a run; if it is a measured trace, read it again with "
-            "that of the experiment: mesoslip trace FILE.csv --config EXPERIMENT.toml"
-        ) from None
-
-
-def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
-    """A group of an output alone, without the coordinates of the root that it does not use.
-
-    So that `xarray.Dataset.to_dataframe` has a row for each row of the group, not for each pair of
-    it and a time of the trace.
-    """
-    data = tree.children[name].to_dataset()
-    return data[list(data.data_vars)]

@@ -27,8 +27,8 @@ from mesoslip.analysis.avalanche_sizes import (
 from mesoslip.analysis.avalanches import failures
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
-from mesoslip.output.files import written_whole
-from mesoslip.output.layout import group_of
+from mesoslip.output.access import group_of
+from mesoslip.output.targets import written_whole
 from mesoslip.plots.run import (
     EVERYTHING,
     Abscissa,

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output.layout import config_of, is_measured
+from mesoslip.output.access import config_of, is_measured
 from mesoslip.plots import avalanches, posterior, response, run, sweep, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled

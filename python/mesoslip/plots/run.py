@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.slips import slips
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output.layout import group_of, is_measured
+from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.variables import TRACE
 from mesoslip.plots.style import (
     COLORS,

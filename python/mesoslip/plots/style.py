@@ -16,7 +16,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
-from mesoslip.output.files import written_whole
+from mesoslip.output.targets import written_whole
 
 # What a picture is drawn into: a whole figure, or a part of one.
 Canvas = Figure | SubFigure

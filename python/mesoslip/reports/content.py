@@ -14,7 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from mesoslip.configuration.config import Config
-from mesoslip.output.layout import config_of
+from mesoslip.output.access import config_of
 from mesoslip.plots.style import Canvas, styled
 
 # A page shows fewer dots than a picture that is printed.

@@ -26,7 +26,7 @@ from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import FileError
 from mesoslip.inference import posterior
 from mesoslip.output import variables
-from mesoslip.output.layout import group_of, is_measured
+from mesoslip.output.access import group_of, is_measured
 from mesoslip.plots import draw, run
 from mesoslip.plots import sweep as sweep_plots
 from mesoslip.plots.run import Extent

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from mesoslip.analysis.regime import regimes
-from mesoslip.output.layout import group_of
+from mesoslip.output.access import group_of
 from outputs import configuration
 
 from claims.base import Claim, Finding, measured, variable, verdict

@@ -43,7 +43,6 @@ PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
     lambda config: f"{config.contacts.coupling} coupling",
 )
 
-
 # Characters of a caption in an inch.
 CAPTION_CHARACTERS = 19
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import xarray as xr
 from matplotlib.figure import Figure
-from mesoslip.output.layout import group_of
+from mesoslip.output.access import group_of
 from mesoslip.plots import run as plots
 from mesoslip.plots.style import CONTACT, SPRING
 from outputs import configuration

@@ -1,0 +1,43 @@
+"""What is asked of an output in memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mesoslip.configuration.config import Config
+from mesoslip.errors import ConfigError, FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def is_measured(tree: xr.DataTree) -> bool:
+    """Whether an output is a measured trace, and no run."""
+    return bool(tree.attrs.get("origin") == "measured")
+
+
+def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
+    """The configuration of an output.
+
+    Raises
+    ------
+    FileError
+        If it has none of a run, as a measured trace of which less is known.
+    """
+    try:
+        return Config.from_toml(tree.attrs["configuration"])
+    except ConfigError:
+        raise FileError(
+            f"{name}: has no configuration of a run; if it is a measured trace, read it again with "
+            "that of the experiment: mesoslip trace FILE.csv --config EXPERIMENT.toml"
+        ) from None
+
+
+def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
+    """A group of an output alone, without the coordinates of the root that it does not use.
+
+    So that `xarray.Dataset.to_dataframe` has a row for each row of the group, not for each pair of
+    it and a time of the trace.
+    """
+    data = tree.children[name].to_dataset()
+    return data[list(data.data_vars)]

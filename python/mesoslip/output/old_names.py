@@ -1,0 +1,45 @@
+"""Names in files of earlier versions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mesoslip.output import variables
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# What rows of groups were called in files of earlier versions, and what they are called now.
+OLD_NAMES = {
+    "slips": {"realization": "realization_index"},
+    "slip_traces": {"realization": "realization_index", "time": "sample_time"},
+    "avalanches": {"realization": "realization_index", "time": "start_time"},
+    "snapshots": {"realization": "realization_index", "time": "snapshot_time"},
+    "critical": {"displacement": "critical_displacement"},
+}
+
+GROUPS = {
+    "slips": variables.SLIPS,
+    "stages": variables.STAGES,
+    "slip_traces": variables.SLIP_TRACES,
+    "avalanches": variables.AVALANCHES,
+    "snapshots": variables.SNAPSHOTS,
+    "critical": variables.CRITICAL,
+}
+
+
+def renamed(name: str, data: xr.Dataset) -> xr.Dataset:
+    """A group of a file with the names of today."""
+    old = {
+        before: now
+        for before, now in OLD_NAMES.get(name, {}).items()
+        if before in data.variables and before not in data.dims
+    }
+    if not old:
+        return data
+    data = data.rename(old).reset_coords(
+        [now for now in old.values() if now in {"realization_index", "start_time"}]
+    )
+    for now in old.values():
+        data[now].attrs = GROUPS[name][now].attributes
+    return data

@@ -1,0 +1,104 @@
+"""Whether a file is an output that commands can use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mesoslip.errors import FileError
+from mesoslip.output import variables
+from mesoslip.output.provenance import version
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Dimensions and variables that commands need of an output of a run: of its root, and of groups that
+# it may have.
+ROOT_NEEDS = tuple(variables.TRACE)[:6]
+
+NEEDS = {
+    "stages": (("stage",), tuple(variables.STAGES)),
+    "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
+    "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
+    "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:8]),
+}
+
+
+def check_signature(path: Path) -> None:
+    """Make sure that a file looks like netCDF-4 before a library opens it.
+
+    Raises
+    ------
+    FileError
+        If it does not, or cannot be read.
+    """
+    try:
+        if not path.exists():
+            raise FileError(f"{path}: no such file")
+        if not path.is_file():
+            raise FileError(f"{path}: is a device or the like, not an output file")
+        with path.open("rb") as file:
+            start = file.read(8)
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path}: cannot be read: {error}") from error
+    if path.suffix == ".toml":
+        raise FileError(
+            f"{path}: is a configuration, not an output (netCDF); make one of it first: "
+            f"mesoslip run {path}"
+        )
+    if start != b"\x89HDF\r\n\x1a\n":
+        told = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
+        raise FileError(f"{path}: not an output (netCDF-4){told}")
+
+
+def _is_table(path: Path) -> bool:
+    return path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
+
+
+def check_layout(tree: xr.DataTree, path: Path) -> None:
+    """Make sure that what commands use of an output is there, as numbers in the right dimensions.
+
+    Raises
+    ------
+    FileError
+        If it is not.
+    """
+    if "configuration" not in tree.attrs:
+        raise FileError(f"{path}: not an output of mesoslip")
+    wrong = [
+        f"attribute {name}"
+        for name in ("configuration", "title", "comment", "complete")
+        if not isinstance(tree.attrs.get(name, ""), str)
+    ]
+    if "spring_force" in tree.data_vars:
+        needed = {"": (("realization", "time"), ROOT_NEEDS), "slips": (("slip",), variables.SLIPS)}
+        needed |= {name: one for name, one in NEEDS.items() if name in tree.children}
+        for group, (dimensions, names) in needed.items():
+            if group and group not in tree.children:
+                wrong.append(f"group {group}")
+                continue
+            data = tree.children[group].to_dataset() if group else tree.to_dataset()
+            wrong += [
+                f"variable {group}/{name}"
+                for name in names
+                if name not in data
+                or data[name].dims[: len(dimensions)] != dimensions
+                or data[name].dtype.kind not in "fiu"
+            ]
+        if not {"realization", "time"} <= tree.coords.keys():
+            wrong.append("coordinates realization and time")
+    newer = _newer_version(tree.attrs.get("program_version"))
+    if wrong and newer:
+        raise FileError(f"{path}: is of {newer}, and cannot be read: {wrong[0]} is not as it was")
+    if wrong:
+        raise FileError(f"{path}: a damaged netCDF-4 file: {wrong[0]} is missing or wrong")
+
+
+def _newer_version(written: object) -> str:
+    """The program that has written a file, if it is newer than this one; otherwise empty."""
+    ours = version("mesoslip")
+    theirs, here = ([int(one) for one in re.findall(r"\d+", str(text))] for text in (written, ours))
+    if written is None or theirs <= here:
+        return ""
+    return f"mesoslip {written}, which is newer than this one ({ours})"

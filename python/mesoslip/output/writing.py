@@ -1,0 +1,108 @@
+"""Outputs written to files: netCDF-4 with the layout that `mesoslip.run` returns in memory."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import netCDF4
+
+from mesoslip.output import filling, layout
+from mesoslip.output.hdf5 import LOCK
+from mesoslip.output.layout import Entry, GroupLayout
+from mesoslip.output.results import RunResults
+from mesoslip.output.targets import written_whole
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Variables with fewer values are not worth compressing.
+LEAST_COMPRESSED = 1000
+
+COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+
+# Slots of the table in which the chunks of a variable in memory are found.
+CACHE_SLOTS = 11
+
+
+def write(tree: xr.DataTree, path: Path) -> None:
+    """Write a tree as an output; its name appears only when it is whole.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    encoding = {
+        group.path: {
+            str(name): COMPRESSION
+            for name, data in group.data_vars.items()
+            if data.size > LEAST_COMPRESSED
+        }
+        for group in tree.subtree
+    }
+    with written_whole(path) as part, LOCK:
+        tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
+
+
+def write_results(results: RunResults, path: Path) -> None:
+    """Write the results of a run, of which only blocks are held in memory.
+
+    The file is that of `write` and `mesoslip.output.tree.build_tree`.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    groups = layout.describe(results)
+    with (
+        written_whole(path) as part,
+        LOCK,
+        netCDF4.Dataset(part, "w", format="NETCDF4") as file,
+    ):
+        taken = {
+            name: _create_group(file.createGroup(name) if name else file, form, groups[""])
+            for name, form in groups.items()
+        }
+        filling.fill(results, groups, taken)
+
+
+def _create_group(
+    place: netCDF4.Dataset, form: GroupLayout, root: GroupLayout
+) -> dict[str, filling.Values]:
+    """Make the dimensions, variables and attributes of a group of a file."""
+    place.setncatts(form.attributes)
+    for name, size in form.sizes.items():
+        place.createDimension(name, size)
+    sizes = {**root.sizes, **form.sizes}
+    made: dict[str, filling.Values] = {}
+    for name, entry in form.entries.items():
+        storage = _storage(entry, [sizes[one] for one in entry.dimensions])
+        variable = place.createVariable(
+            name, entry.dtype, entry.dimensions, fill_value=entry.fill_value, **storage
+        )
+        if storage:
+            # Blocks fill chunks: the library's own cache would hold hundreds of megabytes.
+            size = entry.dtype.itemsize * math.prod(storage["chunksizes"])
+            variable.set_var_chunk_cache(2 * size, CACHE_SLOTS, 1.0)
+        variable.set_auto_maskandscale(False)
+        variable.setncatts(entry.meaning.attributes)
+        auxiliary = form.auxiliary_coordinates(name)
+        if auxiliary:
+            variable.coordinates = " ".join(auxiliary)
+        made[name] = variable
+    return made
+
+
+def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
+    """Compression of a variable, and chunks that hold a block of rows."""
+    if math.prod(shape) <= LEAST_COMPRESSED or entry.is_coordinate:
+        return {}
+    # One realization at a time; of long dimensions after the first no more than a block's worth.
+    chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
+    along = 1 if entry.is_padded else 0
+    most = min(filling.BLOCK_ROWS, filling.BLOCK_NUMBERS // math.prod(shape[along + 1 :]))
+    chunks[along] = max(1, min(shape[along], most))
+    return {**COMPRESSION, "chunksizes": chunks}

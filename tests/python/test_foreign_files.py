@@ -1,0 +1,139 @@
+"""Outputs of others: nothing outside of them is read; and reading on many threads."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+
+import h5py
+import mesoslip
+import netCDF4
+import numpy as np
+import pytest
+from conftest import ROOT
+
+OLD = ROOT / "tests" / "reference" / "eq-rigid-scaled.nc"
+
+
+@pytest.fixture
+def output(tmp_path):
+    path = tmp_path / "out.nc"
+    shutil.copy(OLD, path)
+    return path
+
+
+def external_storage(file, folder):
+    (folder / "secret").write_bytes(np.arange(4.0).tobytes())
+    file.create_dataset("secret", (4,), float, external=[(folder / "secret", 0, 32)])
+
+
+def virtual_data(file, folder):
+    with h5py.File(folder / "secret.h5", "w") as other:
+        other["numbers"] = np.arange(4.0)
+    layout = h5py.VirtualLayout((4,), float)
+    layout[:] = h5py.VirtualSource(folder / "secret.h5", "numbers", (4,))
+    file.create_virtual_dataset("secret", layout)
+
+
+def external_link(file, folder):
+    with h5py.File(folder / "secret.h5", "w") as other:
+        other["numbers"] = np.arange(4.0)
+    file["slips"]["secret"] = h5py.ExternalLink(folder / "secret.h5", "numbers")
+
+
+def link_to_a_pipe(file, folder):
+    os.mkfifo(folder / "pipe")
+    file["secret"] = h5py.ExternalLink(folder / "pipe", "numbers")
+
+
+def soft_link(file, _):
+    file["secret"] = h5py.SoftLink("/slips/force_drop")
+
+
+def cycle(file, _):
+    for name in ("a", "b", "c", "d"):
+        file["slips"][name] = file["/"]
+
+
+def two_names(file, _):
+    file["secret"] = file["slips"]["force_drop"]
+
+
+FOREIGN = (
+    *(external_storage, virtual_data, external_link, link_to_a_pipe),
+    *(soft_link, cycle, two_names),
+)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("attack", FOREIGN, ids=lambda one: one.__name__)
+def test_an_output_refers_to_nothing_outside_of_it(output, tmp_path, attack, command):
+    with h5py.File(output, "r+") as file:
+        attack(file, tmp_path)
+    with pytest.raises(mesoslip.FileError, match=r"secret|slips/"):
+        mesoslip.open_output(output)
+    for arguments in (["slips", output], ["run", output, "-o", tmp_path / "again.nc"]):
+        status, _, told = command(*arguments)
+        assert status == 2
+        assert "damaged" not in told
+        assert told.count("\n") == 1
+
+
+def test_a_configuration_of_an_output_reads_no_file(output, tmp_path, command):
+    secret = tmp_path / "secret.csv"
+    secret.write_text("password\n12345\n")
+    history = f"[drive.history]\nfile = '{secret}'\n"
+    for name in ("configuration", "base_configuration"):
+        shutil.copy(OLD, output)
+        with netCDF4.Dataset(output, "r+") as file:
+            text = mesoslip.Config.load(ROOT / "runs" / "klein.toml").to_toml()
+            file.setncattr(name, text.replace("[drive]\n", f"{history}[drive]\n", 1))
+        status, shown, told = command("run", output, "-o", tmp_path / "again.nc")
+        assert status == 2
+        assert "drive.history.file" in told
+        assert "is not read from an output" in told
+        assert "password" not in shown + told
+    # Who repeats a run may give a file.
+    table = tmp_path / "history.csv"
+    table.write_text("time [s],displacement [um]\n0,0\n20,2\n")
+    text = mesoslip.Config.load(ROOT / "runs" / "klein.toml").to_toml()
+    again = mesoslip.Config.from_toml(
+        text, overrides=["drive.velocity=none", f"drive.history.file={table}"]
+    )
+    assert again.drive.history is not None
+
+
+THREADS = """
+import sys, threading
+import mesoslip
+from mesoslip.output.files import opened, read
+path, errors = sys.argv[1], []
+def work(number):
+    try:
+        for turn in range(12):
+            if number % 2:
+                mesoslip.slips(path)
+            else:
+                with opened(path) as tree:
+                    tree["spring_force"].values
+                    tree["slips"]["force_drop"].values
+    except Exception as error:
+        errors.append(error)
+threads = [threading.Thread(target=work, args=(one,)) for one in range(8)]
+[one.start() for one in threads]
+[one.join() for one in threads]
+print(errors)
+"""
+
+
+def test_outputs_are_read_on_many_threads(output):
+    done = subprocess.run(
+        [sys.executable, "-c", THREADS, output],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")

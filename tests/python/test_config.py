@@ -712,9 +712,9 @@ def test_nothing_overflows_within_the_bounds(keys, data):
     quantities = derived(config)
     assert {"contact_stiffness", "omega_s", "mean_life", "F_steady"} <= quantities.keys()
     for name, value in config.slider.kernel_parameters(config).items():
-        assert math.isfinite(value), name
+        assert isinstance(value, str) or math.isfinite(value), name
     for name, value in config.contact_kind.kernel_parameters(config).items():
-        assert math.isfinite(value), name
+        assert isinstance(value, str) or math.isfinite(value), name
 
 
 ANYTHING = st.recursive(

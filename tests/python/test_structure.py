@@ -57,14 +57,88 @@ def room_of_file(path: Path) -> str:
     return relative.parts[0] if len(relative.parts) > 1 else relative.name.split(".")[0]
 
 
+def wrong_uses(path: Path, modules: set[str]) -> list[str]:
+    """The modules that a file must not use."""
+    room = room_of_file(path)
+    return [
+        module
+        for module in sorted(modules)
+        if room_of(module) not in {room, *MAY_USE[room]} or (module in KINDS and room != "boundary")
+    ]
+
+
 @pytest.mark.parametrize("path", sources(), ids=lambda path: path.name)
 def test_fortran_uses_what_comes_before(path):
-    room = room_of_file(path)
-    for module in used(path):
-        other = room_of(module)
-        assert other == room or other in MAY_USE[room], f"{path.name} uses {module}"
-        if module in KINDS:
-            assert room in {"boundary"}, f"{path.name} uses the list of kinds {module}"
+    assert wrong_uses(path, used(path)) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "module"),
+    [
+        ("contacts/base.f90", "mesoslip_sliders_base"),
+        ("contacts/base.f90", "mesoslip_contacts"),
+        ("sliders/base.f90", "mesoslip_contacts_base"),
+        ("sliders/base.f90", "mesoslip_recording_buffer"),
+        ("recording/buffer.f90", "mesoslip_theory_lives"),
+        ("recording/buffer.f90", "mesoslip_loop_simulation"),
+        ("theory/lives.f90", "mesoslip_sliders_base"),
+        ("theory/lives.f90", "mesoslip_recording_buffer"),
+        ("theory/lives.f90", "mesoslip_loop_simulation"),
+        ("loop/simulation.f90", "mesoslip_theory_lives"),
+        ("loop/simulation.f90", "mesoslip_boundary_handles"),
+        ("numerics/kinds.f90", "mesoslip_interface_law"),
+    ],
+)
+def test_siblings_and_those_behind_are_not_used(file, module):
+    """Each of these uses would be found."""
+    path = FORTRAN / file
+    assert path.exists()
+    assert module in modules_of(module)
+    assert wrong_uses(path, {module}) == [module]
+
+
+def modules_of(module: str) -> set[str]:
+    """The modules of the files of a room."""
+    room = room_of(module)
+    texts = (path.read_text() for path in sources() if room_of_file(path) == room)
+    return {name for text in texts for name in re.findall(r"^module\s+(\w+)", text, re.MULTILINE)}
+
+
+def listed(folder: Path) -> set[str]:
+    """The sources that the build of a folder lists."""
+    build = folder / "meson.build"
+    text = re.sub(r"#.*", "", build.read_text()) if build.exists() else ""
+    return set(re.findall(r"'([\w.]+\.f90(?:\.in)?)'", text))
+
+
+@pytest.mark.parametrize(
+    "folder",
+    sorted({path.parent for path in sources()}),
+    ids=lambda folder: str(folder.relative_to(ROOT)),
+)
+def test_fortran_files_are_listed_in_their_build(folder):
+    assert {path.name for path in folder.glob("*.f90*")} <= listed(folder)
+    if folder != FORTRAN:
+        above = (folder.parent / "meson.build").read_text()
+        assert f"subdir('{folder.name}')" in above
+
+
+def test_python_files_are_listed_in_their_build():
+    """A file that is not would be missing in the wheel."""
+    package = ROOT / "python" / "mesoslip"
+    text = (ROOT / "python" / "meson.build").read_text()
+    named = text[text.index("package = {") :]
+    built = {
+        str(Path(folder) / name)
+        for folder, names in re.findall(r"'([\w./]+)': \[(.*?)\]", named, re.DOTALL)
+        for name in re.findall(r"'([\w.]+)'", names)
+    }
+    there = {
+        str(path.relative_to(package))
+        for path in package.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".in"
+    }
+    assert built == there
 
 
 @pytest.mark.parametrize("path", sources(), ids=lambda path: path.name)

@@ -7,6 +7,7 @@ from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
+from .execution.executors import Dask, Processes, Threads
 from .measured.trace import read_trace
 from .output.inputs import open_output
 from .plots.plot import plot
@@ -19,10 +20,13 @@ from .theory.steady_sliding import SteadySliding
 __all__ = [
     "Config",
     "ConfigError",
+    "Dask",
     "FileError",
     "MesoslipError",
+    "Processes",
     "RunError",
     "SteadySliding",
+    "Threads",
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",

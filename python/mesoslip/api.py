@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
-from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.errors import RunError
+from mesoslip.execution.executors import ExecutorLike
+from mesoslip.execution.stop import StopRequest
 from mesoslip.output.inputs import OutputLike, as_config, as_run
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint
-from mesoslip.simulation.runner import Results, checked_workers, run_realizations
-from mesoslip.simulation.stop import StopFlag
+from mesoslip.simulation.runner import Results, run_realizations
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from mesoslip.campaign.plan import Plan
     from mesoslip.campaign.runner import Sweep
-    from mesoslip.campaign.store import Store
+    from mesoslip.execution.store import Store
     from mesoslip.inference import plan as fit_plans
 
 # What ends a sweep that somebody has stopped.
@@ -30,8 +31,7 @@ INTERRUPTED = "interrupted"
 def run(
     config: PathLike | Mapping[str, Any] | Config,
     *,
-    workers: int | None = None,
-    scheduler: str | None = None,
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.DataTree:
     """Simulate.
@@ -40,14 +40,11 @@ def run(
     ----------
     config
         A TOML file, an output to run again, nested tables, or a `Config`.
-    workers
-        Realizations at the same time; as many as there are processors by default. The result does
-        not depend on it.
-    scheduler
-        Address of a Dask scheduler, or its ``--scheduler-file``, whose workers are to run the
-        realizations.
+    executor
+        Where realizations are computed: `Threads`, `Processes` or `Dask`, or a number of threads;
+        by default as many as there are processors. The result does not depend on it.
     progress
-        Called now and then with the part of the work that is done, 0 to 1.
+        Called now and then with the fraction of the work that is done, 0 to 1.
 
     Returns
     -------
@@ -62,33 +59,24 @@ def run(
     RunError
         If the run fails.
     """
-    results = simulate(as_config(config), workers=workers, scheduler=scheduler, progress=progress)
+    results = simulate(as_config(config), executor=executor, progress=progress)
     return build_tree(results)
 
 
 def simulate(
     config: Config,
     *,
-    workers: int | None = None,
-    scheduler: str | None = None,
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-    stop: StopFlag | None = None,
+    stop: StopRequest | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Results:
     """Simulate; what came out as tables, to build a tree of or to write to a file.
 
     See `run`, and `mesoslip.simulation.runner.run_realizations`.
     """
-    if scheduler is not None:
-        from mesoslip.campaign.cluster import connected
-        from mesoslip.campaign.ensemble import run_on_cluster
-
-        with connected(scheduler) as client:
-            return run_on_cluster(
-                config, client, progress=progress, stop=stop, checkpoint=checkpoint
-            )
     return run_realizations(
-        config, workers=workers, progress=progress, stop=stop, checkpoint=checkpoint
+        config, executor=executor, progress=progress, stop=stop, checkpoint=checkpoint
     )
 
 
@@ -96,9 +84,7 @@ def sweep(
     plan: PathLike | Mapping[str, Any] | Plan,
     *,
     store: PathLike | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    pool: str = "both",
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Run a configuration over a range of parameters, and measure each run.
@@ -108,19 +94,14 @@ def sweep(
     plan
         The file of a sweep, nested tables, or a `mesoslip.campaign.plan.Plan`.
     store
-        Folder where each point is kept as soon as it is done, and taken from when the sweep is
+        Folder where each point is kept as soon as it is done, and read from when the sweep is
         called again; nowhere by default.
-    workers
-        Points at the same time; as many as there are processors by default. The result does not
-        depend on it.
-    scheduler
-        Address of a Dask scheduler, or its ``--scheduler-file``, whose workers are to compute the
-        points.
-    pool
-        What points are computed on: "threads", "processes", or "both", that is threads first and
-        processes in a sweep that takes long.
+    executor
+        Where points are computed: `Threads`, `Processes` or `Dask`, or a number of workers, by
+        default as many as there are processors: threads at first, and processes in a sweep that
+        takes long. The result does not depend on it.
     progress
-        Called now and then with the part of the points that are there, 0 to 1.
+        Called now and then with the fraction of the points that are done, 0 to 1.
 
     Returns
     -------
@@ -135,19 +116,12 @@ def sweep(
     RunError
         If the scheduler is gone, or workers cannot be started, before every point was computed.
     """
-    from mesoslip.campaign.store import Store
+    from mesoslip.execution.store import Store
 
     checked = as_plan(plan)
-    kept = None if store is None else Store(as_path(store))
+    kept = None if store is None else Store(as_path(store), "points")
     with kept or nullcontext():
-        done = run_plan(
-            checked,
-            store=kept,
-            workers=workers,
-            scheduler=scheduler,
-            pool=pool,
-            progress=progress,
-        )
+        done = run_plan(checked, store=kept, executor=executor, progress=progress)
     if done.missing and done.ending != INTERRUPTED:
         raise RunError(done.ending)
     return done.dataset
@@ -176,28 +150,14 @@ def run_plan(
     plan: Plan,
     *,
     store: Store | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    pool: str = "both",
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-    stop: StopFlag | None = None,
+    stop: StopRequest | None = None,
 ) -> Sweep:
-    """Compute what is missing of a sweep; see `sweep` and `mesoslip.campaign.runner.run_sweep`."""
-    from mesoslip.campaign import cluster, execution, runner
+    """Compute the missing points of a sweep; see `mesoslip.campaign.runner.run_sweep`."""
+    from mesoslip.campaign.runner import run_sweep
 
-    count = checked_workers(workers)
-    if pool not in execution.POOLS:
-        raise ConfigError(
-            [Problem("", "pool", f"must be one of {', '.join(execution.POOLS)}", pool)]
-        )
-    # Before a cluster is asked.
-    _ = plan.combinations
-    if scheduler is None:
-        executor = execution.on_this_machine(count, pool)
-        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
-    with cluster.connected(scheduler) as client:
-        executor = cluster.on_dask(client)
-        return runner.run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
+    return run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
 
 
 def fit(
@@ -205,9 +165,9 @@ def fit(
     config: PathLike | Mapping[str, Any] | fit_plans.Plan,
     *,
     store: PathLike | None = None,
-    workers: int | None = None,
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-    stop: StopFlag | None = None,
+    stop: StopRequest | None = None,
 ) -> xr.DataTree:
     """Fit parameters of the model to a trace, with their uncertainty.
 
@@ -219,16 +179,15 @@ def fit(
         What is known, and in a table ``[fit.free]`` what is not: a TOML file, nested tables, or a
         `mesoslip.inference.plan.Plan`.
     store
-        File in which simulations are kept until the fit is done, and from which it goes on when it
-        is called again; nowhere by default.
-    workers
-        Simulations at the same time; as many as there are processors by default. The result does
-        not depend on it.
+        Folder where each simulation is kept as soon as it is done, and read from when the fit is
+        called again; nowhere by default.
+    executor
+        Where simulations are computed: `Threads`, `Processes` or `Dask`, or a number of threads; by
+        default as many as there are processors. The result does not depend on it.
     progress
-        Called now and then with the part of the simulations that is done.
+        Called now and then with the fraction of the simulations that is done.
     stop
-        Set by who wants the fit to stop, which raises
-        `mesoslip.inference.simulations.StoppedError`.
+        A request to stop, which raises `mesoslip.execution.stop.StoppedError`; Ctrl-C is one too.
 
     Returns
     -------
@@ -257,7 +216,7 @@ def fit(
         as_run(output),
         plan,
         store=None if store is None else as_path(store),
-        workers=workers,
+        executor=executor,
         progress=progress,
         stop=stop,
     )

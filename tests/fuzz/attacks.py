@@ -152,7 +152,7 @@ def _kind(config: Config) -> str:
 
 def _other_segments(config: Config, tree: xr.DataTree, random: Random, folder: Path) -> list[str]:
     """Whether a run that is cut into segments, put away and taken up again, is the same."""
-    whole = build_tree(run_realizations(config, workers=random.choice([1, 2])))
+    whole = build_tree(run_realizations(config, executor=random.choice([1, 2])))
     problems = [f"file and memory: {one} differs" for one in differences(tree, whole)]
     advances = int(whole.attrs["advance_count"])
     told: list[str] = []
@@ -176,7 +176,7 @@ def advanced(
     """Go on from the checkpoint in a folder for some advances and keep another, or to the end."""
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
     problems: list[str] = []
-    with Checkpoint(folder, config, resume=True, tell=told.append) as checkpoint:
+    with Checkpoint(folder, config, resume=True, report=told.append) as checkpoint:
         checkpoint.restore(realizations)
         for one in realizations:
             while not one.finished:

@@ -47,7 +47,7 @@ def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
         same = {"law": "log", "time": 1e-3, "growth": 0.0}
     one, other = (
         build_tree(
-            run_realizations(configuration(kind, contacts__coupling="equal", **ageing), workers=1)
+            run_realizations(configuration(kind, contacts__coupling="equal", **ageing), executor=1)
         )
         for ageing in ({}, {"contacts__ageing": same})
     )

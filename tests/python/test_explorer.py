@@ -13,13 +13,14 @@ from conftest import ROOT, klein_tables
 from kinds import KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
+from mesoslip.execution.newest import Newest
+from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import CONTROLS, STEPS, values
-from mesoslip.explorer.following import Pace, Worker, explored, follow
+from mesoslip.explorer.following import Pace, explored, follow
 from mesoslip.explorer.pictures import Theories, motion, theory
 from mesoslip.explorer.session import Session
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results, run_realizations
-from mesoslip.simulation.stop import StopFlag
 
 KLEIN = str(ROOT / "runs" / "klein.toml")
 
@@ -188,7 +189,7 @@ def test_a_run_is_shown_soon_and_at_its_end():
         times.append(time.thread_time() - start)
         parts.append(motion(results).part_done)
 
-    follow(config, StopFlag(), show)
+    follow(config, Stop(), show)
     assert parts[-1] == 1.0
     assert parts == sorted(parts)
     # Of computing time, as others may use the machine as well.
@@ -199,7 +200,7 @@ def test_what_is_explored_moves_as_what_is_run():
     """Samples and snapshots do not change the motion."""
     config = Config.load(KLEIN, ["run.duration=3 s"])
     seen = []
-    follow(explored(config), StopFlag(), seen.append)
+    follow(explored(config), Stop(), seen.append)
     (mine,), (theirs,) = seen[-1].realizations, run_realizations(config).realizations
     assert mine.breaks == theirs.breaks
     assert mine.slips == pytest.approx(theirs.slips)
@@ -209,7 +210,7 @@ def test_what_is_explored_moves_as_what_is_run():
 def test_every_kind_of_run_is_drawn(kind):
     config = configuration(kind)
     seen = []
-    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    follow(explored(config), Stop(), lambda results: seen.append(motion(results)))
     drawn = seen[-1]
     for line in (drawn.force, drawn.velocity, drawn.detached):
         assert len(line.x) == len(line.y) > 1
@@ -222,7 +223,7 @@ def test_every_kind_of_run_is_drawn(kind):
 def test_pictures_are_as_long_as_a_picture_is_wide():
     config = explored(Config.load(KLEIN))
     seen = []
-    follow(config, StopFlag(), lambda results: seen.append(motion(results)))
+    follow(config, Stop(), lambda results: seen.append(motion(results)))
     drawn = seen[-1]
     assert len(drawn.force.x) < 4000
     # The first spike of Klein's case: 18 uN less the spread of the thresholds.
@@ -255,7 +256,7 @@ def test_what_has_no_curve_says_so():
 def test_a_lattice_is_shown_in_motion():
     config = Config.load(ROOT / "runs" / "source" / "S25d.toml", ["run.duration=2 s"])
     seen = []
-    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    follow(explored(config), Stop(), lambda results: seen.append(motion(results)))
     lattice = seen[-1].lattice
     assert lattice.loads.shape[1:] == (68, 60)
     assert len(lattice.times) == len(lattice.loads) > 50
@@ -273,7 +274,7 @@ def test_a_run_is_cut_off_by_the_next_one():
             KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=10 ms"]
         )
     )
-    worker, begun, done = Worker("test"), threading.Event(), []
+    worker, begun, done = Newest(), threading.Event(), []
 
     def hour(stop):
         begun.set()
@@ -290,13 +291,15 @@ def test_a_run_is_cut_off_by_the_next_one():
     assert done[0] == "hour"
     assert done[-1] == "last"
     worker.close()
-    worker._thread.join(30)
+    end = time.monotonic() + 30
+    while worker.is_alive and time.monotonic() < end:
+        time.sleep(0.01)
     assert not worker.is_alive
 
 
 def test_the_first_picture_comes_though_the_next_change_is_there():
     """So that the picture follows a knob that is being turned."""
-    stop, seen = StopFlag(), []
+    stop, seen = Stop(), []
     stop.set()
     follow(explored(Config.load(KLEIN, ["run.duration=1000 s"])), stop, seen.append)
     assert len(seen) == 1
@@ -306,7 +309,7 @@ def test_the_first_picture_comes_though_the_next_change_is_there():
 def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
     told, done = [], threading.Event()
     monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_value))
-    worker = Worker("test")
+    worker = Newest()
     worker.submit(lambda _: 1 / 0)
     while not told:
         time.sleep(0.01)
@@ -318,7 +321,7 @@ def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
 
 def test_a_worker_that_rests_does_the_newest_only():
     done, finished = [], threading.Event()
-    worker = Worker("test", delay=0.5)
+    worker = Newest(delay=0.5)
     for number in range(5):
         worker.submit(lambda _, number=number: done.append(number))
     worker.submit(lambda _: finished.set())
@@ -368,7 +371,7 @@ def test_a_slip_has_both_forces_in_one_unit():
         KLEIN, ["run.duration=2.5 s", *(f"{key}={larger * one}" for key, one in changes.items())]
     )
     seen = []
-    follow(explored(config), StopFlag(), lambda results: seen.append(motion(results)))
+    follow(explored(config), Stop(), lambda results: seen.append(motion(results)))
     spring, contact = seen[-1].slip_force, seen[-1].slip_contact_force
     assert spring.y_label == contact.y_label == "force (mN)"
     assert np.max(contact.y) < 1 < np.max(spring.y)
@@ -381,7 +384,7 @@ def test_a_long_run_says_how_long_it_takes():
             KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=1 s"]
         )
     )
-    seen, stop = [], StopFlag()
+    seen, stop = [], Stop()
 
     def show(results):
         seen.append(motion(results))

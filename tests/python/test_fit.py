@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip.errors import ConfigError, FileError
+from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.inference import checks, likelihood
 from mesoslip.inference.fit import prepare
 from mesoslip.inference.plan import Plan
 from mesoslip.inference.prior import Free, Prior
 from mesoslip.inference.rounds import close_in
 from mesoslip.inference.sampler import draw, r_hat
-from mesoslip.inference.simulations import Simulations, StoppedError
+from mesoslip.inference.simulations import Simulations
 from mesoslip.inference.summaries import Feature, Summarizer
-from mesoslip.simulation.stop import StopFlag
 from scipy.stats import kstest, norm
 
 FREE = {
@@ -278,7 +278,7 @@ def small_fit(tmp_path_factory):
     """The trace of the small experiment, and its posterior."""
     folder = tmp_path_factory.mktemp("fit")
     tree = experiment()
-    posterior = mesoslip.fit(tree, fit_tables(), store=folder / "kept.npz", workers=1)
+    posterior = mesoslip.fit(tree, fit_tables(), store=folder / "kept", executor=1)
     return tree, posterior, folder
 
 
@@ -309,7 +309,7 @@ def test_a_report_tells_the_parameters(small_fit, tmp_path):
 def test_the_same_seed_gives_the_same_posterior(small_fit):
     """With any number of workers, and after a stop at any time."""
     tree, posterior, folder = small_fit
-    stop = StopFlag()
+    stop = Stop()
     done = []
 
     def watch(part):
@@ -317,13 +317,13 @@ def test_the_same_seed_gives_the_same_posterior(small_fit):
         if part > 0.4:
             stop.set()
 
-    store = folder / "stopped.npz"
+    store = folder / "stopped"
     with pytest.raises(StoppedError):
-        mesoslip.fit(tree, fit_tables(), store=store, workers=2, progress=watch, stop=stop)
+        mesoslip.fit(tree, fit_tables(), store=store, executor=2, progress=watch, stop=stop)
     assert store.exists()
     again = []
     resumed = mesoslip.fit(
-        tree, fit_tables(), store=store, workers=2, progress=lambda part: again.append(part)
+        tree, fit_tables(), store=store, executor=2, progress=lambda part: again.append(part)
     )
     assert len(again) < 0.85 * len(again + done)
     for key in FREE:
@@ -332,11 +332,11 @@ def test_the_same_seed_gives_the_same_posterior(small_fit):
 
 def test_simulations_of_another_fit_are_refused(small_fit):
     tree, _, folder = small_fit
-    with pytest.raises(FileError, match="of another fit"):
-        mesoslip.fit(tree, fit_tables(seed=2), store=folder / "kept.npz")
-    (folder / "damaged.npz").write_bytes(b"PK\x03\x04")
-    with pytest.raises(FileError, match="damaged"):
-        mesoslip.fit(tree, fit_tables(), store=folder / "damaged.npz")
+    with pytest.raises(FileError, match="of another configuration, trace or version"):
+        mesoslip.fit(tree, fit_tables(seed=2), store=folder / "kept")
+    (folder / "file").write_bytes(b"PK\x03\x04")
+    with pytest.raises(FileError, match="was not made by this program"):
+        mesoslip.fit(tree, fit_tables(), store=folder / "file")
 
 
 def test_another_mass_is_no_part_of_the_model():
@@ -481,7 +481,7 @@ def test_a_trace_may_count_from_a_time_on():
     assert len(force) == 1501
     assert not simulator.summarizer.has_start
     assert "first_peak" not in simulator.summarizer.names
-    made = Simulations(simulator, simulator.summarizer(force), expected=4, workers=1)
+    made = Simulations(simulator, expected=4, executor=1)
     made.add(np.full((2, 2), 0.5))
     assert np.isfinite(made.summaries[:, :3]).all()
 
@@ -503,7 +503,7 @@ def test_a_trace_of_several_stages_may_start_at_any_time():
     simulator, force = prepare(later, plan)
     np.testing.assert_array_equal(force, tree["spring_force"].values[0])
     np.testing.assert_allclose(simulator.summarizer.time, tree["time"], atol=1e-9)
-    made = simulator.force(3, plan.prior.unit(np.array([18e-6, 1e-3])))
+    made = simulator.force((3, plan.prior.unit(np.array([18e-6, 1e-3]))), Stop())
     first = np.searchsorted(tree["time"], 0.95 * mesoslip.slips(tree)["start_time"].values[0])
     assert np.max(np.abs(made - force)[:first]) < 6 * NOISE
     # In the hold the force changes by ringing and noise only; before and after, by the drive.

@@ -203,13 +203,13 @@ def test_runs_answer(kind, seconds, folder):
 
 @pytest.mark.parametrize("workers", [-1, 0, float("nan"), 1.5, "2", True, np.int64(-1)])
 def test_workers_are_refused(workers):
-    with pytest.raises(mesoslip.ConfigError, match=r"workers = .*: must be a whole number") as told:
-        mesoslip.run(configuration("rigid"), workers=workers)
+    with pytest.raises(mesoslip.ConfigError, match=r"executor = .*: must be a whole") as told:
+        mesoslip.run(configuration("rigid"), executor=workers)
     assert "\n" not in str(told.value)
 
 
 def test_numbers_of_numpy_are_taken():
     tables = klein_tables(contacts__count=np.int64(50), run__duration=np.float64(0.1))
     tables["run"]["realizations"] = np.int32(2)
-    tree = mesoslip.run(tables, workers=np.int64(2))
+    tree = mesoslip.run(tables, executor=np.int64(2))
     assert tree.sizes["realization"] == 2

@@ -161,8 +161,8 @@ def test_results_do_not_depend_on_how_they_are_computed(klein):
     """Segments, threads and other realizations leave every number as it is."""
     config = klein(run__duration=2.2, run__realizations=3, output__slip_interval=1e-4)
     alone = klein(run__duration=2.2, output__slip_interval=1e-4)
-    together = mesoslip.run(config, workers=2)
-    one_by_one = mesoslip.run(config, workers=1)
+    together = mesoslip.run(config, executor=2)
+    one_by_one = mesoslip.run(config, executor=1)
     single = mesoslip.run(alone)
     piecewise = Realization(alone, 0)
     while not piecewise.finished:

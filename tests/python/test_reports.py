@@ -158,7 +158,7 @@ def test_a_report_of_a_sweep(tmp_path):
             "grid": {"contacts.delay": [1e-4, 1e-3], "slider.stiffness": [50.0, 100.0, 200.0]},
         },
     }
-    tree = xr.DataTree(mesoslip.sweep(plan, workers=1))
+    tree = xr.DataTree(mesoslip.sweep(plan, executor=1))
     _, page = written(tree, tmp_path / "sweep.html")
     assert "12 runs: 12 ok." in page.words
     assert page.tags.count("svg") == 2

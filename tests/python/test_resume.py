@@ -32,7 +32,7 @@ ONCE = {}
 def whole(kind: str) -> xr.DataTree:
     """The output of a run that was never stopped."""
     if kind not in ONCE:
-        ONCE[kind] = build_tree(run_realizations(configuration(kind), workers=1))
+        ONCE[kind] = build_tree(run_realizations(configuration(kind), executor=1))
     return ONCE[kind]
 
 
@@ -44,7 +44,7 @@ def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
 def advanced(config: Config, folder: Path, advances: int | None, told: list[str]) -> Results:
     """Go on from the checkpoint in a folder for some advances and keep another, or to the end."""
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
-    with Checkpoint(folder, config, resume=True, tell=told.append) as checkpoint:
+    with Checkpoint(folder, config, resume=True, report=told.append) as checkpoint:
         checkpoint.restore(realizations)
         for one in realizations:
             while not one.finished:
@@ -89,14 +89,14 @@ def test_workers_and_stops_do_not_matter(tmp_path):
     """Stopped again and again by another thread, on two threads and on one."""
     config, expected = configuration("rigid, three realizations"), None
     config = Config.from_dict(config.to_dict() | {"output": {"interval": 1e-5}})
-    expected = build_tree(run_realizations(config, workers=1))
+    expected = build_tree(run_realizations(config, executor=1))
     for attempt in range(100):
         stop = threading.Event()
         timer = threading.Timer(0.02, stop.set)
         timer.start()
         with Checkpoint(tmp_path / "c", config, interval=0.005, resume=True) as checkpoint:
             results = run_realizations(
-                config, workers=1 + attempt % 2, stop=stop, checkpoint=checkpoint
+                config, executor=1 + attempt % 2, stop=stop, checkpoint=checkpoint
             )
         timer.cancel()
         if results.complete:
@@ -111,7 +111,7 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
     """Rows do not stay in memory, and come back in their order."""
     from mesoslip.simulation import checkpoint as module
 
-    monkeypatch.setattr(module, "MOST_WAITING", 1000.0)
+    monkeypatch.setattr(module, "MAX_WAITING_BYTES", 1000.0)
     config = configuration("rigid, lattice")
     one = Realization(config, 0)
     with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
@@ -126,8 +126,9 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
 def test_a_full_disk_does_not_stop_a_run(tmp_path):
     """It says so, once, goes on, and what cannot be put into files stays in memory."""
     config, told = configuration("rigid"), []
-    (tmp_path / "trace.rows").symlink_to("/dev/full")
-    with Checkpoint(tmp_path, config, interval=1e-9, tell=told.append) as checkpoint:
+    with Checkpoint(tmp_path, config, interval=1e-9, report=told.append) as checkpoint:
+        checkpoint.restore([])
+        (tmp_path / "trace.rows").symlink_to("/dev/full")
         results = run_realizations(config, checkpoint=checkpoint)
         assert not checkpoint.write(results.realizations)
         assert len(told) == 1
@@ -257,7 +258,7 @@ def test_a_run_that_starts_anew_keeps_what_was_there(tmp_path):
     config, told = configuration("rigid"), []
     folder = tmp_path / "c"
     advanced(config, folder, 500, told)
-    with Checkpoint(folder, config, tell=told.append) as checkpoint:
+    with Checkpoint(folder, config, report=told.append) as checkpoint:
         checkpoint.restore([Realization(config, 0)])
         assert not (folder / "state.npz").exists()
     assert "c.old" in told[-1]
@@ -313,7 +314,7 @@ def test_states_are_whole_at_any_moment(tmp_path):
     advanced(config, tmp_path, 50, told)
     advanced(config, tmp_path, 50, told)
     # Between two renamings there is only the previous one; before them a part of the next.
-    (tmp_path / "state.npz").rename(tmp_path / "state.part")
+    (tmp_path / "state.npz").rename(tmp_path / ".state.npz.part")
     told.clear()
     results = advanced(config, tmp_path, None, told)
     assert told == []

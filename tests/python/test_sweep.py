@@ -7,6 +7,8 @@ import os
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import Future
+from contextlib import nullcontext
 from pathlib import Path
 
 import mesoslip
@@ -17,14 +19,17 @@ import xarray as xr
 from conftest import ROOT, klein_tables
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.regime import REGIME, regimes
-from mesoslip.campaign import execution, runner
+from mesoslip.campaign import runner
 from mesoslip.campaign.measures import MEASURES
 from mesoslip.campaign.plan import Plan
-from mesoslip.campaign.point import Outcome, compute, point_name
-from mesoslip.campaign.store import Store
+from mesoslip.campaign.point import Outcome, combination_key, point_name
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.messages import all_keys
-from mesoslip.simulation.stop import StopFlag
+from mesoslip.execution import local
+from mesoslip.execution.executors import Executor, ThreadsThenProcesses
+from mesoslip.execution.pool import Pool
+from mesoslip.execution.stop import Stop
+from mesoslip.execution.store import MANIFEST, Store
 
 # A run of a millisecond, in which contacts break.
 TINY = klein_tables(
@@ -72,7 +77,7 @@ SIMPLE = """
 
 
 def test_a_dataset_of_named_axes_in_si():
-    data = mesoslip.sweep(tables(realizations=2), pool="threads")
+    data = mesoslip.sweep(tables(realizations=2), executor=mesoslip.Threads())
     assert data["mean_force"].dims == ("contacts.delay", "slider.stiffness", "realization")
     np.testing.assert_array_equal(data["contacts.delay"], [1e-4, 5e-4])
     np.testing.assert_allclose(data["slider.stiffness"], [50, 100, 200])
@@ -86,7 +91,7 @@ def test_a_dataset_of_named_axes_in_si():
 
 def test_measures_are_those_of_the_run_itself():
     """Each point against a run of its own, measured here."""
-    data = mesoslip.sweep(tables(realizations=2, discard=0.25), pool="threads")
+    data = mesoslip.sweep(tables(realizations=2, discard=0.25), executor=mesoslip.Threads())
     tree = mesoslip.run(
         Config.from_dict(TINY).replace(
             {"contacts.delay": 5e-4, "slider.stiffness": 200.0, "run.realizations": 2}
@@ -165,7 +170,7 @@ def test_regimes_are_those_of_the_run_itself(tmp_path):
         output__interval=5e-3,
     )
     sweep = {"measures": ["regime", "period"], "grid": {"contacts.delay": ["0.5 ms", 0]}}
-    data = mesoslip.sweep({**base, "sweep": sweep}, pool="threads")
+    data = mesoslip.sweep({**base, "sweep": sweep}, executor=mesoslip.Threads())
     for number, delay in enumerate((5e-4, 0.0)):
         tree = mesoslip.run(Config.from_dict(base).replace({"contacts.delay": delay}))
         expected = regimes(tree)
@@ -217,7 +222,7 @@ def test_names_can_be_drawn():
     """A line and a map over a key that takes names."""
     law = {"contacts.threshold.law": ["uniform", "gaussian", "weibull"]}
     for grid in (law, law | {"contacts.delay": [1e-4, 5e-4]}):
-        data = mesoslip.sweep(tables(grid=grid), pool="threads")
+        data = mesoslip.sweep(tables(grid=grid), executor=mesoslip.Threads())
         figure = mesoslip.plot(xr.DataTree(data))
         figure.canvas.draw()
         texts = [
@@ -250,7 +255,7 @@ def test_keys_together_and_a_latin_hypercube():
     # One in each fifth of the two decades.
     fifths = np.floor(5 * np.log10(np.array(delays) / 1e-4) / 2)
     np.testing.assert_array_equal(fifths, np.arange(5))
-    data = mesoslip.sweep(plan, pool="threads")
+    data = mesoslip.sweep(plan, executor=mesoslip.Threads())
     assert data["mean_force"].dims == ("slider.stiffness", "sample", "realization")
     assert data["slider.mass"].dims == ("slider.stiffness",)
     assert data["contacts.delay"].dims == ("sample",)
@@ -259,7 +264,7 @@ def test_keys_together_and_a_latin_hypercube():
 
 def test_names_and_kinds_can_be_varied():
     grid = {"contacts.threshold.law": ["gaussian", "uniform"], "contacts.reattach": [True, False]}
-    data = mesoslip.sweep(tables(grid=grid), pool="threads")
+    data = mesoslip.sweep(tables(grid=grid), executor=mesoslip.Threads())
     assert list(data["contacts.threshold.law"].values) == ["gaussian", "uniform"]
     assert data["mean_force"].sizes["contacts.reattach"] == 2
     assert not data["status"].any()
@@ -285,14 +290,14 @@ def test_points_that_are_the_same_are_computed_once(tmp_path):
     done = done_by(plan, tmp_path)
     assert done.computed == 4
     assert len(done_by(plan, tmp_path).failures) == 0
-    with Store(tmp_path) as store:
+    with Store(tmp_path, "points") as store:
         assert len(store.names()) == 2
     np.testing.assert_array_equal(done.dataset["mean_force"][0], done.dataset["mean_force"][1])
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return mesoslip.sweep(tables(realizations=3), workers=1, pool="threads")
+    return mesoslip.sweep(tables(realizations=3), executor=mesoslip.Threads(1))
 
 
 def assert_same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
@@ -302,59 +307,76 @@ def assert_same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
         assert one[name].values.tobytes() == other[name].values.tobytes(), name
 
 
-@pytest.mark.parametrize(("pool", "workers"), [("threads", 2), ("processes", 1), ("processes", 2)])
-def test_who_computes_does_not_matter(pool, workers, whole):
-    data = mesoslip.sweep(tables(realizations=3), workers=workers, pool=pool)
+@pytest.mark.parametrize(
+    "executor", [mesoslip.Threads(2), mesoslip.Processes(1), mesoslip.Processes(2), 2]
+)
+def test_the_executor_does_not_matter(executor, whole):
+    data = mesoslip.sweep(tables(realizations=3), executor=executor)
     assert_same_numbers(whole, data)
+
+
+class Backwards(Executor, Pool):
+    """Computes the last piece first."""
+
+    capacity = 100
+
+    def open(self, stop):  # noqa: ARG002
+        self.waiting = []
+        return nullcontext(self)
+
+    def submit(self, function, piece):
+        self.waiting.append((Future(), function, piece))
+        return self.waiting[-1][0]
+
+    def check(self):
+        while self.waiting:
+            future, function, piece = self.waiting.pop()
+            future.set_result(function(piece, Stop()))
+
+    def close(self, wait):
+        pass
 
 
 def test_the_order_does_not_matter(whole):
     plan = Plan.from_dict(tables(realizations=3))
-
-    def backwards(tasks, _stop):
-        for task in reversed(list(tasks)):
-            yield task, compute(task)
-
-    assert_same_numbers(whole, runner.run_sweep(plan, executor=backwards).dataset)
+    assert_same_numbers(whole, runner.run_sweep(plan, executor=Backwards()).dataset)
 
 
 def test_threads_hand_over_to_processes(whole, monkeypatch):
     """In the middle of a sweep, and the numbers stay."""
-    monkeypatch.setattr(execution, "THREAD_SECONDS", 0.02)
+    monkeypatch.setattr(ThreadsThenProcesses, "thread_seconds", 0.02)
     started = []
 
-    class Counted(execution.ProcessWorker):
+    class Counted(local.WorkerProcess):
         def __init__(self):
             started.append(self)
             super().__init__()
 
-    monkeypatch.setattr(execution, "ProcessWorker", Counted)
-    data = mesoslip.sweep(tables(realizations=3), workers=1, pool="both")
+    monkeypatch.setattr(local, "WorkerProcess", Counted)
+    data = mesoslip.sweep(tables(realizations=3), executor=1)
     assert len(started) == 1
     assert_same_numbers(whole, data)
 
 
 def done_by(plan, store, executor=None):
-    with Store(store) as opened:
-        return runner.run_sweep(
-            plan, store=opened, executor=executor or execution.on_this_machine(2, "threads")
-        )
+    with Store(store, "points") as opened:
+        return runner.run_sweep(plan, store=opened, executor=executor or mesoslip.Threads(2))
 
 
 def test_only_what_is_missing_is_computed(tmp_path, whole):
     store = tmp_path / "points"
     first = done_by(Plan.from_dict(tables(realizations=2)), store)
-    assert (first.taken, first.computed) == (0, 12)
+    assert (first.stored, first.computed) == (0, 12)
     # Realizations that are added leave the earlier ones as they were.
     second = done_by(Plan.from_dict(tables(realizations=3)), store)
-    assert (second.taken, second.computed) == (12, 6)
+    assert (second.stored, second.computed) == (12, 6)
     assert_same_numbers(whole, second.dataset)
     again = done_by(Plan.from_dict(tables(realizations=3)), store)
-    assert (again.taken, again.computed) == (18, 0)
+    assert (again.stored, again.computed) == (18, 0)
     # A longer list keeps what is there, and so does a shorter one.
     grid = GRID | {"contacts.delay": ["0.5 ms", "1 ms", "0.1 ms"]}
     longer = done_by(Plan.from_dict(tables(realizations=3, grid=grid)), store)
-    assert (longer.taken, longer.computed) == (18, 9)
+    assert (longer.stored, longer.computed) == (18, 9)
     delays = whole["contacts.delay"].values
     assert_same_numbers(whole, longer.dataset.sel({"contacts.delay": delays}))
 
@@ -368,9 +390,9 @@ def test_points_of_another_base_measure_or_program_do_not_mix(tmp_path, monkeypa
         {"sweep": tables(discard=0.4)["sweep"]},
         {"sweep": tables(measures=["mean_force"])["sweep"]},
     ):
-        assert done_by(Plan.from_dict(tables() | change), store).taken == 0, change
+        assert done_by(Plan.from_dict(tables() | change), store).stored == 0, change
     monkeypatch.setattr("mesoslip._build.COMMIT", "another")
-    assert done_by(Plan.from_dict(tables()), store).taken == 0
+    assert done_by(Plan.from_dict(tables()), store).stored == 0
     monkeypatch.undo()
     assert done_by(Plan.from_dict(tables() | {"title": "another"}), store).computed == 0
 
@@ -378,16 +400,17 @@ def test_points_of_another_base_measure_or_program_do_not_mix(tmp_path, monkeypa
 def test_names_of_points_do_not_depend_on_realizations_or_order():
     config = Config.from_dict(TINY)
     measures = [MEASURES["mean_force"], MEASURES["breaks"]]
-    name = point_name(config, 3, measures, 0.5)
-    assert name == point_name(config.replace("run.realizations=7"), 3, measures[::-1], 0.5)
-    assert name != point_name(config, 4, measures, 0.5)
+    key = combination_key(config, measures, 0.5)
+    assert key == combination_key(config.replace("run.realizations=7"), measures[::-1], 0.5)
+    assert key != combination_key(config, measures, 0.4)
+    assert point_name(key, 3) == point_name(key, 3) != point_name(key, 4)
 
 
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "renamed"])
 def test_damaged_points_count_as_missing(damage, tmp_path):
     plan = Plan.from_dict(tables())
     first = done_by(plan, tmp_path)
-    paths = sorted(path for path in tmp_path.glob("*.json") if path.name != "sweep.json")
+    paths = sorted(path for path in tmp_path.glob("*.json") if path.name != MANIFEST)
     path = paths[0]
     content = path.read_text()
     number = json.loads(content)["measures"]["breaks"]
@@ -400,16 +423,18 @@ def test_damaged_points_count_as_missing(damage, tmp_path):
         }[damage]
     )
     again = done_by(plan, tmp_path)
-    assert (again.taken, again.computed) == (5, 1)
+    assert (again.stored, again.computed) == (5, 1)
     assert_same_numbers(first.dataset, again.dataset)
 
 
 def test_numbers_come_back_from_the_store_to_the_bit(tmp_path):
     values = {"tenth": 0.1, "least": 5e-324, "none": float("nan"), "much": float("inf")}
-    task = runner.task_of(plan := Plan.from_dict(tables()), next(iter(runner.places(plan))))
-    with Store(tmp_path) as store:
-        store.write(task, Outcome(values), {})
-        back = store.read(task.name).measures
+    plan = Plan.from_dict(tables())
+    (group, *_) = runner.groups(plan)
+    task = runner.task_of(plan, group, 0)
+    with Store(tmp_path, "points") as store:
+        store.write(task.name, runner.stored_body(task, Outcome(values), group.combinations[0]))
+        back = runner.stored_measures(store, plan, task.name)
     assert {name: np.float64(one).tobytes() for name, one in back.items()} == {
         name: np.float64(one).tobytes() for name, one in values.items()
     }
@@ -420,26 +445,31 @@ def test_outputs_of_points_on_request(tmp_path):
     done_by(Plan.from_dict(tables()), tmp_path)
     plan = Plan.from_dict(tables(traces=True))
     traced = done_by(plan, tmp_path)
-    assert (traced.taken, traced.computed) == (0, 6)
-    assert done_by(plan, tmp_path).taken == 6
-    assert done_by(Plan.from_dict(tables()), tmp_path).taken == 6
-    place = next(iter(runner.places(plan)))
-    tree = mesoslip.open_output(tmp_path / f"{place.name}.nc")
-    expected = mesoslip.run(place.combination.config)
+    assert (traced.stored, traced.computed) == (0, 6)
+    assert done_by(plan, tmp_path).stored == 6
+    assert done_by(Plan.from_dict(tables()), tmp_path).stored == 6
+    group = runner.groups(plan)[0]
+    tree = mesoslip.open_output(tmp_path / f"{point_name(group.key, 0)}.nc")
+    expected = mesoslip.run(group.combinations[0].config)
     np.testing.assert_array_equal(tree["spring_force"], expected["spring_force"])
 
 
 def test_one_store_one_sweep(tmp_path):
-    with Store(tmp_path), pytest.raises(FileError, match="another sweep is at work"):
-        Store(tmp_path)
-    with Store(tmp_path):
+    with (
+        Store(tmp_path, "points"),
+        pytest.raises(FileError, match="another run of this output is under way"),
+    ):
+        Store(tmp_path, "points")
+    with Store(tmp_path, "points"):
         pass
 
 
 def test_what_a_killed_sweep_left_behind_is_removed(tmp_path):
-    (tmp_path / ".host-1-2.abc.json").write_text("half")
-    with Store(tmp_path):
-        assert [path.name for path in tmp_path.iterdir()] == ["lock"]
+    with Store(tmp_path, "points") as store:
+        store.write_manifest({})
+    (tmp_path / f".{'0' * 32}.json.part").write_text("half")
+    with Store(tmp_path, "points"):
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["lock", MANIFEST]
 
 
 USER = '''
@@ -575,8 +605,10 @@ def test_a_sweep_needs_a_sweep(tmp_path, command):
     (tmp_path / "sweep.toml").write_text('base = "base.toml"\n[sweep]')
     status, _, told = command("run", tmp_path / "sweep.toml")
     assert (status, "the command for it is mesoslip sweep" in told) == (2, True)
-    with pytest.raises(ConfigError, match="pool"):
-        mesoslip.sweep(tables(), pool="swimming")
+    status, _, told = command("sweep", tmp_path / "sweep.toml", "--pool", "swimming")
+    assert status == 2
+    with pytest.raises(ConfigError, match="executor"):
+        mesoslip.sweep(tables(), executor="swimming")
 
 
 def test_a_dry_run_runs_nothing(tmp_path, sweep_file, command):
@@ -599,22 +631,20 @@ def test_changes_are_laid_over_the_base(tmp_path, sweep_file, command):
 
 def test_a_stopped_sweep_keeps_what_it_has(tmp_path):
     plan = Plan.from_dict(tables(realizations=3))
-    stop = StopFlag()
+    stop, done = Stop(), []
 
-    def until_five(tasks, flag):
-        for number, task in enumerate(tasks):
-            if number == 5:
-                flag.set()
-                return
-            yield task, compute(task)
+    def until_five(part):
+        done.append(part)
+        if len(done) == 6:
+            stop.set()
 
-    with Store(tmp_path) as store:
-        part = runner.run_sweep(plan, store=store, executor=until_five, stop=stop)
+    with Store(tmp_path, "points") as store:
+        part = runner.run_sweep(plan, store=store, executor=1, progress=until_five, stop=stop)
     assert (part.computed, part.missing, part.complete) == (5, 13, False)
     assert np.sum(part.dataset["status"].values == 2) == 13
     assert part.dataset.attrs["complete"] == "false"
     rest = done_by(plan, tmp_path)
-    assert (rest.taken, rest.computed) == (5, 13)
+    assert (rest.stored, rest.computed) == (5, 13)
 
 
 def test_examples_are_sweeps():
@@ -629,7 +659,7 @@ def test_a_script_without_a_guard_may_sweep(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import json, sys, mesoslip\n"
-        "data = mesoslip.sweep(json.loads(sys.argv[1]), workers=2, pool='processes')\n"
+        "data = mesoslip.sweep(json.loads(sys.argv[1]), executor=mesoslip.Processes(2))\n"
         "print(int(data['status'].sum()))\n"
     )
     result = subprocess.run(

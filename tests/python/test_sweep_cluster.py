@@ -15,13 +15,12 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config, FileError, RunError
-from mesoslip.campaign import ensemble
 from mesoslip.campaign.plan import Plan
-from mesoslip.campaign.store import Store
+from mesoslip.execution.stop import Stop
+from mesoslip.execution.store import Store
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.runner import run_realizations
-from mesoslip.simulation.stop import StopFlag
 from test_sweep import assert_same_numbers, tables
 
 pytest.importorskip("distributed")
@@ -110,15 +109,15 @@ def test_a_cluster_gives_the_same(cluster, tmp_path):
     """With outputs of points, whose files only one thread of a process may write."""
     started = cluster()
     plan = Plan.from_dict(tables(realizations=3, traces=True))
-    expected = mesoslip.sweep(tables(realizations=3), pool="threads")
+    expected = mesoslip.sweep(tables(realizations=3), executor=mesoslip.Threads())
     store = tmp_path / "points"
-    data = mesoslip.sweep(plan, store=store, scheduler=started.address)
+    data = mesoslip.sweep(plan, store=store, executor=mesoslip.Dask(started.address))
     assert_same_numbers(expected, data)
     assert len(list(store.glob("*.nc"))) == 18
     # Realizations of a run too; the time that they take is their own.
     config = Config.from_dict(klein_tables(contacts__count=50, run__realizations=4))
     here = mesoslip.run(config)
-    there = mesoslip.run(config, scheduler=str(started.file))
+    there = mesoslip.run(config, executor=mesoslip.Dask(started.file))
     for group in here.groups:
         assert_same_numbers(
             here[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
@@ -141,14 +140,16 @@ def test_lost_workers_and_a_lost_scheduler(cluster, tmp_path):
         if len(done) == 60:
             started.scheduler.send_signal(signal.SIGKILL)
 
-    with pytest.raises(RunError, match="the scheduler is gone"):
-        mesoslip.sweep(wanted, store=store, scheduler=started.address, progress=progress)
-    with Store(store) as opened:
+    with pytest.raises(RunError, match="scheduler of the cluster is gone"):
+        mesoslip.sweep(
+            wanted, store=store, executor=mesoslip.Dask(started.address), progress=progress
+        )
+    with Store(store, "points") as opened:
         kept = len(opened.names())
     assert 55 <= kept < 180
     plan = Plan.from_dict(own_tables(tmp_path, "slow", 30))
     counted = []
-    data = mesoslip.sweep(plan, store=store, workers=8, pool="threads", progress=counted.append)
+    data = mesoslip.sweep(plan, store=store, executor=8, progress=counted.append)
     assert counted[0] == pytest.approx(kept / 180)
     assert not data["status"].any()
 
@@ -157,34 +158,39 @@ def test_a_point_that_costs_workers_fails_alone(cluster, tmp_path):
     started = cluster(3)
     wanted = own_tables(tmp_path, "deadly", 2)
     wanted["sweep"]["grid"] = {"contacts.delay": ["0.1 ms"]}
-    data = mesoslip.sweep(wanted, scheduler=started.address)
+    data = mesoslip.sweep(wanted, executor=mesoslip.Dask(started.address))
     np.testing.assert_array_equal(data["status"], [[0, 1]])
     assert "KilledWorker" in data.attrs["failures"]
 
 
 def test_no_scheduler_and_no_package(monkeypatch):
     for address in ("nonsense", "tcp://127.0.0.1:1", "there/is/none.json"):
-        monkeypatch.setattr("mesoslip.campaign.cluster.PATIENCE", 0.5)
-        with pytest.raises(FileError, match="there is no scheduler"):
-            mesoslip.sweep(tables(), scheduler=address)
+        monkeypatch.setattr("mesoslip.execution.cluster.ANSWER_SECONDS", 0.5)
+        with pytest.raises(FileError, match="there is no Dask scheduler"):
+            mesoslip.sweep(tables(), executor=mesoslip.Dask(address))
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(FileError, match="pip install 'mesoslip\\[distributed\\]'"):
-        mesoslip.sweep(tables(), scheduler="tcp://127.0.0.1:1")
+        mesoslip.sweep(tables(), executor=mesoslip.Dask("tcp://127.0.0.1:1"))
 
 
-def test_a_checkpoint_keeps_realizations_of_a_cluster(tmp_path, monkeypatch):
-    """Those that are done; those that are under way go on here only."""
+def test_a_checkpoint_keeps_realizations_that_are_complete(tmp_path):
+    """On other executors than threads; those that are under way go on on threads only."""
     config = Config.from_dict(klein_tables(contacts__count=50, run__realizations=4))
     expected = mesoslip.run(config)
-    stop = StopFlag()
+    stop = Stop()
 
-    def two(_client, function, tasks, _stop):
-        for _, task in zip(range(2), tasks, strict=False):
-            yield task, function(task)
+    def stop_at_half(part):
+        if part >= 0.5:
+            stop.set()
 
-    monkeypatch.setattr(ensemble, "on_cluster", two)
     with Checkpoint(tmp_path / "done", config) as checkpoint:
-        part = ensemble.run_on_cluster(config, None, checkpoint=checkpoint)
+        part = run_realizations(
+            config,
+            executor=mesoslip.Processes(1),
+            checkpoint=checkpoint,
+            progress=stop_at_half,
+            stop=stop,
+        )
     assert [one.finished for one in part.realizations] == [True, True, False, False]
     assert not part.complete
     with Checkpoint(tmp_path / "done", config, resume=True) as checkpoint:
@@ -203,6 +209,8 @@ def test_a_checkpoint_keeps_realizations_of_a_cluster(tmp_path, monkeypatch):
             tree[group].to_dataset().drop_vars("kernel_seconds", errors="ignore"),
         )
 
+    stop = Stop()
+
     def stop_early(part):
         if part > 0:
             stop.set()
@@ -214,4 +222,4 @@ def test_a_checkpoint_keeps_realizations_of_a_cluster(tmp_path, monkeypatch):
         Checkpoint(tmp_path / "begun", long, resume=True) as checkpoint,
         pytest.raises(FileError, match="under way"),
     ):
-        ensemble.run_on_cluster(long, None, checkpoint=checkpoint)
+        run_realizations(long, executor=mesoslip.Processes(1), checkpoint=checkpoint)

@@ -135,7 +135,7 @@ def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file):
 
 
 def test_workers_that_cannot_start_end_the_sweep(tmp_path, sweep_file, monkeypatch, command):
-    monkeypatch.setattr("mesoslip.campaign.execution.PROCESS", "raise SystemExit(7)")
+    monkeypatch.setattr("mesoslip.execution.local.PROCESS", "raise SystemExit(7)")
     arguments = ("-o", tmp_path / "sweep.nc", "--pool", "processes", "--workers", "1")
     status, _, told = command("sweep", sweep_file(SIMPLE), *arguments)
     assert status == 1
@@ -184,7 +184,7 @@ def test_a_folder_that_vanishes_keeps_no_result_from_the_dataset(tmp_path):
     def away(_):
         shutil.rmtree(store, ignore_errors=True)
 
-    data = mesoslip.sweep(tables(), store=store, pool="threads", progress=away)
+    data = mesoslip.sweep(tables(), store=store, executor=mesoslip.Threads(), progress=away)
     assert not data["status"].any()
     assert np.isfinite(data["mean_force"]).all()
 
@@ -195,7 +195,7 @@ def test_a_folder_that_is_none_is_told(tmp_path, sweep_file, command):
     output.with_name("sweep.points").write_text("a file")
     status, _, told = command("sweep", sweep_file(SIMPLE), "-o", output)
     assert status == 2
-    assert "sweep.points: cannot be written: File exists" in told
+    assert "sweep.points: was not made by this program" in told
     assert output.read_bytes() == b"earlier"
     status, _, told = command("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
     assert status == 2

@@ -188,17 +188,19 @@ class Study:
 def points_of(output: Path) -> list[Path]:
     """The files of the points of a sweep, without those that are being written."""
     folder = output.with_name(f"{output.stem}.points")
-    others = (".", "sweep.json")
+    others = (".", "manifest.json")
     return [path for path in folder.glob("*.json") if not path.name.startswith(others)]
 
 
 def workers_of(process: int) -> list[int]:
-    """Processes that a process has started."""
+    """Processes that the threads of a process have started."""
+    children: list[int] = []
     try:
-        text = Path(f"/proc/{process}/task/{process}/children").read_text()
+        for path in Path(f"/proc/{process}/task").glob("*/children"):
+            children += map(int, path.read_text().split())
     except OSError:
         return []
-    return [int(one) for one in text.split()]
+    return children
 
 
 def is_alive(process: int) -> bool:

@@ -40,7 +40,7 @@ def held_peaks(growth: float, width: float, engine: str) -> tuple[Config, Array]
             "output.interval=50 ms",
         ],
     )
-    stages = mesoslip.run(config, workers=1)["stages"].to_dataset()
+    stages = mesoslip.run(config, executor=1)["stages"].to_dataset()
     restarts = np.isin(stages["stage_number"], np.arange(2, 2 * len(HOLDS) + 1, 2))
     return config, stages["greatest_force"].values[restarts] / config.contacts.static_force
 
@@ -173,10 +173,10 @@ def compare_steady() -> None:
             ]
             config = Config.load(RUNS / "klein.toml", own + many)
             static = config.contacts.static_force
-            force = mesoslip.run(config, workers=1)["contact_force"].values[0][1000:9000] / static
+            force = mesoslip.run(config, executor=1)["contact_force"].values[0][1000:9000] / static
             blocks = force.reshape(20, -1).mean(axis=1)
             error = blocks.std(ddof=1) / math.sqrt(20)
-            tree = mesoslip.run(Config.load(RUNS / "klein.toml", own + infinite), workers=1)
+            tree = mesoslip.run(Config.load(RUNS / "klein.toml", own + infinite), executor=1)
             limit = tree["contact_force"].values[0][-2000:].mean() / static
             expected = steady_force(config, velocity) / static
             print(

@@ -42,7 +42,7 @@ def main(sweep: Path, file: Path) -> None:
         config = combination.config
         assert config.drive.velocity is not None
         velocity = 1e6 * config.drive.velocity
-        tree = mesoslip.run(config, workers=1)
+        tree = mesoslip.run(config, executor=1)
         judged = mesoslip.regime(tree)
         regime = int(judged["regime"][0])
         time = tree["time"].values

@@ -63,7 +63,7 @@ def experiment(number: int, simulations: int | None = None, workers: int = 1) ->
     start = time.process_time()
     simulator, force = prepare(tree, plan)
     observed = simulator.summarizer(force)
-    made = Simulations(simulator, observed, expected=plan.simulations, workers=workers)
+    made = Simulations(simulator, expected=plan.simulations, executor=workers)
     row: dict[str, object] = {"experiment": number, "status": "fitted"}
     try:
         estimate = close_in(made, observed, plan.simulations, np.random.default_rng(number))

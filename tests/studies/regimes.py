@@ -129,7 +129,7 @@ class Compared(NamedTuple):
 
 def compare(grid: list[Point], first_seed: int = 5001) -> Iterator[Compared]:
     for number, point in enumerate(grid):
-        tree = mesoslip.run(point.configuration(first_seed + number), workers=1)
+        tree = mesoslip.run(point.configuration(first_seed + number), executor=1)
         regime = int(mesoslip.regime(tree)["regime"][0])
         time, force = tree["time"].values, tree["spring_force"].values[0]
         half = len(time) // 2

@@ -240,7 +240,7 @@ def draw_map(file: str) -> None:
         for delay in DELAYS:
             for stiffness in STIFFNESSES:
                 config = at(velocity, delay, stiffness)
-                data = mesoslip.regime(mesoslip.run(config, workers=1))
+                data = mesoslip.regime(mesoslip.run(config, executor=1))
                 regime = int(data["regime"][0])
                 sliding = SteadySliding(config)
                 stable = "stable" if sliding.is_stable else "unstable"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.campaign.point import program
 from mesoslip.configuration.keys import key_kind
+from mesoslip.execution.program import program
 from mesoslip.output.provenance import program_attributes
 
 if TYPE_CHECKING:
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 STATUS = ("ok", "failed", "missing")
 OK, FAILED, MISSING = range(3)
-# Failures of which each is told in the dataset.
-MOST_TOLD = 100
+# Failures that are listed in the dataset.
+MAX_FAILURES = 100
 
 
 class Assembly:
@@ -71,7 +71,7 @@ class Assembly:
         attributes = {"units": "1", "long_name": "number of the realization"}
         coordinates["realization"] = ("realization", numbers, attributes)
         flags = {
-            "long_name": "what has become of the point",
+            "long_name": "status of the point",
             "flag_values": np.arange(len(STATUS), dtype=np.int8),
             "flag_meanings": " ".join(STATUS),
         }
@@ -88,24 +88,24 @@ class Assembly:
         import tomli_w
 
         plan = self._plan
-        told = [f"{point}: {reason}" for point, reason in list(failures.items())[:MOST_TOLD]]
+        reported = [f"{point}: {reason}" for point, reason in list(failures.items())[:MAX_FAILURES]]
         return program_attributes(plan.combinations[0].config, "sweep") | {
             "configuration": tomli_w.dumps(plan.tables),
             "sweep": tomli_w.dumps(plan.sweep.model_dump(exclude_none=True)),
             "complete": "false" if np.any(self._status == MISSING) else "true",
             "comment": ending,
-            "failures": "\n".join(told),
+            "failures": "\n".join(reported),
         }
 
-    def manifest(self, places: Iterable[Any]) -> dict[str, Any]:
-        """What belongs to the sweep: for people, and for who clears away what does not."""
+    def manifest(self, names: Sequence[str]) -> dict[str, Any]:
+        """The names of the points of the sweep: all others in its folder can be deleted."""
         plan = self._plan
         return {
             "program": program(),
             "axes": {axis.dimension: [list(row) for row in axis.rows] for axis in plan.axes},
             "realizations": plan.realizations,
             "measures": [one.name for one in plan.measures],
-            "points": [place.name for place in places],
+            "points": names,
         }
 
 

@@ -1,4 +1,4 @@
-"""What a sweep will take, before it is run: time, memory, disk."""
+"""Time, memory and disk of a sweep, before it is run."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mesoslip.campaign.plan import Combination, Plan
-from mesoslip.campaign.runner import places, taken_from
-from mesoslip.campaign.store import Points
+from mesoslip.campaign.runner import groups, stored_measures
+from mesoslip.execution.store import Pieces
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.tables import COLUMNS
 
-# Combinations that are begun to see how long they take, and time for all of them [s].
-TRIED = 12
+# Combinations that are started to see how long they take, and time for all of them [s].
+MAX_TRIED = 12
 TRIAL_SECONDS = 3.0
 # Time of a point beside the kernel [s], and of the start of a worker; as measured.
 OVERHEAD_SECONDS = 0.01
@@ -28,7 +28,7 @@ COMPRESSED = 0.5
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a sweep will take.
+    """Time, memory and disk that a sweep will take.
 
     Attributes
     ----------
@@ -49,46 +49,49 @@ class Estimate:
     disk_bytes: float
 
 
-def estimate(plan: Plan, store: Points, workers: int) -> Estimate:
-    """Estimate what a sweep will take: combinations from all over it are begun for a moment.
+def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
+    """Estimate what a sweep will take, from starting some of its combinations for a moment.
 
     Raises
     ------
     ConfigError
         If a combination cannot be run.
     RunError
-        If one of those that are begun fails.
+        If one of those that are started fails.
     """
     there = store.names()
     missing: list[Combination] = []
-    stored = 0
-    for place in places(plan):
-        if place.name in there and taken_from(store, plan, place):
-            stored += 1
-        else:
-            missing.append(place.combination)
-    chosen = sorted({id(one): one for one in missing}.values(), key=lambda one: one.place)
-    step = max(1, len(chosen) // TRIED)
-    tried = chosen[step // 2 :: step]
+    stored_count = missing_count = 0
+    for group in groups(plan):
+        stored = sum(
+            name in there and stored_measures(store, plan, name) is not None
+            for name in group.names(plan)
+        )
+        stored_count += stored * len(group.combinations)
+        if stored < plan.realizations:
+            missing_count += plan.realizations - stored
+            missing.append(group.combinations[0])
+    step = max(1, len(missing) // MAX_TRIED)
+    tried = missing[step // 2 :: step]
     seconds = [_seconds(one, TRIAL_SECONDS / len(tried)) for one in tried]
     mean = float(np.mean(seconds)) + OVERHEAD_SECONDS if seconds else 0.0
     longest = max(seconds, default=0.0)
-    wall = max(mean * len(missing) / workers, longest) + START_SECONDS if missing else 0.0
+    wall = max(mean * missing_count / workers, longest) + START_SECONDS if missing else 0.0
     trace_bytes = max((_trace_bytes(one) for one in plan.combinations), default=0.0)
-    # In the kernel's tables, in the tree, and in what is measured.
+    # In the tables of the kernel, in the tree, and in measures.
     memory = (workers + 1) * PROCESS_BYTES + 3 * workers * trace_bytes
     disk: float = plan.count * (POINT_BYTES + 8 * (1 + len(plan.measures)))
     if plan.sweep.traces:
         disk += COMPRESSED * sum(map(_trace_bytes, plan.combinations)) * plan.realizations
-    return Estimate(plan.count, stored, wall, memory, disk)
+    return Estimate(plan.count, stored_count, wall, memory, disk)
 
 
-def _seconds(combination: Combination, patience: float) -> float:
-    """Time that a combination takes [s], from how far it comes."""
+def _seconds(combination: Combination, max_seconds: float) -> float:
+    """Time that a combination takes [s], extrapolated from its start."""
     realization = Realization(combination.config, 0)
     start = time.perf_counter()
     try:
-        while not realization.finished and time.perf_counter() - start < patience:
+        while not realization.finished and time.perf_counter() - start < max_seconds:
             realization.advance(work=2e4)
     finally:
         realization.close()

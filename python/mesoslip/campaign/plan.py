@@ -1,4 +1,4 @@
-"""The file of a sweep, and the points that it asks for.
+"""The file of a sweep, and its points.
 
 A sweep varies keys of a configuration along axes. The keys of ``[sweep.grid]`` are an axis each,
 those of a ``[[sweep.together]]`` table one axis together, those of ``[sweep.latin_hypercube]`` too.
@@ -14,6 +14,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -32,10 +33,10 @@ from mesoslip.errors import ConfigError, Problem
 
 Value = float | int | str | bool
 
-# Combinations that cannot be run, of which each is told.
-MOST_TOLD = 5
-# More points than anybody waits for.
-MOST_POINTS = 10_000_000
+# Combinations that cannot be run and are listed.
+MAX_REPORTED = 5
+# Points of a sweep.
+MAX_POINTS = 10_000_000
 
 
 class Range(Table):
@@ -45,7 +46,7 @@ class Range(Table):
     """First value."""
     to: Any
     """Last value."""
-    points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
+    points: Annotated[Whole, Field(ge=1, le=MAX_POINTS)]
     """Number of values, both ends among them."""
     spacing: Literal["linear", "logarithmic"] = "linear"
     """How values are spaced."""
@@ -55,9 +56,9 @@ class Extent(Table):
     """Where a Latin hypercube takes the values of a key from."""
 
     from_: Annotated[Any, Field(alias="from")]
-    """Least value."""
+    """Minimum."""
     to: Any
-    """Greatest value."""
+    """Maximum."""
     spacing: Literal["linear", "logarithmic"] = "linear"
     """How values are spread."""
 
@@ -141,7 +142,7 @@ class Combination:
 
 
 def described(values: Mapping[str, Value]) -> str:
-    """Values of keys, as messages tell them."""
+    """Values of keys, as in messages."""
     parts = []
     for key, value in values.items():
         kind = key_kind(key)
@@ -171,7 +172,7 @@ class Plan:
     def __init__(self, tables: Mapping[str, Any], source: str, folder: Path) -> None:
         tables = dict(tables)
         if "sweep" not in tables:
-            message = "missing; this table says what is varied, and what is measured"
+            message = "missing; this table says what is varied and what is measured"
             raise ConfigError([Problem(source, "sweep", message)])
         try:
             self.sweep = SweepFile.model_validate({"sweep": tables.pop("sweep")}).sweep
@@ -189,8 +190,8 @@ class Plan:
         of_run = run.get("realizations", 1) if isinstance(run, Mapping) else 1
         self.realizations: int = self.sweep.realizations or of_run
         count = math.prod(self.shape)
-        if not isinstance(self.realizations, int) or count * self.realizations > MOST_POINTS:
-            message = f"asks for more than {MOST_POINTS} points"
+        if not isinstance(self.realizations, int) or count * self.realizations > MAX_POINTS:
+            message = f"asks for more than {MAX_POINTS} points"
             raise ConfigError([Problem(source, "sweep", message)])
 
     @classmethod
@@ -240,14 +241,14 @@ class Plan:
                 )
             except ConfigError as error:
                 wrong += 1
-                if wrong <= MOST_TOLD:
+                if wrong <= MAX_REPORTED:
                     source = f"{self._source}: point {described(values)}"
                     found += [
                         Problem(source, one.key, one.message, one.value) for one in error.problems
                     ]
                 continue
             combinations.append(Combination(place, values, config))
-        if wrong > MOST_TOLD:
+        if wrong > MAX_REPORTED:
             message = f"{wrong} of {math.prod(self.shape)} combinations cannot be run"
             found.append(Problem(self._source, "sweep", message))
         if found:
@@ -277,8 +278,10 @@ def _axes(sweep: SweepTable, source: str, found: list[Problem]) -> Iterator[Axis
         if not columns:
             found.append(Problem(source, name, "names no keys"))
         elif len(set(lengths.values())) > 1:
-            told = ", ".join(f"{key} has {length}" for key, length in lengths.items())
-            found.append(Problem(source, name, f"keys that go together need equally many: {told}"))
+            lengths_text = ", ".join(f"{key} has {length}" for key, length in lengths.items())
+            found.append(
+                Problem(source, name, f"keys that go together need equally many: {lengths_text}")
+            )
         elif len(lengths) == len(columns):
             yield Axis(
                 next(iter(columns)), tuple(columns), tuple(zip(*columns.values(), strict=True))
@@ -357,7 +360,10 @@ def _range(
     ends = _ends(kind, wanted, place, source, found)
     if ends is None:
         return ()
-    return _spread(kind, ends, wanted.spacing, np.linspace(0, 1, wanted.points))
+    fractions: Iterable[float | Fraction] = np.linspace(0, 1, wanted.points)
+    if kind.is_whole:
+        fractions = [Fraction(number, max(1, wanted.points - 1)) for number in range(wanted.points)]
+    return _spread(kind, ends, wanted.spacing, fractions)
 
 
 def _inner_problems(
@@ -377,11 +383,13 @@ def _ends(
         return None
     before = len(found)
     first, last = (
-        float(_value(kind, end, f"{place}.{name}", source, found))
+        _value(kind, end, f"{place}.{name}", source, found)
         for name, end in (("from", wanted.from_), ("to", wanted.to))
     )
     if len(found) > before:
         return None
+    assert not isinstance(first, str)
+    assert not isinstance(last, str)
     if wanted.spacing == "logarithmic" and not (min(first, last) > 0 or max(first, last) < 0):
         message = "a logarithmic range needs both ends greater than 0, or both less"
         found.append(Problem(source, place, message))
@@ -402,19 +410,25 @@ def _between(first: float, last: float, part: float) -> float:
 
 
 def _spread(
-    kind: KeyKind, ends: tuple[float, float], spacing: str, parts: Iterable[float]
+    kind: KeyKind, ends: tuple[float, float], spacing: str, fractions: Iterable[float | Fraction]
 ) -> tuple[Value, ...]:
-    """Values at parts of the way from one end to the other; the ends themselves are kept exact."""
+    """Values at fractions of a range, whose ends are kept exactly.
+
+    Whole numbers are not rounded to doubles on the way.
+    """
     first, last = ends
     values: list[Value] = []
-    for part in parts:
-        if part in {0.0, 1.0}:
-            value = last if part else first
+    for fraction in fractions:
+        value: float | Fraction
+        if fraction in {0, 1}:
+            value = last if fraction else first
         elif spacing == "logarithmic":
-            value = _between(first, last, float(part))
+            value = _between(first, last, float(fraction))
+        elif kind.is_whole:
+            value = first + (last - first) * Fraction(fraction)
         else:
-            value = first + (last - first) * float(part)
-        values.append(round(value) if kind.is_whole else value)
+            value = first + (last - first) * float(fraction)
+        values.append(round(value) if kind.is_whole else float(value))
     return tuple(values)
 
 

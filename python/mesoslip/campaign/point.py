@@ -1,4 +1,4 @@
-"""A point: one realization of one combination, computed anywhere to the same numbers."""
+"""A point: one realization of one combination, the same to the bit wherever it is computed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mesoslip import _build
 from mesoslip.campaign.measures import RunView, measure_of, measured
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
+from mesoslip.execution.program import program
+from mesoslip.execution.stop import Stop
 from mesoslip.output import writing
-from mesoslip.output.provenance import version
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import TOO_MUCH, Results
-from mesoslip.simulation.stop import StopFlag
+from mesoslip.simulation.runner import NO_MEMORY, Results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,18 +29,13 @@ if TYPE_CHECKING:
 # Changes when the numbers of measures do, so that points of earlier ones are not taken.
 FORMAT = 1
 
-# HDF5 is used by one thread of a process at a time.
+# One thread of a process uses HDF5 at a time.
 _HDF5 = threading.Lock()
-
-
-def program() -> str:
-    """The program that computes points: its version and commit."""
-    return f"mesoslip {version('mesoslip')} {_build.COMMIT}"
 
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker needs to know of a point; nothing but plain values, to be sent anywhere.
+    """A point for a worker, in plain values that can be sent anywhere.
 
     Attributes
     ----------
@@ -56,9 +50,7 @@ class Task:
     discard
         Part of the run that measures leave out.
     trace
-        Whether the output of the run is wanted too.
-    program
-        What is to compute it.
+        Whether the output of the run is kept too.
     """
 
     name: str
@@ -67,12 +59,11 @@ class Task:
     measures: tuple[tuple[str, str, str], ...]
     discard: float
     trace: bool
-    program: str
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out of a point: its measures, or why there are none.
+    """Result of a point: its measures, or why there are none.
 
     Attributes
     ----------
@@ -81,7 +72,7 @@ class Outcome:
     seconds
         Computing time.
     trace
-        The bytes of an output file, if it was wanted.
+        The content of its output file, if it is kept.
     failure
         Why it failed; empty if it did not.
     is_complete
@@ -95,12 +86,10 @@ class Outcome:
     is_complete: bool = True
 
 
-def point_name(
-    config: Config, realization: int, measures: Sequence[Measure], discard: float
-) -> str:
-    """The name of a point: a hash of all that its measures follow from.
+def combination_key(config: Config, measures: Sequence[Measure], discard: float) -> str:
+    """A hash of everything that the measures of a combination follow from, but the realization.
 
-    Neither the title of a run nor how many realizations it has makes a difference.
+    Neither the title of a run nor its number of realizations makes a difference.
     """
     tables = config.to_dict()
     tables.pop("title", None)
@@ -109,24 +98,27 @@ def point_name(
         "format": FORMAT,
         "program": program(),
         "configuration": tables,
-        "realization": realization,
         "measures": sorted(one.identity for one in measures),
         "discard": discard,
     }
-    text = json.dumps(everything, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    return hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()
 
 
-def compute(task: Task, stop: StopFlag | None = None) -> Outcome:
-    """Run a point and measure it. Whatever goes wrong is told in the outcome."""
+def point_name(key: str, realization: int) -> str:
+    """The name of a point: a hash of everything that its measures follow from."""
+    return hashlib.sha256(f"{key} {realization}".encode()).hexdigest()[:32]
+
+
+def compute(task: Task, stop: Stop) -> Outcome:
+    """Run a point and measure it. Whatever goes wrong is reported in the outcome."""
     start = time.perf_counter()
     try:
-        outcome = _compute(task, stop or StopFlag())
+        outcome = _compute(task, stop)
     except MesoslipError as error:
         outcome = Outcome({}, failure=str(error))
     except MemoryError:
-        outcome = Outcome({}, failure=TOO_MUCH)
-    # What nobody has thought of ends this point, not those beside it.
+        outcome = Outcome({}, failure=NO_MEMORY)
+    # An error that was not foreseen ends this point, not those beside it.
     except Exception as error:
         outcome = Outcome({}, failure=f"{type(error).__name__}: {error}")
     return Outcome(
@@ -138,9 +130,7 @@ def compute(task: Task, stop: StopFlag | None = None) -> Outcome:
     )
 
 
-def _compute(task: Task, stop: StopFlag) -> Outcome:
-    if task.program != program():
-        return Outcome({}, failure=f"the worker has {program()}, and {task.program} is wanted")
+def _compute(task: Task, stop: Stop) -> Outcome:
     config = Config.from_dict(task.config)
     realization = Realization(config, task.realization)
     try:

@@ -1,28 +1,46 @@
-"""A sweep from its plan to its dataset: what is stored is taken, what is missing is computed."""
+"""A sweep from its plan to its dataset: stored points are read, missing ones computed."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from mesoslip.campaign.assembly import Assembly
-from mesoslip.campaign.execution import Executor, on_this_machine
 from mesoslip.campaign.plan import Combination, Plan, described
-from mesoslip.campaign.point import Task, point_name, program
-from mesoslip.campaign.store import Points, Store, Stored
-from mesoslip.errors import RunError
-from mesoslip.simulation.stop import StopFlag
+from mesoslip.campaign.point import (
+    FORMAT,
+    Outcome,
+    Task,
+    combination_key,
+    compute,
+    point_name,
+)
+from mesoslip.errors import MesoslipError
+from mesoslip.execution.executors import (
+    Executor,
+    ExecutorLike,
+    ThreadsThenProcesses,
+    as_executor,
+    completed,
+)
+from mesoslip.execution.pool import PoolError
+from mesoslip.execution.program import program
+from mesoslip.execution.stop import Stop, StopRequest
+from mesoslip.execution.store import Pieces, Store
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# Longest time to wait at the end for a user's measure that ignores the stop [s].
+MAX_WAIT = 5.0
+
 
 @dataclass
 class Sweep:
-    """What came out of a sweep.
+    """Results of a sweep.
 
     Attributes
     ----------
@@ -30,15 +48,15 @@ class Sweep:
         See `mesoslip.campaign.assembly`.
     failures
         Which points failed, and why.
-    taken, computed, missing
-        Points that were there, that were computed, and that are neither.
+    stored, computed, missing
+        Points that were in the store, that were computed, and that are neither.
     ending
         What ended the sweep before it was complete; empty if nothing did.
     """
 
     dataset: xr.Dataset
     failures: dict[str, str] = field(default_factory=dict)
-    taken: int = 0
+    stored: int = 0
     computed: int = 0
     missing: int = 0
     ending: str = ""
@@ -50,42 +68,78 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Place:
-    """A point of a sweep: its combination, realization, and name in the store."""
+class Group:
+    """Combinations whose points are the same, as of runs that differ by their titles.
 
-    combination: Combination
-    realization: int
-    name: str
+    Attributes
+    ----------
+    key
+        Hash of everything that their measures follow from.
+    combinations
+        At least one.
+    """
 
-    def __str__(self) -> str:
-        return described({**self.combination.values, "realization": self.realization})
+    key: str
+    combinations: list[Combination]
+
+    def names(self, plan: Plan) -> Iterator[str]:
+        """Names of the points of all realizations."""
+        return (point_name(self.key, number) for number in range(plan.realizations))
 
 
-def places(plan: Plan) -> Iterator[Place]:
-    """All points of a sweep: the realizations of the first combination, of the second, ..."""
+def groups(plan: Plan) -> list[Group]:
+    """All combinations of a sweep, in the order of the first of each group.
+
+    Raises
+    ------
+    ConfigError
+        If a combination cannot be run.
+    """
+    found: dict[str, Group] = {}
     for one in plan.combinations:
-        for realization in range(plan.realizations):
-            name = point_name(one.config, realization, plan.measures, plan.sweep.discard)
-            yield Place(one, realization, name)
+        key = combination_key(one.config, plan.measures, plan.sweep.discard)
+        found.setdefault(key, Group(key, [])).combinations.append(one)
+    return list(found.values())
 
 
-def taken_from(store: Points, plan: Plan, place: Place) -> Stored | None:
-    """A point of a store; None if not all that is wanted of it is there."""
-    if plan.sweep.traces and not store.trace_path(place.name).exists():
+def output_path(store: Pieces, name: str) -> Path:
+    """Where the output of a point is, if it is kept."""
+    return store.path / f"{name}.nc"
+
+
+def stored_measures(store: Pieces, plan: Plan, name: str) -> dict[str, float] | None:
+    """Measures of a stored point; None if not everything that the sweep asks for is there."""
+    if plan.sweep.traces and not output_path(store, name).exists():
         return None
-    return store.read(place.name)
+    body = store.read(name)
+    try:
+        return None if body is None else {key: float(one) for key, one in body["measures"].items()}
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        return None
 
 
-def task_of(plan: Plan, place: Place) -> Task:
-    """What a worker needs to know of a point."""
+def stored_body(task: Task, outcome: Outcome, combination: Combination) -> dict[str, Any]:
+    """A point as the store keeps it."""
+    return {
+        "format": FORMAT,
+        "program": program(),
+        "point": dict(combination.values),
+        "realization": task.realization,
+        # Numbers as Python writes them are read to the bit.
+        "measures": {name: repr(value) for name, value in outcome.measures.items()},
+        "seconds": outcome.seconds,
+    }
+
+
+def task_of(plan: Plan, group: Group, realization: int) -> Task:
+    """A point for a worker."""
     return Task(
-        place.name,
-        place.combination.config.to_dict(),
-        place.realization,
+        point_name(group.key, realization),
+        group.combinations[0].config.to_dict(),
+        realization,
         tuple((one.name, one.source, one.path) for one in plan.measures),
         plan.sweep.discard,
         plan.sweep.traces,
-        program(),
     )
 
 
@@ -93,24 +147,25 @@ def run_sweep(
     plan: Plan,
     *,
     store: Store | None = None,
-    executor: Executor | None = None,
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-    stop: StopFlag | None = None,
+    stop: StopRequest | None = None,
 ) -> Sweep:
-    """Compute what is missing of a sweep, and put everything together.
+    """Compute the missing points of a sweep, and build its dataset.
 
     Parameters
     ----------
     plan
         The sweep.
     store
-        Where points are taken from and kept; nowhere by default.
+        Where points are kept, and read if they are there; nowhere by default.
     executor
-        Where points are computed; on as many workers as there are processors by default.
+        Where points are computed, or on how many workers; on as many as there are processors by
+        default: threads at first, and processes in a sweep that takes long.
     progress
-        Called with the part of the points that are there.
+        Called with the fraction of the points that are done.
     stop
-        Set by who wants the sweep to stop soon; Ctrl-C does the same.
+        A request to stop soon; Ctrl-C is one too.
 
     Raises
     ------
@@ -119,55 +174,110 @@ def run_sweep(
     FileError
         If the store cannot be read or written; what was written stays.
     """
-    executor = executor or on_this_machine(os.cpu_count() or 1)
-    stop = stop or StopFlag()
-    assembly = Assembly(plan)
-    # Points of one name, as of runs that differ by their titles, are one.
-    waiting: dict[str, list[Place]] = {}
-    taken = computed = failed = 0
-    there = set() if store is None else store.names()
-    for place in places(plan):
-        stored = None
-        if store is not None and place.name in there and place.name not in waiting:
-            stored = taken_from(store, plan, place)
-        if stored is None:
-            waiting.setdefault(place.name, []).append(place)
-        else:
-            assembly.put(place.combination, place.realization, stored.measures)
-            taken += 1
-    if store is not None:
-        store.write_manifest(assembly.manifest(places(plan)))
-    failures: dict[str, str] = {}
+    run = _Run(plan, store, progress)
+    checked = as_executor(executor, ThreadsThenProcesses)
+    requested = Stop(stop)
     ending = ""
+    try:
+        with requested.on_interrupt():
+            run.read_store(requested)
+            run.compute(checked, requested)
+    except PoolError as error:
+        ending = str(error)
+    return run.result(ending)
 
-    def tell() -> None:
-        if progress is not None:
-            progress((taken + computed + failed) / plan.count)
 
-    tell()
-    with ExitStack() as stack:
-        finished = executor((task_of(plan, alike[0]) for alike in waiting.values()), stop)
-        stack.callback(getattr(finished, "close", lambda: None))
-        try:
-            for task, outcome in finished:
-                alike = waiting[task.name]
-                if outcome.failure:
-                    failures[str(alike[0])] = outcome.failure
-                    failed += len(alike)
-                    for place in alike:
-                        assembly.fail(place.combination, place.realization)
-                elif outcome.is_complete:
-                    if store is not None:
-                        store.write(task, outcome, alike[0].combination.values)
-                    computed += len(alike)
-                    for place in alike:
-                        assembly.put(place.combination, place.realization, outcome.measures)
-                tell()
-        except KeyboardInterrupt:
-            stop.set()
-        except RunError as error:
-            ending = str(error)
-    missing = plan.count - taken - computed - failed
-    if missing and not ending:
-        ending = "interrupted"
-    return Sweep(assembly.dataset(ending, failures), failures, taken, computed, missing, ending)
+class _Run:
+    """A sweep under way."""
+
+    def __init__(
+        self, plan: Plan, store: Store | None, progress: Callable[[float], None] | None
+    ) -> None:
+        self._plan = plan
+        self._store = store
+        self._progress = progress
+        self._groups = groups(plan)
+        self._missing: list[tuple[Group, Sequence[int]]] = []
+        # By the names of their tasks.
+        self._in_flight: dict[str, Group] = {}
+        self._assembly = Assembly(plan)
+        self._failures: dict[str, str] = {}
+        self._stored = self._computed = self._failed = 0
+
+    def read_store(self, stop: Stop) -> None:
+        """Take the points that are in the store, and find out which are missing."""
+        store, plan = self._store, self._plan
+        if store is None:
+            self._missing = [(group, range(plan.realizations)) for group in self._groups]
+            return
+        there = store.names()
+        names: list[str] = []
+        for group in self._groups:
+            missing = []
+            for number, name in enumerate(group.names(plan)):
+                if stop.is_set():
+                    return
+                names.append(name)
+                measures = stored_measures(store, plan, name) if name in there else None
+                if measures is None:
+                    missing.append(number)
+                    continue
+                for one in group.combinations:
+                    self._assembly.put(one, number, measures)
+                self._stored += len(group.combinations)
+            self._missing.append((group, missing))
+        store.write_manifest(self._assembly.manifest(names))
+
+    def compute(self, executor: Executor, stop: Stop) -> None:
+        """Compute the points that are missing, and keep each as soon as it is there."""
+        self._look()
+        work = completed(executor, compute, self._tasks(), stop, max_wait=MAX_WAIT)
+        with closing(work):
+            for task, future in work:
+                try:
+                    outcome = future.result()
+                except MesoslipError as error:
+                    outcome = Outcome({}, failure=str(error))
+                except Exception as error:
+                    failure = f"its worker failed: {type(error).__name__}: {error}"
+                    outcome = Outcome({}, failure=failure)
+                self._take(task, self._in_flight.pop(task.name), outcome)
+                self._look()
+
+    def _tasks(self) -> Iterator[Task]:
+        for group, missing in self._missing:
+            for number in missing:
+                task = task_of(self._plan, group, number)
+                self._in_flight[task.name] = group
+                yield task
+
+    def _take(self, task: Task, group: Group, outcome: Outcome) -> None:
+        if outcome.failure:
+            values = {**group.combinations[0].values, "realization": task.realization}
+            self._failures[described(values)] = outcome.failure
+            self._failed += len(group.combinations)
+            for one in group.combinations:
+                self._assembly.fail(one, task.realization)
+        elif outcome.is_complete:
+            if self._store is not None:
+                body = stored_body(task, outcome, group.combinations[0])
+                self._store.write(task.name, body, outcome.trace)
+            self._computed += len(group.combinations)
+            for one in group.combinations:
+                self._assembly.put(one, task.realization, outcome.measures)
+
+    @property
+    def _done(self) -> int:
+        return self._stored + self._computed + self._failed
+
+    def _look(self) -> None:
+        if self._progress is not None:
+            self._progress(self._done / self._plan.count)
+
+    def result(self, ending: str) -> Sweep:
+        """The sweep as it is."""
+        missing = self._plan.count - self._done
+        if missing and not ending:
+            ending = "interrupted"
+        dataset = self._assembly.dataset(ending, self._failures)
+        return Sweep(dataset, self._failures, self._stored, self._computed, missing, ending)

@@ -11,7 +11,7 @@ import typer
 
 from mesoslip.command_line.options import JsonOption, OutputArgument, SetOption, print_json
 from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.command_line.signals import stopped_by_signals
+from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
 # Units in which parameters are shown, by their SI unit: scales from the greatest to the least.
 SCALES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
@@ -46,14 +46,14 @@ def fit(
 ) -> None:
     """Fit parameters of the model to a trace, with their uncertainty.
 
-    Simulations are kept beside the posterior, in NAME.simulations.npz, until the fit is done: the
+    Simulations are kept beside the posterior, in NAME.simulations, until the fit is done: the
     same command goes on after it was stopped.
     """
     from mesoslip import api
     from mesoslip.errors import FileError
+    from mesoslip.execution.store import Store
     from mesoslip.inference.plan import Plan
     from mesoslip.inference.posterior import table
-    from mesoslip.inference.simulations import StoppedError
     from mesoslip.output import files, targets, writing
 
     if Path(config).suffix == ".nc":
@@ -61,19 +61,19 @@ def fit(
     plan = Plan.load(config, changes or ())
     path = posterior or Path("out") / f"{output.stem}.posterior.nc"
     targets.check_output(path, [output, config])
-    store = path.with_name(f"{path.stem}.simulations.npz")
+    store = path.with_name(f"{path.stem}.simulations")
     trace = files.read_run(output)
     with stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
                 tree = api.fit(
-                    trace, plan, store=store, workers=workers, progress=progress, stop=stop
+                    trace, plan, store=store, executor=workers, progress=progress, stop=stop
                 )
         except StoppedError:
             say(f"{path}: interrupted; the same command goes on from {store}")
             raise typer.Exit(stop.exit_status) from None
     writing.write(tree, path)
-    store.unlink(missing_ok=True)
+    Store(store, "simulations").remove()
     rows = table(tree)
     notes = [one for one in str(tree.attrs["warnings"]).split("\n") if one]
     if as_json:

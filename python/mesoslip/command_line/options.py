@@ -12,6 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
+    from mesoslip.execution.executors import ExecutorLike
 
 ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
@@ -36,6 +37,15 @@ SchedulerOption = Annotated[
         metavar="ADDRESS",
     ),
 ]
+PoolOption = Annotated[
+    str | None,
+    typer.Option(
+        "--pool",
+        help="What computes: threads, processes, or both: threads at first, and processes if it "
+        "takes long",
+        metavar="POOL",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
 
 
@@ -54,6 +64,27 @@ def load(config: str, changes: Iterable[str] | None) -> Config:
         kind = f'slider.kind = "{checked.slider.kind}"'
         typer.echo(f"dropped with {kind}: {', '.join(checked.dropped)}", err=True)
     return checked
+
+
+def executor_of(
+    workers: int | None, scheduler: str | None = None, pool: str | None = None
+) -> ExecutorLike:
+    """The executor that options ask for; the default of the command without any.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such pool, or what options ask for is contradictory.
+    """
+    from mesoslip.errors import ConfigError, Problem
+    from mesoslip.execution.executors import Dask, Processes, Threads, ThreadsThenProcesses
+
+    pools = {"threads": Threads, "processes": Processes, "both": ThreadsThenProcesses}
+    if pool is not None and pool not in pools:
+        raise ConfigError([Problem("", "--pool", f"must be one of {', '.join(pools)}", pool)])
+    if scheduler is not None:
+        return Dask(scheduler)
+    return workers if pool is None else pools[pool](workers)
 
 
 def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None:

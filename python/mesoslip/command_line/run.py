@@ -7,10 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import ConfigArgument, SchedulerOption, SetOption, load, quantity
+from mesoslip.command_line.options import (
+    ConfigArgument,
+    SchedulerOption,
+    SetOption,
+    executor_of,
+    load,
+    quantity,
+)
 from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.command_line.signals import Stop, stopped_by_signals
 from mesoslip.errors import FileError
+from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -67,27 +74,31 @@ def run(
     path = output or Path("out") / f"{Path(config).stem}.nc"
     targets.check_output(path, [config])
 
-    def tell(text: str) -> None:
+    def report(text: str) -> None:
         say(f"{path}: {text}")
 
+    if not quiet and files.is_of_another(path, checked):
+        report("replaces the output of another configuration at the end; -o gives other names")
     with (
         Checkpoint(
-            checkpoint_folder(path), checked, interval=interval, resume=resume, tell=tell
+            checkpoint_folder(path),
+            checked,
+            interval=interval,
+            resume=resume,
+            report=report,
         ) as checkpoint,
         stopped_by_signals() as stop,
     ):
         with progress_shown(quiet) as progress:
             results = api.simulate(
                 checked,
-                workers=workers,
-                scheduler=scheduler,
+                executor=executor_of(workers, scheduler),
                 progress=progress,
                 stop=stop,
                 checkpoint=checkpoint,
             )
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
-        replaces = files.is_of_another(path, checked)
         try:
             writing.write_results(results, path)
         except FileError as error:
@@ -99,8 +110,6 @@ def run(
             raise
         if not quiet:
             _tell_results(results, checked, path)
-            if replaces:
-                tell("it replaces the output of another configuration; -o gives other names")
         _partial(path).unlink(missing_ok=True)
         checkpoint.remove()
 

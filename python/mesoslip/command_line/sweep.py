@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import SchedulerOption, SetOption
+from mesoslip.command_line.options import PoolOption, SchedulerOption, SetOption, executor_of
 from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.command_line.signals import Stop, stopped_by_signals
 from mesoslip.errors import WriteError
+from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
     from mesoslip.campaign.plan import Plan
@@ -39,14 +39,7 @@ def sweep(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Tell what it will take, and run nothing")
     ] = False,
-    pool: Annotated[
-        str,
-        typer.Option(
-            help="What points are computed on: threads, processes, or both: threads first, "
-            "processes in a sweep that takes long",
-            metavar="POOL",
-        ),
-    ] = "both",
+    pool: PoolOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
 ) -> None:
     """Run a configuration over a range of parameters, and write the measures of all runs.
@@ -55,27 +48,26 @@ def sweep(
     again, the command does what is missing. The exit status is 1 if points failed.
     """
     from mesoslip import api
-    from mesoslip.campaign.store import Store, store_folder
+    from mesoslip.execution.store import Store
     from mesoslip.output import targets
 
     plan = api.as_plan(file, changes or ())
     path = output or Path("out") / f"{file.stem}.nc"
-    folder = store_folder(path)
+    folder = path.with_name(f"{path.stem}.points")
+    executor = executor_of(workers, scheduler, pool)
     if dry_run:
         _tell_estimate(plan, folder, workers)
         return
     # All of them are checked before anything is made.
     _ = plan.combinations
     targets.check_output(path, [file])
-    with Store(folder) as store, stopped_by_signals() as stop:
+    with Store(folder, "points") as store, stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
                 done = api.run_plan(
                     plan,
                     store=store,
-                    workers=workers,
-                    scheduler=scheduler,
-                    pool=pool,
+                    executor=executor,
                     progress=progress,
                     stop=stop,
                 )
@@ -115,16 +107,16 @@ def _tell(done: Sweep, path: Path, quiet: bool) -> None:
         say(f"{path}: {len(done.failures) - MOST_TOLD} more failed; see the attribute failures")
     if not quiet and done.complete:
         failed = f", {len(done.failures)} failed" if done.failures else ""
-        say(f"{path}: {done.computed} points computed, {done.taken} were there{failed}")
+        say(f"{path}: {done.computed} points computed, {done.stored} were there{failed}")
 
 
 def _tell_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from mesoslip.campaign.estimate import estimate
-    from mesoslip.campaign.store import Points
-    from mesoslip.simulation.runner import checked_workers
+    from mesoslip.execution.executors import checked_workers
+    from mesoslip.execution.store import Pieces
 
     count = checked_workers(workers)
-    told = estimate(plan, Points(folder), count)
+    told = estimate(plan, Pieces(folder), count)
     axes = " x ".join(
         [f"{len(axis.rows)} {' + '.join(axis.keys)}" for axis in plan.axes]
         + [f"{plan.realizations} realization{'s' * (plan.realizations > 1)}"]

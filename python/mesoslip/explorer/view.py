@@ -23,15 +23,16 @@ from bokeh.models.widgets import Button, Div, TextInput, Toggle
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, MesoslipError
+from mesoslip.execution.newest import Newest
+from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import BY_KEY
 from mesoslip.explorer.figures import FIRST, SECOND, LatticeView, MotionView, TheoryView
-from mesoslip.explorer.following import Worker, explored, follow
+from mesoslip.explorer.following import explored, follow
 from mesoslip.explorer.knobs import PLAIN, RED, ControlView, set_changed
 from mesoslip.explorer.pictures import Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
 from mesoslip.output.writing import write_results
 from mesoslip.simulation.runner import Results
-from mesoslip.simulation.stop import StopFlag
 
 # How long theory waits for the next change, after a picture was drawn [s].
 REST = 0.15
@@ -78,9 +79,9 @@ class Page:
         self._turn = self._shown = self._explained = 0
         self._is_closed = False
         self._workers = {
-            "run": Worker("explore run"),
-            "limit": Worker("explore limit"),
-            "theory": Worker("explore theory", REST),
+            "run": Newest(),
+            "limit": Newest(),
+            "theory": Newest(REST),
         }
         self._theories = Theories()
         self._controls = {
@@ -216,7 +217,7 @@ class Page:
         view = self._motion if name == "run" else self._beside
         show = self._show_motion if name == "run" else self._show_limit
 
-        def job(stop: StopFlag) -> None:
+        def job(stop: Stop) -> None:
             def look(results: Results) -> None:
                 shown = motion(results), results if results.complete else None
                 view.pace.wait()
@@ -248,7 +249,7 @@ class Page:
                 self._theory.show(known)
             return
 
-        def job(stop: StopFlag) -> None:
+        def job(stop: Stop) -> None:
             for shown in self._theories.compute(config):
                 if stop.is_set():
                     return

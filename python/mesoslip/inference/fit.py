@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.execution.executors import ExecutorLike
+from mesoslip.execution.stop import StopRequest
+from mesoslip.execution.store import Store
 from mesoslip.inference.checks import Agreement, compare, informed_by
 from mesoslip.inference.plan import Plan
 from mesoslip.inference.rounds import Estimate, close_in
@@ -20,7 +24,6 @@ from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.measured.slips import FoundSlips, estimated_period, noise_level
 from mesoslip.measured.trace import even_trace, first_velocity
-from mesoslip.simulation.stop import StopFlag
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,9 +98,9 @@ def fit(
     plan: Plan,
     *,
     store: Path | None = None,
-    workers: int | None = None,
+    executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-    stop: StopFlag | None = None,
+    stop: StopRequest | None = None,
 ) -> Fitted:
     """Fit parameters to a trace.
 
@@ -108,14 +111,14 @@ def fit(
     plan
         What is free.
     store
-        File in which simulations are kept until the fit is done, and from which it goes on.
-    workers
-        Simulations at the same time; as many as there are processors by default. The result does
-        not depend on it.
+        Folder in which simulations are kept, so that a fit that was stopped can be continued.
+    executor
+        Where simulations are computed, or how many threads compute them; as many as there are
+        processors by default. The result does not depend on it.
     progress
-        Called now and then with the part of the simulations that is done.
+        Called now and then with the fraction of the simulations that is done.
     stop
-        Set by who wants the fit to stop.
+        A request to stop; Ctrl-C is one too.
 
     Raises
     ------
@@ -123,7 +126,7 @@ def fit(
         If the trace cannot be fitted, or the configuration contradicts it.
     RunError
         If no simulation is like the trace, or emcee is not installed.
-    mesoslip.inference.simulations.StoppedError
+    mesoslip.execution.stop.StoppedError
         If it was stopped.
     """
     check_installed()
@@ -131,23 +134,26 @@ def fit(
     summarizer = simulator.summarizer
     observed = summarizer(force)
     rng = np.random.default_rng(plan.seed)
-    simulations = Simulations(
-        simulator,
-        observed,
-        expected=plan.simulations + PREDICTIONS,
-        store=store,
-        workers=workers,
-        progress=progress,
-        stop=stop,
-    )
-    estimate = close_in(simulations, observed, plan.simulations, rng)
-    chosen = estimate.draws[rng.choice(len(estimate.draws), PREDICTIONS, replace=False)]
-    stride = max(1, len(force) // MOST_SAMPLES)
-    forces, slips, predicted = [], [], []
-    for one in simulations.forces(chosen):
-        forces.append(one[::stride].astype(np.float32))
-        slips.append(summarizer.slips(one))
-        predicted.append(summarizer(one))
+    with ExitStack() as stack:
+        kept = None
+        if store is not None:
+            kept = stack.enter_context(Store(store, "simulations", simulator.fingerprint(observed)))
+        simulations = Simulations(
+            simulator,
+            expected=plan.simulations + PREDICTIONS,
+            store=kept,
+            executor=executor,
+            progress=progress,
+            stop=stop,
+        )
+        estimate = close_in(simulations, observed, plan.simulations, rng)
+        chosen = estimate.draws[rng.choice(len(estimate.draws), PREDICTIONS, replace=False)]
+        stride = max(1, len(force) // MOST_SAMPLES)
+        forces, slips, predicted = [], [], []
+        for one in simulations.forces(chosen):
+            forces.append(one[::stride].astype(np.float32))
+            slips.append(summarizer.slips(one))
+            predicted.append(summarizer(one))
     agreement = compare(summarizer.features, estimate.summaries, np.array(predicted), observed)
     information = informed_by(
         summarizer.features, estimate.parameters, estimate.summaries, observed

@@ -1,49 +1,49 @@
-"""The simulations of a fit: on all cores, kept as they come, taken up again after a stop."""
+"""The simulations of a fit: on any executor, each kept when it is finished."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.errors import ConfigError, FileError, RunError
+from mesoslip.errors import ConfigError, RunError
+from mesoslip.execution.executors import ExecutorLike, as_executor, completed
+from mesoslip.execution.pool import Function, Result
+from mesoslip.execution.program import program
+from mesoslip.execution.stop import Stop, StoppedError, StopRequest
+from mesoslip.execution.store import Store
 from mesoslip.inference.prior import Prior
 from mesoslip.inference.summaries import Summarizer
-from mesoslip.output.targets import written_whole
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.stop import StopFlag
+from mesoslip.simulation.tables import TRACE_COLUMNS
 
 Array = NDArray[np.float64]
 
-# Breaks after which a simulation is given up: far more than the trace can be of.
-MOST_BREAKS = 3e7
-# Simulations between two times that they are written to their file.
-KEPT_EVERY = 64
+# Breaks after which a simulation is given up: far more than the trace can have.
+MAX_BREAKS = 3e7
 
-
-class StoppedError(Exception):
-    """Somebody has stopped the fit."""
+# The number of a simulation, and its parameters on the unit cube.
+Piece = tuple[int, Array]
 
 
 @dataclass(frozen=True)
 class Simulator:
-    """Simulates the experiment with parameters, noise and all, and sums the trace up.
+    """Simulates the experiment, with noise, and reduces the trace to its summaries.
 
     Attributes
     ----------
     config
-        What is known.
+        The known parameters.
     prior
-        What is not.
+        The free ones.
     summarizer
-        How a trace is summed up.
+        Reduces a trace to its summaries.
     noise
         Standard deviation of the noise of the force [N].
     skipped
@@ -59,55 +59,76 @@ class Simulator:
     skipped: int
     seed: int
 
-    def force(self, number: int, unit: Array) -> Array | None:
+    def force(self, piece: Piece, stop: StopRequest) -> Array | None:
         """A noisy trace of the force [N]; None if it cannot be simulated.
 
         Parameters
         ----------
-        number
-            Of the simulation, which gives it its own random numbers.
-        unit
-            Parameters on the unit cube.
+        piece
+            The number of the simulation, which its random numbers follow from, and its parameters.
+        stop
+            A request to stop.
+
+        Raises
+        ------
+        StoppedError
+            If it is stopped.
         """
+        number, unit = piece
         words = np.random.SeedSequence((self.seed, number)).generate_state(3, np.uint64)
         changes = self.prior.changes(self.prior.values(unit))
         try:
             config = self.config.replace({**changes, "run.seed": int(words[0] >> np.uint64(2))})
             run = Realization(config, 0)
-            while not run.finished and run.breaks < MOST_BREAKS:
+            while not run.finished and run.breaks < MAX_BREAKS:
+                if stop.is_set():
+                    raise StoppedError("the fit was stopped")
                 run.advance()
         except (ConfigError, RunError):
             return None
-        force: Array = run.trace[self.skipped :, 4]
+        force: Array = run.trace[self.skipped :, TRACE_COLUMNS.index("spring_force")]
         run.close()
-        if not run.finished or run.breaks >= MOST_BREAKS:
-            return None
         count = len(self.summarizer.time)
-        if len(force) < count:
+        if not run.finished or run.breaks >= MAX_BREAKS or len(force) < count:
             return None
         noise = np.random.default_rng(words[1:]).standard_normal(count)
         return force[:count] + self.noise * noise
 
-    def __call__(self, number: int, unit: Array) -> Array:
-        """Summaries of a simulation; all NaN if it cannot be simulated."""
-        force = self.force(number, unit)
+    def summaries(self, piece: Piece, stop: StopRequest) -> Array:
+        """Summaries of a simulation; all NaN if it cannot be simulated. See `force`."""
+        force = self.force(piece, stop)
         if force is None:
             return np.full(len(self.summarizer.names), np.nan)
         return self.summarizer(force)
 
     def fingerprint(self, observed: Array) -> str:
-        """What tells this fit from others."""
-        told = repr((self.config.to_toml(), self.prior, self.noise, self.skipped, self.seed))
+        """A hash of everything that the simulations of a fit follow from."""
+        known = (self.config.to_toml(), self.prior, self.noise, self.skipped, self.seed)
         times = self.summarizer.time
         state = np.concatenate([np.nan_to_num(observed), times[[0, -1]], [len(times)]])
-        return hashlib.sha256(told.encode() + state.tobytes()).hexdigest()
+        return hashlib.sha256(repr((program(), *known)).encode() + state.tobytes()).hexdigest()
 
 
 class Simulations:
     """Simulations one after another, each with its number.
 
-    They follow from the seed and the trace alone, so a fit that is begun again comes to ask for the
-    same ones, and takes those that it finds in its file.
+    They follow from the seed and the trace alone. So a fit that is started again asks for the same
+    ones, and finds those that its store has kept.
+
+    Parameters
+    ----------
+    simulator, observed
+        The simulator, and the summaries of the trace.
+    expected
+        Number of simulations of the whole fit.
+    store
+        Where they are kept; nowhere by default.
+    executor
+        Where they are computed; on as many threads as there are processors by default.
+    progress
+        Called with the fraction of the simulations that is done.
+    stop
+        A request to stop.
 
     Attributes
     ----------
@@ -118,36 +139,30 @@ class Simulations:
     def __init__(
         self,
         simulator: Simulator,
-        observed: Array,
         *,
         expected: int,
-        store: Path | None = None,
-        workers: int | None = None,
+        store: Store | None = None,
+        executor: ExecutorLike = None,
         progress: Callable[[float], None] | None = None,
-        stop: StopFlag | None = None,
+        stop: StopRequest | None = None,
     ) -> None:
         self.simulator = simulator
-        self._fingerprint = simulator.fingerprint(observed)
-        self._workers = workers or os.cpu_count() or 1
+        self._executor = as_executor(executor)
         self._expected = expected
         self._store = store
+        self._stored = set() if store is None else store.names()
         self._progress = progress or (lambda _: None)
-        self._stop = stop or StopFlag()
-        names = len(simulator.summarizer.names)
-        self._kept: dict[int, tuple[Array, Array]] = {}
+        self._stop = Stop(stop)
         self._parameters: list[Array] = []
         self._summaries: list[Array] = []
-        self._shape = (len(simulator.prior), names)
-        if store is not None and store.exists():
-            self._kept = self._read(store)
 
     @property
     def parameters(self) -> Array:
-        return np.array(self._parameters).reshape(-1, self._shape[0])
+        return np.array(self._parameters).reshape(-1, len(self.simulator.prior))
 
     @property
     def summaries(self) -> Array:
-        return np.array(self._summaries).reshape(-1, self._shape[1])
+        return np.array(self._summaries).reshape(-1, len(self.simulator.summarizer.names))
 
     def __len__(self) -> int:
         return len(self._parameters)
@@ -158,80 +173,69 @@ class Simulations:
         Raises
         ------
         StoppedError
-            If somebody has stopped the fit; what was simulated is kept.
+            If the fit is stopped; what was simulated is kept.
         """
         start = len(self)
-        missing = [
-            number
-            for number, point in enumerate(points, start)
-            if number not in self._kept or not np.array_equal(self._kept[number][0], point)
-        ]
-        fresh = 0
-
-        def simulate(number: int) -> tuple[int, Array]:
-            if self._stop.is_set():
-                raise StoppedError
-            return number, self.simulator(number, points[number - start])
-
-        with ThreadPoolExecutor(self._workers) as pool:
-            pending = [pool.submit(simulate, number) for number in missing]
-            try:
-                for future in as_completed(pending):
-                    number, summary = future.result()
-                    self._kept[number] = (points[number - start], summary)
-                    fresh += 1
-                    if fresh % KEPT_EVERY == 0:
-                        self._write()
-                    done = start + len(points) - len(missing) + fresh
-                    self._progress(min(0.999, done / self._expected))
-            except (StoppedError, KeyboardInterrupt):
-                self._stop.set()
-                for future in pending:
-                    future.cancel()
-                self._write()
-                raise StoppedError from None
+        found = {}
         for number, point in enumerate(points, start):
-            self._parameters.append(point)
-            self._summaries.append(self._kept[number][1])
-        self._write()
+            summaries = self._read(number, point)
+            if summaries is not None:
+                found[number] = summaries
+        missing = ((one, points[one - start]) for one in range(start, start + len(points)))
+        pieces = [piece for piece in missing if piece[0] not in found]
+        for (number, point), future in self._completed(self.simulator.summaries, pieces):
+            found[number] = future.result()
+            if self._store is not None:
+                body = {"parameters": _texts(point), "summaries": _texts(found[number])}
+                self._store.write(_name(number), body)
+            self._progress(min(0.999, (start + len(found)) / self._expected))
+        self._parameters += list(points)
+        self._summaries += [found[number] for number in range(start, start + len(points))]
 
     def forces(self, points: Array) -> Iterator[Array]:
-        """Noisy traces at points of the unit cube, with numbers after those of all others."""
-        start = self._expected + len(self)
+        """Noisy traces at points of the unit cube, with numbers after those of all others.
 
-        def simulate(place: int) -> Array | None:
-            if self._stop.is_set():
-                raise StoppedError
-            return self.simulator.force(start + place, points[place])
+        Raises
+        ------
+        StoppedError
+            If the fit is stopped.
+        """
+        pieces = enumerate(points, self._expected + len(self))
+        for _, future in self._completed(self.simulator.force, pieces, in_order=True):
+            force = future.result()
+            if force is not None:
+                yield force
 
-        with ThreadPoolExecutor(self._workers) as pool:
-            for force in pool.map(simulate, range(len(points))):
-                if force is not None:
-                    yield force
+    def _completed(
+        self,
+        function: Function[Piece, Result],
+        pieces: Iterable[Piece],
+        *,
+        in_order: bool = False,
+    ) -> Iterator[tuple[Piece, Future[Result]]]:
+        work = completed(self._executor, function, pieces, self._stop, in_order=in_order)
+        with closing(work), self._stop.on_interrupt():
+            yield from work
+        if self._stop.is_set():
+            raise StoppedError("the fit was stopped")
 
-    def _write(self) -> None:
-        if self._store is None or not self._kept:
-            return
-        numbers = np.array(sorted(self._kept))
-        with written_whole(self._store) as part, part.open("wb") as file:
-            np.savez(
-                file,
-                fingerprint=np.array(self._fingerprint),
-                numbers=numbers,
-                parameters=np.array([self._kept[one][0] for one in numbers]),
-                summaries=np.array([self._kept[one][1] for one in numbers]),
-            )
-
-    def _read(self, store: Path) -> dict[int, tuple[Array, Array]]:
+    def _read(self, number: int, point: Array) -> Array | None:
+        """Summaries of a stored simulation; None if it is not there, or of other parameters."""
+        name = _name(number)
+        body = self._store.read(name) if self._store is not None and name in self._stored else None
         try:
-            with store.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-                fingerprint = str(file["fingerprint"])
-                rows = zip(file["numbers"], file["parameters"], file["summaries"], strict=True)
-                kept = {int(number): (point, summary) for number, point, summary in rows}
-        except Exception as error:
-            raise FileError(f"{store}: is damaged; remove it, and the fit starts anew") from error
-        if fingerprint != self._fingerprint:
-            raise FileError(
-                f"{store}: is of another fit, trace or version; remove it, and the fit starts anew"
-            )
-        return kept
+            if body is None or [float(one) for one in body["parameters"]] != point.tolist():
+                return None
+            return np.array([float(one) for one in body["summaries"]])
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            return None
+
+
+def _name(number: int) -> str:
+    """The name under which a simulation is stored."""
+    return f"{number:08d}"
+
+
+def _texts(values: Array) -> list[str]:
+    """Numbers as Python writes them, which are read to the bit."""
+    return [repr(float(one)) for one in values]

@@ -1,25 +1,25 @@
-"""Checkpoints: a run that was stopped, killed or cut off goes on as if it never had been.
+"""Checkpoints: a run that was stopped or killed is resumed, to the bit.
 
-A checkpoint is a folder beside the output. ``TABLE.rows`` holds what was recorded, appended as the
-run goes on, which also bounds its memory; ``state.npz`` the state of the kernels and how far each
-table was then, ``state.previous.npz`` the one before. A state is written under another name,
-flushed, and renamed, so whatever happens one of the two is whole. What was appended after it is cut
-off again when the run goes on.
+A checkpoint is a folder beside the output. ``TABLE.rows`` holds what was recorded, appended during
+the run, which also bounds its memory; ``state.npz`` the state of the kernels and the length of each
+table at that moment, ``state.previous.npz`` the one before. A state is written under another name,
+flushed, and renamed, so one of the two is always whole. Rows that were appended after it are cut
+off when the run is resumed.
 """
 
 from __future__ import annotations
 
-import fcntl
 import io
 import json
 import os
-import shutil
+import re
 import threading
 import time
 import zlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -27,23 +27,26 @@ import numpy as np
 
 from mesoslip import _build
 from mesoslip.errors import FileError
+from mesoslip.execution.store import Folder
 from mesoslip.simulation.realization import Realization, Saved
 from mesoslip.simulation.tables import TABLES, Rows, Stored
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Of what is in the files; a run goes on only with the kernels that began it.
+# Of the content of the files; only the program that began a run resumes it.
 FORMAT = 1
 
 # Wall time between two checkpoints [s].
 INTERVAL = 60.0
 # Time after which a full disk or the like is tried again [s].
-RETRY = 10.0
-# What may wait in memory before it is put into the files [bytes].
-MOST_WAITING = 64e6
+RETRY_SECONDS = 10.0
+# Rows in memory before they are written to the files [bytes].
+MAX_WAITING_BYTES = 64e6
 
-STATE, PREVIOUS, PART, LOCK = "state.npz", "state.previous.npz", "state.part", "lock"
+STATE, PREVIOUS = "state.npz", "state.previous.npz"
+DAMAGED = "damaged."
+NAMES = rf"(damaged\.)?state(\.previous)?\.npz|({'|'.join(TABLES)})\.rows"
 
 
 class DamagedError(Exception):
@@ -53,6 +56,10 @@ class DamagedError(Exception):
 def checkpoint_folder(output: Path) -> Path:
     """Where the checkpoint of an output is."""
     return output.with_name(f"{output.stem}.checkpoint")
+
+
+def _folder(path: Path) -> Folder:
+    return Folder(path, "checkpoint", NAMES)
 
 
 def _program() -> dict[str, Any]:
@@ -74,11 +81,11 @@ class Checkpoint:
     config
         What is run.
     interval
-        Wall time between two checkpoints [s]; 0 for none but when the run is stopped.
+        Wall time between two checkpoints [s]; 0: only when the run is stopped.
     resume
-        Whether to go on from what is there.
-    tell
-        Called with a sentence about what the user should know.
+        Whether to resume from what is there.
+    report
+        Called with each message for the user.
     """
 
     def __init__(
@@ -88,14 +95,15 @@ class Checkpoint:
         *,
         interval: float = INTERVAL,
         resume: bool = False,
-        tell: Callable[[str], None] = lambda _: None,
+        report: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.folder = folder
+        self._files = _folder(folder)
         self.saved_time: float | None = None
         self._config = config
         self._interval = interval
         self._resume = resume
-        self._tell = tell
+        self._report = report
         # What runs now, not what is installed by the time of a checkpoint.
         self._program = _program()
         self._paths = {table: folder / f"{table}.rows" for table in TABLES}
@@ -106,9 +114,8 @@ class Checkpoint:
         self._epoch = self._written = 0
         self._start = self._last = time.perf_counter()
         self._before = 0.0
-        self._lock_file: io.TextIOBase | None = None
         self._is_failing = False
-        self._last_failure = -RETRY
+        self._last_failure = -RETRY_SECONDS
 
     def __enter__(self) -> Self:
         return self
@@ -119,7 +126,7 @@ class Checkpoint:
     # What the threads of realizations call.
 
     def visit(self, realization: Realization) -> None:
-        """Between two segments of a realization: save it if it is wanted, or over."""
+        """Between two segments of a realization: save it if a checkpoint is due or it is over."""
         epoch, _ = self._saved.get(realization.number, (-1, None))
         saved = None
         if epoch < self._epoch or realization.finished:
@@ -132,9 +139,9 @@ class Checkpoint:
     # What the main thread calls.
 
     def look(self, realizations: Sequence[Realization]) -> None:
-        """Now and then: begin a checkpoint when it is time, finish one that all are saved for."""
+        """Now and then: begin a checkpoint when it is due, write it when all are saved."""
         if self._epoch > self._written:
-            # Those of a run that was taken up wait for a worker as they were saved.
+            # Those of a resumed run that wait for a worker are as they were saved.
             running = [one for one in realizations if one.is_open and one.advances > 0]
             running = [one for one in running if not one.finished]
             if all(self._saved.get(one.number, (-1,))[0] == self._epoch for one in running):
@@ -144,12 +151,12 @@ class Checkpoint:
         with self._lock:
             grown = list(self._grown.values())
         waiting = sum(rows.waiting_bytes for one in grown for _, rows in one.waiting)
-        is_time = time.perf_counter() - self._last_failure >= RETRY
-        if waiting > MOST_WAITING and (is_time or not self._is_failing):
+        is_time = time.perf_counter() - self._last_failure >= RETRY_SECONDS
+        if waiting > MAX_WAITING_BYTES and (is_time or not self._is_failing):
             self._attempt(lambda: self._flush(grown))
 
     def write(self, realizations: Sequence[Realization]) -> bool:
-        """Write a checkpoint of a run that stands still; whether it was possible."""
+        """Write a checkpoint of a run that is not advancing; whether that was possible."""
         self._epoch += 1
         for one in realizations:
             if one.advances > 0:
@@ -157,7 +164,7 @@ class Checkpoint:
         return self._write(realizations)
 
     def restore(self, realizations: Sequence[Realization]) -> float:
-        """Set realizations to the state of the checkpoint, if it is wanted and there is one.
+        """Set realizations to the state of the checkpoint, if there is one to resume from.
 
         Returns
         -------
@@ -170,98 +177,62 @@ class Checkpoint:
             If the checkpoint is of another configuration or program, or in use.
         """
         with suppress(OSError):
-            self._take_lock()
+            self._files.lock()
         there = [name for name in (STATE, PREVIOUS) if (self.folder / name).exists()]
         if not self._resume:
             if there:
-                self._set_aside("starts anew")
+                self._set_aside("starts from the beginning")
             return 0.0
         for name in there:
             try:
                 return self._read(self.folder / name, realizations)
             except DamagedError as error:
-                self._tell(f"{self.folder / name}: damaged ({error})")
+                self._report(f"{self.folder / name}: damaged ({error})")
                 # It must not take the place of the previous one, which may be whole.
-                (self.folder / name).replace(self.folder / f"damaged.{name}")
+                (self.folder / name).replace(self.folder / f"{DAMAGED}{name}")
         if there:
-            self._set_aside("no checkpoint can be taken up: starts at the beginning")
+            self._set_aside("no checkpoint can be resumed: starts from the beginning")
         else:
-            self._tell(f"no checkpoint in {self.folder}: starts at the beginning")
+            self._report(f"no checkpoint in {self.folder}: starts from the beginning")
         return 0.0
 
-    def _set_aside(self, what: str) -> None:
-        """Keep what another run has left, and this one does not go on with, under another name."""
-        self.close()
-        shutil.rmtree(self._aside, ignore_errors=True)
-        self.folder.replace(self._aside)
-        self._take_lock()
-        self._tell(
-            f"{what}; the checkpoint of a run that was stopped is kept as {self._aside} until this "
-            f"one is complete (as {self.folder}, --resume goes on with it)"
+    def _set_aside(self, reason: str) -> None:
+        """Keep the checkpoint of an earlier run, which is not resumed, under another name."""
+        for number in count(1):
+            aside = self.folder.with_name(f"{self.folder.name}.old{number if number > 1 else ''}")
+            if not os.path.lexists(aside):
+                break
+        self._files.move(aside)
+        with suppress(OSError):
+            self._files.lock()
+        self._report(
+            f"{reason}; the checkpoint of a run that was stopped is kept as {aside} until this one "
+            f"is complete (renamed to {self.folder}, it is resumed by --resume)"
         )
 
-    @property
-    def _aside(self) -> Path:
-        return self.folder.with_name(f"{self.folder.name}.old")
-
     def remove(self) -> None:
-        """Remove it, when the output is there."""
-        for folder in (self.folder, self._aside):
-            shutil.rmtree(folder, ignore_errors=True)
-        self.close()
+        """Remove it, and those that were kept until the output is there."""
+        old = re.compile(rf"{re.escape(self.folder.name)}\.old\d*")
+        with suppress(OSError):
+            for path in self.folder.parent.iterdir():
+                if old.fullmatch(path.name):
+                    _folder(path).remove()
+        self._files.remove()
 
     def close(self) -> None:
-        """Leave it to another run; it stays where it is, unless nothing is in it."""
-        if self._lock_file is None:
-            return
-        with suppress(OSError):
-            if [one.name for one in self.folder.iterdir()] == [LOCK]:
-                shutil.rmtree(self.folder)
-        self._lock_file.close()
-        self._lock_file = None
-
-    def _take_lock(self) -> None:
-        """Be the only run of this output.
-
-        Raises
-        ------
-        FileError
-            If another one is under way.
-        """
-        if self._lock_file is not None:
-            return
-        path = self.folder / LOCK
-        while True:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            file = path.open("w")
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                file.close()
-                raise FileError(
-                    f"{self.folder}: another run of this output is under way; wait for it, or give "
-                    "this one another output (-o)"
-                ) from None
-            except OSError:
-                # A file system without locks: there is nothing to be had.
-                break
-            # Another run may have removed the folder meanwhile.
-            with suppress(OSError):
-                if path.stat().st_ino == os.fstat(file.fileno()).st_ino:
-                    break
-            file.close()
-        self._lock_file = file
+        """Leave it to another run; it stays where it is, unless it is empty."""
+        self._files.unlock()
 
     def _attempt(self, action: Callable[[], None]) -> bool:
-        """Do what a full disk or the like may prevent: the run goes on without it, and says so."""
+        """Do what a full disk may prevent: the run goes on without it, and reports that."""
         try:
-            self._take_lock()
+            self._files.lock()
             action()
         except OSError as error:
             if not self._is_failing:
-                self._tell(
+                self._report(
                     f"{self.folder}: the checkpoint cannot be written: {error.strerror or error}; "
-                    "the run goes on, and tries again"
+                    "the run goes on, and tries again later"
                 )
             self._is_failing = True
             self._last_failure = time.perf_counter()
@@ -270,7 +241,7 @@ class Checkpoint:
         return True
 
     def _flush(self, realizations: Sequence[Realization]) -> None:
-        """Append what waits in memory to the files."""
+        """Append rows in memory to the files."""
         for one in realizations:
             with self._lock:
                 self._grown.pop(one.number, None)
@@ -299,7 +270,7 @@ class Checkpoint:
         return is_written
 
     def _write_state(self, realizations: Sequence[Realization]) -> None:
-        # Before rows are put into files, as one that ends meanwhile is saved with more of them.
+        # Before rows are written: a realization that ends meanwhile is saved with more of them.
         with self._lock:
             saved = {number: one for number, (_, one) in self._saved.items()}
         self._flush([realizations[number] for number in saved])
@@ -331,23 +302,8 @@ class Checkpoint:
                 for number, one in saved.items()
             },
         }
-        part = self.folder / PART
-        try:
-            with part.open("wb") as file:
-                np.savez(file, header=np.array(json.dumps(header)), **arrays)
-                file.flush()
-                os.fsync(file.fileno())
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
-        if (self.folder / STATE).exists():
-            (self.folder / STATE).replace(self.folder / PREVIOUS)
-        part.replace(self.folder / STATE)
-        folder = os.open(self.folder, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        with self._files.written(STATE, keep=PREVIOUS) as file:
+            np.savez(file, header=np.array(json.dumps(header)), **arrays)
 
     def _read(self, path: Path, realizations: Sequence[Realization]) -> float:
         """Set realizations to a state.
@@ -399,7 +355,7 @@ class Checkpoint:
         return self._before
 
     def _compare(self, header: dict[str, Any]) -> None:
-        """Refuse a state that this run cannot go on from.
+        """Refuse a state that this run cannot resume from.
 
         Raises
         ------
@@ -407,13 +363,14 @@ class Checkpoint:
             If it is of another configuration or program.
         """
         advice = (
-            "; run without --resume to start anew, or give another output (-o) to keep this one"
+            "; without --resume the run starts from the beginning, and with another output (-o) "
+            "this one is kept"
         )
         for name, value in self._program.items():
             if header.get(name) != value:
                 raise FileError(
                     f"{self.folder}: the checkpoint was made with {name} {header.get(name)} of "
-                    f"mesoslip, and this is {value}: only the same program goes on to the bit"
+                    f"mesoslip, and this is {value}: only the same program resumes it to the bit"
                     + advice
                 )
         if header["configuration"] != self._config.to_toml():
@@ -439,5 +396,5 @@ def _difference(old: str, new: str) -> str:
 
     before, now = flat(tomllib.loads(old)), flat(tomllib.loads(new))
     names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
-    told = [f"{name} was {before.get(name)}, is {now.get(name)}" for name in names[:3]]
-    return ", ".join(told)
+    changes = [f"{name} was {before.get(name)}, is {now.get(name)}" for name in names[:3]]
+    return ", ".join(changes)

@@ -1,0 +1,253 @@
+"""Workers on this machine: threads, each of which may have a process of its own.
+
+Threads start at once, and the kernel runs without Python's lock. Processes need most of a second to
+start, and then do not wait for each other; one that is killed costs its piece one attempt and
+nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future
+from contextlib import suppress
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from mesoslip.errors import RunError
+from mesoslip.execution.pool import (
+    Function,
+    Pool,
+    PoolError,
+    Result,
+    WorkerLostError,
+    compute_elsewhere,
+)
+from mesoslip.execution.program import program
+from mesoslip.execution.stop import Stop
+
+# Workers that a piece may cost before it fails.
+MAX_ATTEMPTS = 3
+# Time for a process to end whose pipe is closed [s].
+EXIT_SECONDS = 5.0
+
+# Program of a worker process. It finds the packages of this process, behind its own: with -P, no
+# file of the current folder is taken for a module.
+PROCESS = (
+    "import json, sys; sys.path += [one for one in json.loads(sys.argv[2]) if one not in sys.path];"
+    "from mesoslip.execution.worker import main; main(int(sys.argv[1]))"
+)
+
+
+class WorkerProcess:
+    """A process that computes one piece at a time, and ends when this one does."""
+
+    def __init__(self) -> None:
+        self._connection, theirs = multiprocessing.Pipe()
+        number = theirs.fileno()
+        # Ctrl-C goes to the whole group of processes, and this one decides what it means.
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", PROCESS, str(number), json.dumps(search_path())],
+                pass_fds=[number],
+                stdin=subprocess.DEVNULL,
+                stdout=2,
+            )
+        except OSError as error:
+            self._connection.close()
+            raise PoolError(f"a worker cannot be started: {error.strerror}") from None
+        finally:
+            theirs.close()
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+    def compute(self, function: Function[Any, Any], piece: object) -> tuple[bool, Any]:
+        """Compute a piece there: whether that succeeded, and the result or the error.
+
+        Raises
+        ------
+        OSError, EOFError
+            If the process has died.
+        """
+        self._connection.send((compute_elsewhere, (function, piece, program())))
+        answer: tuple[bool, Any] = self._connection.recv()
+        return answer
+
+    def kill(self) -> None:
+        """End the process, and with it what it computes."""
+        self._process.kill()
+
+    def close(self) -> None:
+        """End the process, and wait for it."""
+        self._process.kill()
+        self._process.wait()
+        self._connection.close()
+
+    def ending(self) -> str:
+        """How a process has died, as the end of a sentence."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(EXIT_SECONDS)
+        status = self._process.returncode
+        if status is None:
+            return "closed its connection"
+        return f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
+
+
+def search_path() -> list[str]:
+    """Where this process finds modules, without the current folder."""
+    here = Path.cwd()
+    return [one for one in sys.path if one and Path(one).is_absolute() and Path(one) != here]
+
+
+class LocalPool(Pool):
+    """Threads and processes of this machine.
+
+    Parameters
+    ----------
+    workers
+        Pieces that are computed at the same time.
+    stop
+        Passed to pieces on threads.
+    thread_seconds
+        Time after which new pieces go to processes [s].
+    """
+
+    def __init__(self, workers: int, stop: Stop, thread_seconds: float) -> None:
+        self._workers = workers
+        self._stop = stop
+        self._thread_seconds = thread_seconds
+        self._start = time.monotonic()
+        self._queue: SimpleQueue[tuple[Future[Any], Function[Any, Any], object] | None] = (
+            SimpleQueue()
+        )
+        self._threads: list[threading.Thread] = []
+        self._processes: set[WorkerProcess] = set()
+        self._lock = threading.Lock()
+        # Processes that died since a piece was computed.
+        self._deaths = 0
+
+    @property
+    def capacity(self) -> int:
+        # The next piece is there before the last one is stored.
+        return 2 * self._workers
+
+    def submit(self, function: Function[Any, Result], piece: object) -> Future[Result]:
+        future: Future[Result] = Future()
+        self._queue.put((future, function, piece))
+        if len(self._threads) < self._workers:
+            # Not one of ThreadPoolExecutor's: the interpreter does not wait for it at its end.
+            self._threads.append(threading.Thread(target=self._serve, daemon=True))
+            self._threads[-1].start()
+        return future
+
+    def check(self) -> None:
+        """Nothing to do: processes that cannot be started fail their pieces with a `PoolError`."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether a thread is there."""
+        return any(thread.is_alive() for thread in self._threads)
+
+    def close(self, wait: float | None) -> None:
+        self._stop.set()
+        for _ in self._threads:
+            self._queue.put(None)
+        with self._lock:
+            for process in self._processes:
+                process.kill()
+        end = None if wait is None else time.monotonic() + wait
+        for thread in self._threads:
+            thread.join(None if end is None else max(0.0, end - time.monotonic()))
+
+    def _serve(self) -> None:
+        """What a thread does: piece after piece, from some time on in a process."""
+        process: WorkerProcess | None = None
+        while (item := self._queue.get()) is not None:
+            future, function, piece = item
+            if self._stop.is_set() or not future.set_running_or_notify_cancel():
+                continue
+            try:
+                if time.monotonic() - self._start < self._thread_seconds:
+                    result = function(piece, self._stop)
+                else:
+                    process, succeeded, result = self._compute_in_process(process, function, piece)
+                    if not succeeded:
+                        raise result
+            except BaseException as error:
+                future.set_exception(error)
+                if isinstance(error, WorkerLostError | PoolError):
+                    process = None
+            else:
+                future.set_result(result)
+                del result
+            # Nothing of a piece stays until the next one.
+            del item, future, piece
+        if process is not None:
+            self._forget(process)
+
+    def _compute_in_process(
+        self, process: WorkerProcess | None, function: Function[Any, Any], piece: object
+    ) -> tuple[WorkerProcess, bool, Any]:
+        """Compute a piece in a process, which is replaced if it dies.
+
+        Returns
+        -------
+        tuple
+            The process; whether the piece succeeded; and its result or error.
+
+        Raises
+        ------
+        WorkerLostError
+            If the piece has cost too many processes.
+        PoolError
+            If processes die whatever they compute, or cannot be started, or the pool is closed.
+        """
+        for _ in range(MAX_ATTEMPTS):
+            process = process or self._new_process()
+            try:
+                succeeded, result = process.compute(function, piece)
+            except (EOFError, OSError):
+                ending = process.ending()
+                self._forget(process)
+                process = None
+                self._deaths += 1
+                if self._deaths > MAX_ATTEMPTS * self._workers:
+                    raise PoolError(f"no worker computes anything; the last one {ending}") from None
+                continue
+            self._deaths = 0
+            return process, succeeded, result
+        raise WorkerLostError(
+            f"cost {MAX_ATTEMPTS} workers, of which the last {ending}; is memory too little?"
+        )
+
+    def _new_process(self) -> WorkerProcess:
+        with self._lock:
+            if self._stop.is_set():
+                raise PoolError("the pool is closed")
+            process = WorkerProcess()
+            self._processes.add(process)
+        return process
+
+    def _forget(self, process: WorkerProcess) -> None:
+        with self._lock:
+            self._processes.discard(process)
+        process.close()
+
+
+def pickled_error(error: BaseException) -> BaseException:
+    """An error that another process can raise: itself, or one that says the same."""
+    import pickle
+
+    try:
+        copy = pickle.loads(pickle.dumps(error))
+    except Exception:
+        copy = None
+    if type(copy) is type(error) and str(copy) == str(error):
+        return error
+    return RunError(f"{type(error).__name__}: {error}")

@@ -1,0 +1,15 @@
+"""The program that runs: finished work of another one is not mixed with it."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from mesoslip import _build
+
+# What runs now, not what is installed later on.
+_VERSION = version("mesoslip")
+
+
+def program() -> str:
+    """The program: its version and commit."""
+    return f"mesoslip {_VERSION} {_build.COMMIT}"

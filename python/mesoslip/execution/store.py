@@ -1,0 +1,372 @@
+"""Files of work under way: folders that one process at a time writes to, and finished pieces.
+
+A file is written under another name, flushed, and renamed: it is there as a whole or not at all,
+whatever ends the program. What other programs have put into a folder stays as it is: only files of
+known names are replaced or removed, and only in folders that this program has made.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+import re
+import stat
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any, Self
+
+from mesoslip.errors import FileError, WriteError
+
+LOCK = "lock"
+
+
+class Folder:
+    """A folder that the program has made, which one process at a time writes to.
+
+    Parameters
+    ----------
+    path
+        Where it is; made when it is locked.
+    kind
+        What it holds, such as "checkpoint".
+    names
+        Pattern of the names of its files.
+    shared
+        Whether it may hold files of others from the beginning.
+    """
+
+    def __init__(self, path: Path, kind: str, names: str, *, shared: bool = False) -> None:
+        self.path = path
+        self.kind = kind
+        self._shared = shared
+        self._names = re.compile(names)
+        self._lock: int | None = None
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether this process may write to it."""
+        return self._lock is not None
+
+    @property
+    def is_own(self) -> bool:
+        """Whether this program has made it, or there is nothing in it yet."""
+        try:
+            names = {one.name for one in self.path.iterdir()}
+        except FileNotFoundError:
+            return not self.path.is_symlink()
+        except NotADirectoryError:
+            return False
+        mark = self._mark()
+        # An empty lock is that of a process that was killed as it made it.
+        return names <= {LOCK} if mark == b"" else mark == self._own_mark
+
+    @property
+    def _own_mark(self) -> bytes:
+        return f"mesoslip {self.kind}\n".encode()
+
+    def _mark(self) -> bytes | None:
+        """What the lock says, empty if there is none; None if it is not a regular file."""
+        try:
+            number = self._open_lock(os.O_RDONLY)
+        except FileNotFoundError:
+            return b""
+        except OSError:
+            return None
+        with os.fdopen(number, "rb") as file:
+            return file.read(100) if _is_regular(number) else None
+
+    def _open_lock(self, flags: int) -> int:
+        # Neither through a link, nor waiting for the other end of a pipe.
+        return os.open(self.path / LOCK, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+
+    def check(self) -> None:
+        """Make sure that it is not another's.
+
+        Raises
+        ------
+        FileError
+            If something is there that this program has not made.
+        """
+        if self.is_own or (self._shared and self.path.is_dir() and self._mark() == b""):
+            return
+        raise FileError(
+            f"{self.path}: was not made by this program, which keeps its {self.kind} under this "
+            "name; move it, or give another output (-o)"
+        )
+
+    def lock(self) -> None:
+        """Be the only process that writes to it.
+
+        Raises
+        ------
+        FileError
+            If it is another's, or another process writes to it.
+        OSError
+            If it cannot be made.
+        """
+        if self._lock is not None:
+            return
+        while True:
+            self.check()
+            self.path.mkdir(parents=True, exist_ok=True)
+            number = self._open_lock(os.O_RDWR | os.O_CREAT)
+            try:
+                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(number)
+                raise FileError(
+                    f"{self.path}: another run of this output is under way; wait for it, or give "
+                    "another output (-o)"
+                ) from None
+            except OSError:
+                # A file system without locks: two runs at the same time are not noticed.
+                break
+            # Another process may have removed the folder meanwhile.
+            with suppress(OSError):
+                if (self.path / LOCK).stat().st_ino == os.fstat(number).st_ino:
+                    break
+            os.close(number)
+        try:
+            if self.is_own and os.fstat(number).st_size == 0:
+                os.write(number, self._own_mark)
+                os.fsync(number)
+        except OSError:
+            os.close(number)
+            raise
+        self._lock = number
+
+    def unlock(self) -> None:
+        """Leave it to other processes; without any files in it, it is removed."""
+        if self._lock is None:
+            return
+        with suppress(OSError):
+            if [one.name for one in self.path.iterdir()] == [LOCK]:
+                self._remove_lock()
+        self._close()
+
+    def remove(self) -> None:
+        """Remove its files, and then the folder unless others have put something there."""
+        if not self.is_own:
+            return
+        self.remove_parts()
+        with suppress(OSError):
+            # States before the rows of tables that they need.
+            for one in sorted(self.path.iterdir(), key=lambda one: one.suffix):
+                if self._names.fullmatch(one.name):
+                    one.unlink()
+            self._remove_lock()
+        self._close()
+
+    def move(self, path: Path) -> None:
+        """Give it another name, and leave it to other processes."""
+        self.path.replace(path)
+        self._close()
+
+    def _close(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def _remove_lock(self) -> None:
+        (self.path / LOCK).unlink(missing_ok=True)
+        self.path.rmdir()
+
+    def remove_parts(self) -> None:
+        """Remove files that were being written by a process that was killed."""
+        for one in self.path.glob(".*.part"):
+            if self._names.fullmatch(one.name[1:-5]):
+                with suppress(OSError):
+                    one.unlink()
+
+    @contextmanager
+    def written(self, name: str, *, keep: str | None = None) -> Iterator[IO[bytes]]:
+        """Write a file whole.
+
+        Parameters
+        ----------
+        name
+            Its name.
+        keep
+            A name under which the file that it replaces is kept.
+        """
+        part, target = self.path / f".{name}.part", self.path / name
+        self.path.mkdir(parents=True, exist_ok=True)
+        try:
+            with part.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            if keep is not None and target.exists():
+                target.replace(self.path / keep)
+            part.replace(target)
+        except BaseException:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+            raise
+        folder = os.open(self.path, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _is_regular(number: int) -> bool:
+    return stat.S_ISREG(os.fstat(number).st_mode)
+
+
+class Pieces:
+    """Finished pieces of work in a folder, to be read: a small file for each.
+
+    Parameters
+    ----------
+    path
+        Where they are; it need not be there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def names(self) -> set[str]:
+        """Names of the pieces that are there."""
+        try:
+            return {one.stem for one in self.path.iterdir() if NAME.fullmatch(one.name) is not None}
+        except FileNotFoundError:
+            return set()
+        except OSError as error:
+            raise FileError(f"{self.path}: cannot be read: {error.strerror}") from None
+
+    def read(self, name: str) -> dict[str, Any] | None:
+        """A piece; None if it is not there, or damaged, as by a disk.
+
+        Raises
+        ------
+        FileError
+            If it is there and the disk does not give it.
+        """
+        path = self.path / f"{name}.json"
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read: {error.strerror}") from None
+        try:
+            body: dict[str, Any] = json.loads(content)
+            is_whole = body.pop("checksum") == _checksum(body) and body["name"] == name
+        # A number of thousands of digits is a ValueError.
+        except (AttributeError, LookupError, RecursionError, TypeError, ValueError):
+            return None
+        return body if is_whole else None
+
+
+# Files of pieces: their hash or number, what they have measured, or what else came of them.
+PIECE = r"[0-9a-f]{6,32}"
+NAME = re.compile(rf"{PIECE}\.json")
+MANIFEST = "manifest.json"
+
+
+class Store(Pieces):
+    """Finished pieces in a folder that this process alone writes to.
+
+    Parameters
+    ----------
+    path
+        Where it is; made if it is not there.
+    kind
+        What its pieces are, such as "points".
+    fingerprint
+        What all pieces belong to; empty if their names say so.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written to, is another's, another process writes to it, or its pieces belong
+        to something else.
+    """
+
+    def __init__(self, path: Path, kind: str, fingerprint: str = "") -> None:
+        super().__init__(path)
+        self._folder = Folder(path, kind, rf"{PIECE}\.(json|nc)|{re.escape(MANIFEST)}", shared=True)
+        try:
+            self._folder.lock()
+        except OSError as error:
+            raise FileError(f"{path}: cannot be written: {error.strerror}") from None
+        self._folder.remove_parts()
+        if fingerprint:
+            self._check(fingerprint)
+
+    def _check(self, fingerprint: str) -> None:
+        try:
+            there = json.loads((self.path / MANIFEST).read_bytes()).get("fingerprint")
+        except FileNotFoundError:
+            there = None if self.names() else fingerprint
+            if there:
+                self.write_manifest({"fingerprint": fingerprint})
+        except (OSError, AttributeError, RecursionError, ValueError):
+            there = None
+        if there != fingerprint:
+            self.close()
+            raise FileError(
+                f"{self.path}: is of another configuration, trace or version; remove it to start "
+                "anew"
+            )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let others write to it."""
+        self._folder.unlock()
+
+    def remove(self) -> None:
+        """Remove it, when what its pieces belong to is complete."""
+        self._folder.remove()
+
+    def write(self, name: str, body: Mapping[str, Any], output: bytes | None = None) -> None:
+        """Keep a piece, after the output that belongs to it.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        if output is not None:
+            self._write(f"{name}.nc", output)
+        body = {"name": name, **body}
+        content = json.dumps({"checksum": _checksum(body), **body}, indent=1)
+        self._write(f"{name}.json", content.encode())
+
+    def write_manifest(self, manifest: Mapping[str, Any]) -> None:
+        """Keep what belongs to all pieces.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        self._write(MANIFEST, json.dumps(manifest, indent=1).encode())
+
+    def _write(self, name: str, content: bytes) -> None:
+        try:
+            with self._folder.written(name) as file:
+                file.write(content)
+        except OSError as error:
+            raise not_written(self.path / name, error) from error
+
+
+def not_written(path: Path, error: OSError) -> FileError:
+    """The error of a file that could not be written."""
+    if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+        return WriteError(f"{path}: cannot be written: no space left on the disk")
+    return FileError(f"{path}: cannot be written: {error.strerror or error}")
+
+
+def _checksum(body: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(body, sort_keys=True).encode())

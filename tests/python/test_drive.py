@@ -552,14 +552,14 @@ def test_what_is_wrong_with_an_end_is_told(changes, words):
 
 
 def test_info_knows_ramps_and_holds(klein):
-    """Their stages, duration, way, and the speed that stands for them elsewhere."""
+    """Their stages, duration, path length, and the speed that represents them elsewhere."""
     derived = mesoslip.derived(klein(run__duration=None, **RAMPS))
     values = {name: derived[name].value for name in derived if name.startswith("drive_")}
-    expected = {"stages": 3, "duration": 0.1, "way": 4e-7 + 0.05 * (1e-10 + 4e-10) / 6e-5}
+    expected = {"stages": 3, "duration": 0.1, "path_length": 4e-7 + 0.05 * (1e-10 + 4e-10) / 6e-5}
     for name, value in expected.items():
         assert values[f"drive_{name}"] == pytest.approx(value)
     assert values["drive_speed"] == 2e-5
-    assert "drive_way" not in mesoslip.derived(klein())
+    assert "drive_path_length" not in mesoslip.derived(klein())
 
 
 def test_the_mean_force_of_a_ramp_without_inertia_is_that_of_its_parabola():

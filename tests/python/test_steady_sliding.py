@@ -203,16 +203,16 @@ def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
     file = tmp_path / "klein.toml"
     file.write_text(config.to_toml())
     told = command("curve", file)[1]
-    assert f"from {with_unit(found, 'N/m', 3)} on; of contacts" in told
-    assert f"from {with_unit(most, 'N/m', 3)} on, and" in told
-    assert "springs from" not in command("curve", file, "--set", "contacts.delay=0")[1]
+    assert f"springs stiffer than {with_unit(found, 'N/m', 3)}" in told
+    assert f"out of step, stiffer than {with_unit(most, 'N/m', 3)}." in told
+    assert "springs stiffer than" not in command("curve", file, "--set", "contacts.delay=0")[1]
 
 
 def test_what_has_no_steady_sliding_is_refused(klein):
     with pytest.raises(ConfigError, match="without it there is no steady sliding"):
         SteadySliding(klein(contacts__reattach=False))
     ageing = {"law": "relax", "time": 1e-3, "young_force_ratio": 0.5, "young_relative_width": 0.1}
-    with pytest.raises(ConfigError, match="runs tell"):
+    with pytest.raises(ConfigError, match="only runs show"):
         SteadySliding(klein(contacts__coupling="equal", contacts__ageing=ageing))
     with pytest.raises(ConfigError, match="needs a velocity"):
         SteadySliding(klein(), 0.0)
@@ -223,7 +223,7 @@ def test_what_has_no_steady_sliding_is_refused(klein):
     assert math.isnan(SteadySliding(klein(slider={"kind": "prescribed"})).growth_rate)
 
 
-def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
+def test_info_and_curve_report_steady_sliding(klein, tmp_path, command):
     file = tmp_path / "klein.toml"
     file.write_text(klein().to_toml())
     soft = ("--set", "slider.stiffness=200", "--set", "contacts.delay=3e-4")
@@ -232,13 +232,13 @@ def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
         assert status == 0
         assert "necessary" in told
         assert "not sufficient" in told
-        assert "is unstable, with delay" in told
-        assert "only while contacts break in step" in told
+        assert "is linearly unstable, with delay" in told
+        assert "may be self-limiting" in told
     for velocity in ("1e-7", "3e-6"):
         told = command("info", file, "--set", f"drive.velocity={velocity}")[1]
-        assert "also of contacts that break out of step" in told
+        assert "for contacts that break out of step too" in told
     status, told, _ = command("info", file, "--set", "contacts.delay=0")
-    assert "is stable, as there is no delay" in told
+    assert "is linearly stable, as there is no delay" in told
     quantities = mesoslip.derived(klein())
     assert quantities["steady_growth_rate"].value == SteadySliding(klein()).growth_rate
     assert quantities["steady_frequency"].unit == "1/s"
@@ -250,7 +250,7 @@ def test_info_and_curve_tell_of_steady_sliding(klein, tmp_path, command):
         assert "steady_growth_rate" not in mesoslip.derived(klein(slider=slider))
 
 
-def test_what_leaves_the_range_of_numbers_is_told(klein):
+def test_overflow_is_reported(klein):
     """A mountain on a spring, driven at a metre in a second: no number, and no warning."""
     config = klein(
         drive__velocity=1.0,

@@ -51,7 +51,7 @@ def curve(
     """Force curve of the master equation, and its elastic instability."""
     from mesoslip.output import targets, writing
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
-    from mesoslip.theory.steady_sliding import steady_sliding, told_of_stiffness
+    from mesoslip.theory.steady_sliding import steady_sliding, stiffness_summary
 
     checked = load(config, changes)
     if output is not None:
@@ -69,8 +69,8 @@ def curve(
         typer.echo(force_curve.verdict)
         sliding = steady_sliding(checked, MOST_WORK)
         for told in (
-            None if sliding is None else sliding.told,
-            told_of_stiffness(checked, MOST_WORK),
+            None if sliding is None else sliding.summary,
+            stiffness_summary(checked, MOST_WORK),
         ):
             if told is not None:
                 typer.echo(told)

@@ -324,7 +324,7 @@ def with_steady_sliding(config: Config, curve: Theory) -> Theory:
     sliding = steady_sliding(config, MOST_WORK)
     if sliding is None:
         return curve
-    told = [curve.told, *([] if sliding.told is None else [sliding.told])]
+    told = [curve.told, *([] if sliding.summary is None else [sliding.summary])]
     numbers = (*curve.numbers, ("steady force", with_unit(sliding.force, "N", 4)))
     return replace(curve, told="; ".join(told), numbers=numbers)
 

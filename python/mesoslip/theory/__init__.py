@@ -1,1 +1,1 @@
-"""What theory says of a configuration, without simulating it."""
+"""Predictions for a configuration that need no simulation."""

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Panels and points of the rule over the configured thresholds, and how far it goes: what is left
-# out has the probability that a normal deviate is as far.
+# Panels and points of the quadrature over the configured thresholds, and the normal deviate that
+# has the probability of its limits.
 PANELS, POINTS = 80, 12
-FARTHEST = 8.0
+MAX_DEVIATE = 8.0
 
 
 def steady_force(config: Config, velocity: float) -> float:
@@ -72,7 +72,7 @@ def mean_life(config: Config, velocity: float) -> float:
 
 
 def restart_peak(config: Config, velocity: float, hold: float) -> float:
-    """Greatest force of a restart at the velocity before a hold, under a prescribed slider [N].
+    """Maximum force of a restart at the velocity before a hold, under a prescribed slider [N].
 
     Sliding at v leaves contacts whose displacements w since they attached are spread evenly up to
     the life l of each. Held for so long, a contact would break after a life of L instead, at the
@@ -81,7 +81,7 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
 
         F(y) = F(0) + y - <L max(0, y - (L - l))>/<l>,
 
-    whose greatest value is where <L; L - l < y> = <l>. It is exact for infinitely many contacts
+    whose maximum is where <L; L - l < y> = <l>. It is exact for infinitely many contacts
     without delay that do not weaken, as long as those that attach after the restart bear on to
     the peak: while it comes within the shortest lives.
 
@@ -107,7 +107,7 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
     held = speed * _lives(config, threshold, speed, hold)
     mean = float(weight @ life)
     # The force is concave in y, and straight between the displacements at which contacts start to
-    # break: the greatest one is at one of them.
+    # break: its maximum is at one of them.
     order = np.argsort(held - life)
     start = (held - life)[order]
     broken, moment = (np.cumsum((weight * one)[order]) for one in (held, held * (held - life)))
@@ -117,13 +117,13 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
 
 
 def _thresholds(config: Config) -> tuple[Array, Array]:
-    """Weights and points of a rule over the configured thresholds, relative to the mean."""
+    """Weights and points of a quadrature over the configured thresholds, relative to the mean."""
     contacts = config.contacts
     law = ThresholdLaw(
         contacts.threshold.law, contacts.threshold.relative_width, contacts.least_threshold
     )
     # Panels that a normal law would have of one width: narrow where a law is steep.
-    edges = law.quantile(special.ndtr(np.linspace(FARTHEST, -FARTHEST, PANELS + 1)))
+    edges = law.quantile(special.ndtr(np.linspace(MAX_DEVIATE, -MAX_DEVIATE, PANELS + 1)))
     point, share = np.polynomial.legendre.leggauss(POINTS)
     half = np.diff(edges)[:, None] / 2
     threshold = (edges[:-1, None] + half * (1 + point)).ravel()
@@ -149,10 +149,10 @@ def _lives(config: Config, configured: Array, speed: float, older: float = 0.0) 
     def gap(time: Array, threshold: Array) -> Array:
         return _threshold(config, threshold, older + time) - back - speed * time
 
-    longest = np.ones_like(configured) / speed
-    while np.any(gap(longest, configured) > 0):
-        longest = np.where(gap(longest, configured) > 0, 2 * longest, longest)
+    upper = np.ones_like(configured) / speed
+    while np.any(gap(upper, configured) > 0):
+        upper = np.where(gap(upper, configured) > 0, 2 * upper, upper)
     lives: Array = find_root(
-        gap, (np.zeros_like(longest), longest), args=(configured,), tolerances={"xrtol": 1e-14}
+        gap, (np.zeros_like(upper), upper), args=(configured,), tolerances={"xrtol": 1e-14}
     ).x
     return lives

@@ -12,8 +12,8 @@ from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.lives import scales
 from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
 
-# Work that the stability of steady sliding may take, about a tenth of a second.
-MOST_WORK = 10_000
+# Maximum work for the stability of steady sliding, about a tenth of a second.
+MAX_WORK = 10_000
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def derived(config: ConfigLike) -> dict[str, Derived]:
         for name, value, unit, meaning in (
             *_contacts(config),
             *config.slider.quantities(config),
-            *_stability(steady_sliding(config, MOST_WORK)),
+            *_stability(steady_sliding(config, MAX_WORK)),
             *_drive(config),
         )
         if math.isfinite(value)
@@ -51,41 +51,46 @@ def derived(config: ConfigLike) -> dict[str, Derived]:
 
 
 def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
-    """What a drive that is not one velocity amounts to."""
+    """Totals of a drive with more than one velocity."""
     parts = config.drive_parts
     if not config.drive.parts:
         return
     yield "drive_stages", float(parts[-1].stage + 1), "1", "stages of the drive in the run"
     yield "drive_duration", config.duration, "s", "duration of the run"
-    way = math.fsum(part.way for part in parts)
-    yield "drive_way", way, "m", "way of the drive, there and back both counted"
-    yield "drive_speed", config.drive_speed, "m/s", "speed that stands for the drive elsewhere"
+    length = math.fsum(part.way for part in parts)
+    yield "drive_path_length", length, "m", "path length of the drive, there and back both counted"
+    yield (
+        "drive_speed",
+        config.drive_speed,
+        "m/s",
+        "speed that represents the drive in the other quantities",
+    )
 
 
 def verdict(config: Config) -> str | None:
-    """What is known of the motion before it is run, and what is not; None without a spring."""
-    sliding = steady_sliding(config, MOST_WORK)
-    stability = None if sliding is None else sliding.told
-    told = [one for one in (_verdict_of_stiffness(config), stability) if one is not None]
-    return "\n".join(told) or None
+    """Predictions for the motion, and their limits; None without a spring."""
+    sliding = steady_sliding(config, MAX_WORK)
+    stability = None if sliding is None else sliding.summary
+    sentences = [one for one in (_verdict_of_stiffness(config), stability) if one is not None]
+    return "\n".join(sentences) or None
 
 
 def _stability(sliding: SteadySliding | None) -> Iterator[tuple[str, float, str, str]]:
-    """How small perturbations of steady sliding grow or die away, where that is found quickly."""
+    """Growth or decay of small perturbations of steady sliding, if it is found quickly."""
     if sliding is None:
         return
     yield (
         "steady_growth_rate",
         sliding.growth_rate,
         "1/s",
-        "growth of small perturbations of steady sliding at the drive's velocity, with delay; "
-        "below 0 they die away",
+        "growth rate of small perturbations of steady sliding at the drive's velocity, with delay; "
+        "negative: they decay",
     )
-    yield "steady_frequency", sliding.frequency, "1/s", "their frequency"
+    yield "steady_frequency", sliding.frequency, "1/s", "angular frequency of these perturbations"
 
 
 def _verdict_of_stiffness(config: Config) -> str | None:
-    """What the estimate of K* says of the spring, and what it does not; None without a spring."""
+    """The spring against the estimate of K*; None without a spring."""
     spring = config.spring_stiffness
     if not 0 < spring < math.inf:
         return None
@@ -97,8 +102,8 @@ def _verdict_of_stiffness(config: Config) -> str | None:
         )
     return (
         "K is below the estimate of K*: relaxed contacts lead to a first slip. This is necessary "
-        "for stick-slip, not sufficient: delay and ageing decide whether slips go on or die away; "
-        "mesoslip curve tells K* itself, a run the rest"
+        "for stick-slip, not sufficient: delay and ageing decide whether slips continue or decay. "
+        "mesoslip curve computes K*; only a run shows the motion"
     )
 
 
@@ -131,8 +136,8 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "K_star_estimate",
         contacts.stiffness * (1 - contacts.back_force_ratio) / width,
         "N/m",
-        "estimate of K*, above which slow sliding is smooth; softer springs may do, "
-        "see mesoslip curve; Nk (f_s - f_b)/Delta f_s (S48)",
+        "estimate of K*, above which slow sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48); "
+        "mesoslip curve computes K*, which may be smaller",
     )
     if config.interaction is not None:
         bond = config.bond_stiffness
@@ -142,13 +147,13 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
             "bond_ratio",
             bonds / stiffness,
             "1",
-            "that of all bonds of a contact over its own, G z/k",
+            "stiffness of all bonds of a contact over its own, G z/k",
         )
     yield from _lives(config) if contacts.ageing is None else _ageing(config, contacts.ageing)
 
 
 def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
-    """What follows from the lives of contacts, from attaching to breaking."""
+    """Averages over the lives of contacts, from attaching to breaking."""
     contacts = config.contacts
     static, stiffness = contacts.contact_static_force, contacts.contact_stiffness
     lives = scales(config)
@@ -175,9 +180,8 @@ def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
 
 
 def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, str]]:
-    """What follows from the lives of contacts that age: of the young, of the old, and at the
-    velocity of the drive."""
-    # With scipy, which takes long to import.
+    """Averages over the lives of contacts that age: young, old, and at the drive's velocity."""
+    # scipy takes long to import.
     from mesoslip.theory.ageing import mean_life, steady_force
 
     contacts, width = config.contacts, config.contacts.threshold.relative_width
@@ -192,7 +196,7 @@ def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, s
         "young_relative_width",
         float((strongest - weakest) / (2 * mean)),
         "1",
-        "standard deviation over mean of their thresholds then, before any is rejected",
+        "relative standard deviation of the thresholds at attachment, before any is rejected",
     )
     yield (
         "ageing_velocity",

@@ -1,8 +1,9 @@
 """The force curve of the master equation, F(X), and the elastic instability it leads to.
 
 Slow forward sliding of infinitely many contacts, for which the delay does not matter: a renewal
-equation, solved by collocation of high order (``fortran/renewal.f90``) on panels that are halved
-until the force no longer changes. Sources: Braun's "Stick-slip kinetics", Eqs. S42, S43, S48.
+equation, solved by collocation of high order (``fortran/theory/renewal.f90``) on panels that are
+halved until the force no longer changes. Sources: Braun's "Stick-slip kinetics", Eqs. S42, S43,
+S48.
 """
 
 from __future__ import annotations
@@ -38,39 +39,39 @@ Array = NDArray[np.float64]
 POINTS = 12
 # Width of the first panels over the spread of the break stretches.
 FIRST_WIDTH = 0.7
-# Multiplications that a finer solution may take, which is about a second.
-MOST_WORK = 2e9
-# A force that falls by less than this part of F_s, or than its error, is not said to fall.
-LEAST_FALL = 1e-11
-# A curve that ends closer to the stationary force than this part of it has come to it.
+# Maximum multiplications of a finer solution, which take about a second.
+MAX_WORK = 2e9
+# A force counts as falling if it falls by more than this fraction of F_s, and than its error.
+MIN_FALL = 1e-11
+# A curve has reached the stationary force if it ends within this fraction of it.
 ARRIVED = 0.01
-# Panels that fit into memory.
-MOST_PANELS = 4_000_000
+# Maximum number of panels, which fit into memory.
+MAX_PANELS = 4_000_000
 
 
-# Units and meanings of what a curve is summed up in.
+# Units and meanings of the summary of a curve.
 SUMMARY = {
     "K_star": (
         "N/m",
-        "greatest -F'(X), K*: slow sliding is smooth with a stiffer spring, and may be with a "
+        "K* = max(-F'(X)): slow sliding is smooth with a stiffer spring, and may be with a "
         "softer one; 0 if the force does not fall",
     ),
-    "K_star_displacement": ("m", "where that is"),
+    "K_star_displacement": ("m", "displacement at K*"),
     "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
     "stable": ("1", "whether K >= K*, so that slow sliding has no instability"),
     "X_c": ("m", "displacement at which the slider becomes unstable, lowest F'(X) = -K"),
-    "F_c": ("N", "force there"),
-    "F_peak": ("N", "greatest force; none if the force does not fall"),
-    "X_peak": ("m", "where that is"),
+    "F_c": ("N", "force at X_c"),
+    "F_peak": ("N", "maximum force; none if the force does not fall"),
+    "X_peak": ("m", "displacement at the maximum force"),
     "F_steady": ("N", "force of stationary slow sliding"),
     "D0": ("1", "F(X_c)/F_s"),
     "D1": ("1", "v_d (K M)^(1/2)/F_s"),
     "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
     "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
     "error": ("1", "estimated error of the force over F_s"),
-    "slope_error": ("1", "estimated error of its slope over Nk"),
-    "digits": ("1", "digits of the force that are certain"),
-    "conservation_error": ("1", "largest error of the number of contacts, relative"),
+    "slope_error": ("1", "estimated error of the slope over Nk"),
+    "digits": ("1", "reliable digits of the force"),
+    "conservation_error": ("1", "maximum relative error of the number of contacts"),
 }
 
 
@@ -158,15 +159,15 @@ class ForceCurve:
     Parameters
     ----------
     config
-        What contacts there are; the table ``curve`` says how far and how exactly.
+        The contacts; the table ``curve`` has the length of the curve and its tolerance.
 
     Attributes
     ----------
     error, slope_error
-        Estimated errors of the force over F_s and of its slope over Nk: what changed in the last
-        halving of the panels, which is more than what the result still lacks.
+        Estimated errors of the force over F_s and of its slope over Nk: the change in the last
+        halving of the panels, an upper estimate.
     conservation_error
-        Largest deviation of the number of contacts from 1.
+        Maximum deviation of the number of contacts from 1.
     panels, kernel_seconds
         Panels of the result; computing time of all solutions together.
 
@@ -209,14 +210,14 @@ class ForceCurve:
         while True:
             begin = time.perf_counter()
             panels = math.ceil((length - start) / width)
-            if panels > MOST_PANELS:
+            if panels > MAX_PANELS:
                 raise ConfigError(
                     [
                         Problem(
                             "",
                             "curve.length",
                             f"needs {panels:.1e} steps of the spread of the breaking stretches, of "
-                            f"which there may be {MOST_PANELS:.0e}: choose a shorter curve or a "
+                            f"which there may be {MAX_PANELS:.0e}: choose a shorter curve or a "
                             "wider threshold law",
                             self.length,
                         )
@@ -241,7 +242,7 @@ class ForceCurve:
     def _is_too_much(self, panels: int, width: float) -> bool:
         """Whether a solution would take too much work."""
         band = min(panels, (self.scales.longest - self.scales.shortest) / width + 3)
-        return panels * band * POINTS * (3 + 2 * POINTS) > MOST_WORK
+        return panels * band * POINTS * (3 + 2 * POINTS) > MAX_WORK
 
     def _first_panels(self, length: float) -> tuple[float, float]:
         """Start and width of the panels, with their edges where the density is discontinuous."""
@@ -252,7 +253,7 @@ class ForceCurve:
         width = min(FIRST_WIDTH * spread, length)
         scales = self.scales
         # The first generation breaks between two displacements, the next ones after lives of at
-        # least the shortest; the width is a whole part of what lies between discontinuities.
+        # least the shortest; the width divides the distance between discontinuities.
         period = 0.0
         if self.config.contacts.initial == "uniform":
             period = scales.first_shortest
@@ -323,10 +324,10 @@ class ForceCurve:
         nodes = np.concatenate([[0.0], nodes[nodes > 0]])
         return self._stretch * nodes[nodes * self._stretch <= self.length]
 
-    def _extreme(self, function: Callable[[Array], Array], place: int) -> tuple[float, float]:
-        """Place and value of the minimum of a function next to one of the samples."""
-        low = self.samples[max(place - 1, 0)]
-        high = self.samples[min(place + 1, len(self.samples) - 1)]
+    def _extreme(self, function: Callable[[Array], Array], sample: int) -> tuple[float, float]:
+        """Displacement and value of the minimum of a function next to one of the samples."""
+        low = self.samples[max(sample - 1, 0)]
+        high = self.samples[min(sample + 1, len(self.samples) - 1)]
         scale = self._stretch
         found = optimize.minimize_scalar(
             lambda x: float(function(x * scale)),
@@ -339,30 +340,30 @@ class ForceCurve:
 
     @cached_property
     def K_star(self) -> tuple[float, float]:  # noqa: N802
-        """K* = max(-F'(X)) [N/m] and where it is [m]: slow sliding is smooth with a stiffer spring.
+        """K* = max(-F'(X)) [N/m] and its displacement [m]: a stiffer spring slides smoothly.
 
-        A force that does not fall flattens out for ever, so that K* is 0, at infinity. So it is of
-        lives the likelier to end the younger they are: wide laws whose density diverges at 0, or
-        the exponential one (M. Brown, Ann. Probab. 8 (1980) 227: ages grow with the displacement).
+        A force that does not fall flattens out for ever, so that K* is 0, at infinity. That is so
+        for lives the likelier to end the younger they are: wide laws whose density diverges at 0,
+        or the exponential one (M. Brown, Ann. Probab. 8 (1980) 227: ages grow with displacement).
         """
         if not self.falls:
             return 0.0, math.inf
-        place = int(np.argmin(self.slope(self.samples)))
-        displacement, slope = self._extreme(self.slope, place)
+        sample = int(np.argmin(self.slope(self.samples)))
+        displacement, slope = self._extreme(self.slope, sample)
         return -slope, displacement
 
     @cached_property
     def falls(self) -> bool:
-        """Whether the force falls anywhere on the curve, by more than it may be wrong."""
+        """Whether the force falls anywhere on the curve by more than its error."""
         force = self.force(self.samples)
         fall = np.max(np.maximum.accumulate(force) - force) / self._force_unit
-        return bool(fall > max(self.error, LEAST_FALL))
+        return bool(fall > max(self.error, MIN_FALL))
 
     @cached_property
     def peak(self) -> tuple[float, float]:
-        """Greatest force of the curve [N] and where it is [m]; its end if the force only rises."""
-        place = int(np.argmax(self.force(self.samples)))
-        displacement, force = self._extreme(lambda x: -self.force(x), place)
+        """Maximum force [N] and its displacement [m]; the curve's end if the force only rises."""
+        sample = int(np.argmax(self.force(self.samples)))
+        displacement, force = self._extreme(lambda x: -self.force(x), sample)
         return -force, displacement
 
     @property
@@ -377,33 +378,33 @@ class ForceCurve:
 
     @property
     def verdict(self) -> str:
-        """What the curve says of the configured spring, and what it does not say."""
+        """Conclusions for the configured spring, and their limits."""
         sentences = []
         if not self.falls:
             sentences.append("the force does not fall: it has no peak, and K* = 0")
         if self._ends_early:
             sentences.append(
-                "the curve ends before the force is stationary, and K* is of no more than the "
-                "curve: choose a longer curve.length"
+                "the curve ends before the force is stationary, so that K* may be larger: choose a "
+                "longer curve.length"
             )
         if math.isinf(self._spring):
             sentences.append("the slider follows the drive, so it has no instability")
         elif self.stable:
             sentences.append(
-                "K >= K*: in slow sliding from this start there is no instability; of fast "
-                "sliding, where delay and ageing weaken the contacts, the curve says nothing"
+                "K >= K*: slow sliding from this start has no instability. The curve does not "
+                "apply to fast sliding, where delay and ageing weaken the contacts"
             )
         else:
             sentences.append(
                 "K < K*: the slider becomes unstable at X_c, where the first slip starts. This is "
-                "necessary for stick-slip, not sufficient: whether slips go on or die away into "
-                "smooth sliding is decided by delay and ageing, which the curve does not know"
+                "necessary for stick-slip, not sufficient: delay and ageing, which are not part of "
+                "the curve, decide whether slips continue or decay into smooth sliding"
             )
         return "; ".join(sentences)
 
     @property
     def _ends_early(self) -> bool:
-        """Whether what the curve does not show may change K*."""
+        """Whether the force beyond the end of the curve may change K*."""
         if self.falls:
             return bool(self.K_star[1] > self.samples[-3])
         end = float(self.force(self.samples[-1]))
@@ -422,8 +423,8 @@ class ForceCurve:
         changes = np.flatnonzero(np.diff(np.sign(excess)) != 0)
         scale = self._stretch
         points = []
-        for place in changes:
-            low, high = samples[place : place + 2] / scale
+        for first in changes:
+            low, high = samples[first : first + 2] / scale
             root = optimize.brentq(
                 lambda x: float(self.slope(x * scale)) + spring, low, high, xtol=1e-15
             )
@@ -446,10 +447,10 @@ class ForceCurve:
         )
 
     def stretch_density(self, stretch: ArrayLike, displacement: float) -> tuple[Array, float]:
-        """Q(x; X) [1/m] at stretches x [m], and the part of contacts that are all at x = X.
+        """Q(x; X) [1/m] at stretches x [m], and the fraction of contacts that are all at x = X.
 
-        The second is not zero after a relaxed start, as long as some of the first generation are
-        left. The integral of the first and the second are 1 together.
+        The fraction is not zero after a relaxed start while some of the first generation remain.
+        The integral of the density and the fraction add up to 1.
         """
         contacts = self.config.contacts
         law = ThresholdLaw(
@@ -507,7 +508,7 @@ class ForceCurve:
                 density = rate * law.survival(lowest)
                 acceptance += part * float(law.survival(back + shift))
             else:
-                # Of an age between 0 and X are those with x_b(u) between gap and gap - X.
+                # Ages between 0 and X belong to x_b(u) between gap and gap - X.
                 lower, upper = (
                     np.where(edge > 0, (back / np.maximum(edge, 1e-9)) ** 2, np.inf)
                     for edge in (gap, gap - moved)
@@ -515,8 +516,8 @@ class ForceCurve:
                 lower = np.maximum(np.where(gap > 0, lower, np.inf), lowest)
 
                 def attached(threshold: Array, gap: Array = gap) -> Array:
-                    place = moved - gap[:, None] + back / np.sqrt(threshold)
-                    rate: Array = np.nan_to_num(breaks(place))
+                    birth = moved - gap[:, None] + back / np.sqrt(threshold)
+                    rate: Array = np.nan_to_num(breaks(birth))
                     return rate
 
                 density = self._average_between(law, lower, np.maximum(lower, upper), attached)
@@ -546,10 +547,10 @@ class ForceCurve:
         return np.zeros_like(x)
 
     def to_tree(self) -> xr.DataTree:
-        """The curve and its instability as an output file holds them.
+        """The curve and its instability in the layout of an output file.
 
         Root: F, F', K_c and Γ over ``displacement``, with V_eff if a drive displacement is given;
-        what follows from them as attributes. Groups: ``critical`` (all X_c), ``stretch_density``
+        derived quantities as attributes. Groups: ``critical`` (all X_c), ``stretch_density``
         (Q at the displacements asked for).
         """
         x = self.samples
@@ -590,8 +591,8 @@ class ForceCurve:
         """Q(x; X) at the displacements that the configuration asks for."""
         width = self.newborn_width / self._stretch
         back = self.config.contacts.back_force_ratio
-        least, most = min(0.0, back - 6 * width), self.scales.longest + back
-        x = self._stretch * np.linspace(least, most, 2001)
+        low, high = min(0.0, back - 6 * width), self.scales.longest + back
+        x = self._stretch * np.linspace(low, high, 2001)
         at = np.array(self.config.curve.density_at)
         densities, atoms = zip(*(self.stretch_density(x, one) for one in at), strict=True)
         dimensions = ("density_displacement", "stretch")
@@ -610,19 +611,19 @@ class ForceCurve:
         )
 
     def summary(self) -> dict[str, float | bool | None]:
-        """What is to be known of the curve, in SI units; None for what does not exist.
+        """Derived quantities of the curve in SI units; None for those that do not exist.
 
         ``X_c`` and ``D0``, ``D2``, ``D3`` belong to the lowest solution of F'(X) = -K, which does
         not exist if sliding is stable; ``D1`` needs a drive that moves and a slider with a mass. A
-        force that does not fall has neither ``F_peak`` nor a place of K*, which is 0.
+        force that does not fall has neither ``F_peak`` nor a displacement at K*, which is 0.
         """
         critical = self.critical_points[0] if self.critical_points else None
         contacts = self.config.contacts
-        force, force_place = self.peak
-        stiffness, stiffness_place = self.K_star
+        force, peak_displacement = self.peak
+        stiffness, stiffness_displacement = self.K_star
         return {
             "K_star": stiffness,
-            "K_star_displacement": stiffness_place if self.falls else None,
+            "K_star_displacement": stiffness_displacement if self.falls else None,
             "K_star_estimate": contacts.stiffness
             * (1 - contacts.back_force_ratio)
             / contacts.threshold.relative_width,
@@ -630,7 +631,7 @@ class ForceCurve:
             "X_c": critical.displacement if critical else None,
             "F_c": critical.force if critical else None,
             "F_peak": force if self.falls else None,
-            "X_peak": force_place if self.falls else None,
+            "X_peak": peak_displacement if self.falls else None,
             "F_steady": self.steady_force,
             "D0": critical.D0 if critical else None,
             "D1": self.config.slider.loading_rate(self.config),

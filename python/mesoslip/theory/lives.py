@@ -26,7 +26,7 @@ class Scales(NamedTuple):
 
 
 def law_parameters(config: Config, newborn_width: float = 0.0) -> dict[str, float | str]:
-    """What the kernels of the master equation are told of contacts; ``newborn_width`` in m."""
+    """Contact parameters for the kernels of the master equation; ``newborn_width`` in m."""
     contacts = config.contacts
     return {
         **contacts.threshold.kernel_parameters,

@@ -28,17 +28,17 @@ Array = NDArray[np.float64]
 LAWS = ("ageing", "slip")
 
 UNSTABLE = (
-    "the motion of the spring and slider cannot be followed: it is unstable, or its parameters are "
-    "out of any scale"
+    "the motion of the spring and slider cannot be integrated: it is unstable, or its parameters "
+    "are out of range"
 )
 
-# Steps of the integration between two times, at most.
-MOST_STEPS = 20_000
-# Logarithm of a velocity over V_0 that no motion reaches but one that is unstable without a mass.
+# Maximum number of integration steps between two times.
+MAX_STEPS = 20_000
+# Logarithm of a velocity over V_0 that only an unstable motion without mass reaches.
 RUNAWAY = 40.0
-# Exponents that trial steps of the integration are held at, before they overflow.
-LARGEST_EXPONENT = 100.0
-# Integration's tolerance, relative, and absolute in logarithms of velocity and state.
+# Maximum exponent in trial steps of the integration, so that nothing overflows.
+MAX_EXPONENT = 100.0
+# Tolerance of the integration: relative, and absolute for logarithms of velocity and state.
 TOLERANCE = 1e-10
 
 
@@ -90,12 +90,12 @@ class Loading:
 
 @dataclass(frozen=True)
 class Motion:
-    """What the slider does, each of the shape of the times that were asked for.
+    """Motion of the slider, each array with the shape of the requested times.
 
     Attributes
     ----------
     force
-        Force of the spring, in the unit of the law's. NaN where a rigid drive holds still.
+        Force of the spring, in the unit of the law. NaN where a rigid drive holds still.
     velocity
         Velocity of the slider [m/s].
     state
@@ -120,9 +120,9 @@ def spring_slider(
     mass: float = 0.0,
     tolerance: float = TOLERANCE,
 ) -> Motion:
-    """Follow a slider on a spring through stages of its load point, from steady sliding on.
+    """Integrate a slider on a spring through stages of its load point, from steady sliding on.
 
-    The logarithms of velocity and state are integrated by LSODA, which is stiff where it must be;
+    The logarithms of velocity and state are integrated by LSODA, which switches to a stiff method;
     without mass k (X_lp - X) = F + η V gives (a + η V) d ln V/dt = k (V_lp - V) - b d ln θ/dt.
 
     Parameters
@@ -130,15 +130,14 @@ def spring_slider(
     law
         The law of friction.
     stages
-        Stages of the load point one after another; the first starts with steady sliding at its
-        velocity.
+        Consecutive stages of the load point; the first starts with steady sliding at its velocity.
     times
         Times in ascending order, from the start of the first stage on [s].
     stiffness
-        k of the spring, unit of force over metre; infinite for a slider that goes where the load
-        point goes.
+        k of the spring, unit of force over metre; infinite for a slider that moves with the
+        load point.
     damping
-        η of a damping (as by radiation), unit of force times s/m.
+        η of viscous damping (such as radiation damping), unit of force times s/m.
     mass
         Mass of the slider, unit of force times s²/m; 0 for motion without inertia.
     tolerance
@@ -149,7 +148,7 @@ def spring_slider(
     ValueError
         If the first stage does not slide, the load point goes back, or a is not positive.
     RunError
-        If the motion cannot be followed: without mass, that is where it is unstable.
+        If the motion cannot be integrated, such as an unstable one without mass.
     """
     if not stages or stages[0].start_velocity <= 0:
         raise ValueError("the first stage must slide")
@@ -167,7 +166,7 @@ def spring_slider(
     if not is_rigid:
         at.append(force if mass > 0 else 0.0)
     velocity, logarithm, displacement, load = (np.full(times.shape, np.nan) for _ in range(4))
-    begin = way = 0.0
+    begin = load_point = 0.0
     for number, stage in enumerate(stages):
         last = number == len(stages) - 1
         end = begin + stage.duration
@@ -180,7 +179,7 @@ def spring_slider(
         here = slice(first, after)
         there = slice(1, 1 + inside.size)
         driven = stage.start_velocity + acceleration * inside
-        moved = way + (stage.start_velocity + 0.5 * acceleration * inside) * inside
+        moved = load_point + (stage.start_velocity + 0.5 * acceleration * inside) * inside
         if is_rigid:
             velocity[here], logarithm[here], displacement[here] = driven, path[there, 0], moved
         else:
@@ -190,12 +189,12 @@ def spring_slider(
             if mass > 0:
                 load[here] = path[there, 3]
         at = list(path[-1])
-        # What a trial step of the integration alone has gone there is nothing.
+        # A short excursion belongs to a trial step of the integration.
         if not is_rigid and mass == 0:
             if at[3] > law.slip_distance:
                 raise RunError(UNSTABLE)
             at[3] = 0.0
-        way += 0.5 * (stage.start_velocity + stage.end_velocity) * stage.duration
+        load_point += 0.5 * (stage.start_velocity + stage.end_velocity) * stage.duration
         begin = end
     if is_rigid or mass == 0:
         slides = velocity > 0
@@ -206,11 +205,11 @@ def spring_slider(
 
 
 def _evolution(law: RateAndState) -> Any:
-    """d ln θ/dt of a velocity over V_0, its logarithm, and ln(V_0 θ/D_c)."""
+    """d ln θ/dt as a function of V/V_0, its logarithm, and ln(V_0 θ/D_c)."""
     rate = law.reference_velocity / law.slip_distance
 
     def ageing(velocity: float, _: float, state: float) -> float:
-        return rate * (math.exp(min(-state, LARGEST_EXPONENT)) - velocity)
+        return rate * (math.exp(min(-state, MAX_EXPONENT)) - velocity)
 
     def slip(velocity: float, logarithm: float, state: float) -> float:
         return -rate * velocity * (logarithm + state)
@@ -219,7 +218,7 @@ def _evolution(law: RateAndState) -> Any:
 
 
 def _rigid(law: RateAndState) -> Any:
-    """The state under a velocity that is given."""
+    """The state under a prescribed velocity."""
     evolution, reference = _evolution(law), law.reference_velocity
 
     def derivative(time: float, at: Array, start: float, acceleration: float) -> list[float]:
@@ -231,14 +230,14 @@ def _rigid(law: RateAndState) -> Any:
 
 
 def _on_spring(law: RateAndState, stiffness: float, damping: float, mass: float) -> Any:
-    """ln V/V_0, ln V_0 θ/D_c, the slider's displacement; with a mass the spring's force, without
-    one how far the slider ran away."""
+    """ln V/V_0, ln V_0 θ/D_c, the slider's displacement; with a mass the spring force, without one
+    the displacement at runaway velocity."""
     evolution, reference, a, b = _evolution(law), law.reference_velocity, law.a, law.b
     force_0 = law.reference_force
 
     def derivative(time: float, at: Array, start: float, acceleration: float) -> list[float]:
         logarithm, state = at[0], at[1]
-        ratio = math.exp(min(logarithm, LARGEST_EXPONENT))
+        ratio = math.exp(min(logarithm, MAX_EXPONENT))
         velocity = reference * ratio
         change = evolution(ratio, logarithm, state)
         loading = stiffness * (start + acceleration * time - velocity)
@@ -259,10 +258,10 @@ def _integrate(
     acceleration: float,
     tolerance: float,
 ) -> Array:
-    """A stage from its start on, shape (times, variables)."""
+    """Integrate one stage; shape (times, variables)."""
     from scipy.integrate import ODEintWarning, odeint
 
-    # Displacements are small in metres: what matters of them is their change, which is smooth.
+    # Displacements are small in metres: their tolerance is relative to their change.
     absolute = np.full(len(at), tolerance)
     absolute[2:] = 0.0
     if len(at) > 2:
@@ -273,7 +272,7 @@ def _integrate(
         absolute[3] = tolerance * abs(at[3]) or math.inf
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", ODEintWarning)
-        path, told = odeint(
+        path, report = odeint(
             system,
             at,
             times,
@@ -281,10 +280,10 @@ def _integrate(
             tfirst=True,
             rtol=tolerance,
             atol=absolute,
-            mxstep=MOST_STEPS,
+            mxstep=MAX_STEPS,
             full_output=True,
         )
-    if told["message"] != "Integration successful." or not np.all(np.isfinite(path)):
+    if report["message"] != "Integration successful." or not np.all(np.isfinite(path)):
         raise RunError(UNSTABLE)
     result: Array = path
     return result

@@ -1,14 +1,14 @@
 """The onset of slip: contacts that break one after another, or a film that melts at once.
 
 Eqs. S46 and S47 of Braun's "Stick-slip kinetics" in the dimensionless displacement
-x = K (X - X_c)/F_s and time τ = Ω_S (t - t_c), integrated by CVODE (``fortran/onset.f90``).
+x = K (X - X_c)/F_s and time τ = Ω_S (t - t_c), integrated by CVODE (``fortran/theory/onset.f90``).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -22,15 +22,12 @@ from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
 from mesoslip.theory.force_curve import ForceCurve
 
-if TYPE_CHECKING:
-    pass
-
 Array = NDArray[np.float64]
 
-# Units and meanings of what the onset is summed up in.
+# Units and meanings of the summary of the onset.
 SUMMARY = {
     "stable": ("1", "whether K >= K*, so that slow sliding has no onset of slip"),
-    "K_star": ("N/m", "spring constant above which it has none"),
+    "K_star": ("N/m", "spring constant above which there is no onset"),
     "X_c": ("m", "displacement at the onset"),
     "D0": ("1", "F(X_c)/F_s"),
     "D1": ("1", "v_d (K M)^(1/2)/F_s"),
@@ -38,22 +35,22 @@ SUMMARY = {
     "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
     "alpha": (
         "1",
-        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; the source says 2.21 of "
-        "Klein's case, for which this is 14.2",
+        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; the source gives 2.21 for "
+        "Klein's case, where this is 14.2",
     ),
     "slip_time_sequential": ("s", "slip time of sequential breaking"),
     "B": ("1", "(D0 - eta D1/Omega_S)/2: the spring force drops by B tau^2 F_s as the film melts"),
     "beta": ("1", "B^(-1/2), slip time of instant melting times Omega_S"),
     "slip_time_melting": ("s", "slip time of instant melting"),
     "expansion_end": ("1", "x at which S46 no longer describes the contacts"),
-    "expansion_end_time": ("1", "tau at which it comes there"),
+    "expansion_end_time": ("1", "tau at which x reaches that value"),
 }
 
 EQUATIONS = ("sequential", "melting")
-# S46 describes the contacts as long as its force is off by less than this part of F_s.
+# S46 describes the contacts while its force differs by less than this fraction of F_s.
 EXPANSION_ERROR = 0.02
 TOLERANCE = 1e-10
-MOST_SAMPLES = 50_000
+MAX_SAMPLES = 50_000
 # Samples in the time scale of an equation.
 SAMPLES = 200
 
@@ -69,8 +66,8 @@ class Onset:
     force_drop
         ΔF_d/F_s = D1 τ - x, negative: the change of the spring force.
     ended
-        Whether the solution came to its end: S46 to where its expansion does, S47 to the least
-        spring force.
+        Whether the solution reached its end: S46 the end of its expansion, S47 the minimum spring
+        force.
     """
 
     time: Array
@@ -95,7 +92,7 @@ def solve(
     Parameters
     ----------
     equation
-        Which one.
+        The equation.
     coefficients
         D0 to D3; S46 does not need the first, S47 the last two.
     damping, drag
@@ -103,7 +100,7 @@ def solve(
     end_displacement
         x at which S46 ends.
     interval
-        Interval of the samples in τ; by default a small part of the equation's time scale.
+        Interval of the samples in τ; by default a small fraction of the equation's time scale.
 
     Raises
     ------
@@ -116,7 +113,7 @@ def solve(
         if equation == "sequential":
             scale = min(1.0, (d_1 * max(d_2, 1.0)) ** -0.2, 4 * end_displacement / d_1)
         interval = scale / SAMPLES
-    samples = np.zeros((4, MOST_SAMPLES), order="F")
+    samples = np.zeros((4, MAX_SAMPLES), order="F")
     count, ended, status, message = _core.onset(
         equation,
         np.array(coefficients),
@@ -136,7 +133,7 @@ def solve(
 def end_of_expansion(curve: ForceCurve) -> float:
     """Displacement from X_c [m] at which the expansion of F about X_c no longer describes it.
 
-    It is off by `EXPANSION_ERROR` of F_s there, unless the curve ends before.
+    It differs by `EXPANSION_ERROR` of F_s there, unless the curve ends before.
     """
     critical = curve.critical_points[0]
     spring = curve.config.spring_stiffness
@@ -156,9 +153,9 @@ def end_of_expansion(curve: ForceCurve) -> float:
     beyond = np.flatnonzero(excess(x) > 0)
     if beyond.size == 0:
         return float(x[-1])
-    place = int(beyond[0])
-    low = float(x[place - 1]) if place > 0 else 0.0
-    return float(optimize.brentq(excess, low, float(x[place]), xtol=1e-15 * float(x[-1])))
+    first = int(beyond[0])
+    low = float(x[first - 1]) if first > 0 else 0.0
+    return float(optimize.brentq(excess, low, float(x[first]), xtol=1e-15 * float(x[-1])))
 
 
 def onset(config: ConfigLike) -> xr.DataTree:
@@ -168,7 +165,7 @@ def onset(config: ConfigLike) -> xr.DataTree:
     -------
     xarray.DataTree
         Groups ``sequential`` (S46) and ``melting`` (S47) with dimension ``time``; attributes: the
-        coefficients, the slip times of both and how they end. Without groups if sliding is stable.
+        coefficients, the slip times of both and their endings. Without groups if sliding is stable.
 
     Raises
     ------
@@ -204,7 +201,7 @@ def onset(config: ConfigLike) -> xr.DataTree:
     solutions = {
         "sequential": solve("sequential", coefficients, damping=damping, end_displacement=end)
     }
-    # A film that drags with more than D0 at the velocity of the drive does not let the force drop.
+    # The force does not drop if the drag of the film at the velocity of the drive exceeds D0.
     drops = coefficients[0] > drag * coefficients[1]
     if drops:
         solutions["melting"] = solve("melting", coefficients, damping=damping, drag=drag)
@@ -212,14 +209,14 @@ def onset(config: ConfigLike) -> xr.DataTree:
         "omega_s": omega,
         "expansion_end": end,
         "expansion_end_time": float(solutions["sequential"].time[-1]),
-        "comment": "S46 ends where its expansion of the force is off by "
+        "comment": "S46 ends where its expansion of the force differs by "
         f"{EXPANSION_ERROR:g} of the static force"
-        + ("" if solutions["sequential"].ended else "; it did not come to that")
+        + ("" if solutions["sequential"].ended else "; it did not reach that")
         + (
-            "; S47 has no solution with a drop, as the film drags with more than D0"
+            "; S47 has no solution with a drop, as the drag of the film exceeds D0"
             if not drops
-            else "; S47 ends at the least spring force"
-            + ("" if solutions["melting"].ended else ", but did not come to that")
+            else "; S47 ends at the minimum spring force"
+            + ("" if solutions["melting"].ended else ", but did not reach it")
         )
         + f"; {curve.verdict}",
     }

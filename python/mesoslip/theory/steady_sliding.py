@@ -1,4 +1,4 @@
-"""Linear stability of steady sliding with delay: does a small perturbation grow or die away?
+"""Linear stability of steady sliding with delay: does a small perturbation grow or decay?
 
 The master equation under a slider that moves with v t + ε e^(λt). The response of the contacts is
 
@@ -31,43 +31,42 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Panels over the lives, and points of each: a law is a polynomial in each panel.
 PANELS, POINTS = 100, 10
-# Probability that is left out at either end of a law.
+# Probability beyond either end of the quadrature over a threshold law.
 LEFT_OUT = 1e-16
-# Points of the path along which roots are counted for each turn of its fastest factor, greatest
-# change of the argument between two of them, and how often an interval may be halved.
+# Points of the path along which roots are counted, for each turn of its fastest factor; maximum
+# change of the argument between two of them, and maximum number of halvings of an interval.
 POINTS_A_TURN = 10
-LARGEST_TURN = 0.8
-MOST_HALVINGS = 40
-# Angle by which the slider's function may differ from its leading power where the path ends.
+MAX_TURN = 0.8
+MAX_HALVINGS = 40
+# Maximum angle between the slider's function and its leading power where the path ends.
 UNLIKE_POWER = 0.3
-# Points of the path that are not exceeded.
-MOST_POINTS = 400_000
+# Maximum number of points of the path.
+MAX_POINTS = 400_000
 # Arguments beyond which integrals of a panel come from a recurrence, and points of the rule that
 # they come from otherwise, which is exact to rounding there.
 LARGE, QUADRATURE_POINTS = 12.0, 26
-# Growth below this part of the frequency of the slider is none.
+# Growth rate over the frequency of the slider below which a perturbation does not grow, and its
+# maximum.
 NO_GROWTH = 1e-7
-# Growth that is not exceeded, over that frequency.
-FASTEST = 1e6
+MAX_GROWTH = 1e6
 # Steps of Newton's method, and relative change at which a root is found.
 STEPS, ROOT_TOLERANCE = 25, 1e-10
 # Imaginary part over the absolute value below which a root is real.
 REAL = 1e-9
-# Candidates for roots that are followed.
-MOST_CANDIDATES = 40
+# Maximum number of starts of Newton's method on the path.
+MAX_CANDIDATES = 40
 
 # Relative width of thresholds with which contacts do not break in step.
 OUT_OF_STEP = 0.5
 
-# Springs of which the least one is looked for with which sliding is stable, over the stiffness of
-# all contacts.
-STIFFEST, SOFTEST = 16.0, 1e-4
-# Layers whose frequencies the points of the path still tell apart.
-MOST_LAYERS = 16
+# Range of spring stiffnesses over that of all contacts in which the stable ones are sought.
+MAX_STIFFNESS, MIN_STIFFNESS = 16.0, 1e-4
+# Maximum number of layers whose frequencies the points of the path resolve.
+MAX_LAYERS = 16
 
 WITHOUT_AGEING = (
-    "has no linear stability here: contacts that age break at times that depend on how the slider "
-    "moved, so that the response has no such closed form; runs tell"
+    "has no linear stability theory here: contacts that age break at times that depend on the "
+    "history of the motion, so that the response has no closed form; only runs show the motion"
 )
 
 
@@ -103,7 +102,7 @@ class Transforms(NamedTuple):
 
 
 class SteadySliding:
-    """Steady sliding of a configuration, and what becomes of small perturbations of it.
+    """Steady sliding of a configuration, and the growth of small perturbations of it.
 
     The contacts are those of the master equation, N → ∞, with delay, back force and drag, without
     interaction.
@@ -111,7 +110,7 @@ class SteadySliding:
     Parameters
     ----------
     config
-        What slides.
+        The configuration.
     velocity
         Velocity [m/s]; that of the drive by default.
     relative_width
@@ -138,8 +137,8 @@ class SteadySliding:
             problems.append(
                 Problem("", "contacts.reattach", "without it there is no steady sliding", False)
             )
-        if config.slider.layer_count > MOST_LAYERS:
-            message = f"linear stability is found for at most {MOST_LAYERS}"
+        if config.slider.layer_count > MAX_LAYERS:
+            message = f"linear stability is found for at most {MAX_LAYERS}"
             problems.append(Problem("", "slider.layers", message, config.slider.layer_count))
         self.velocity = abs(config.drive_speed if velocity is None else velocity)
         if not 0 < self.velocity < math.inf:
@@ -289,7 +288,7 @@ class SteadySliding:
         return _Parts(fed, births, free, np.abs(transforms.life * late))
 
     def _characteristic(self, rate: Complex) -> tuple[Complex, Complex]:
-        """An entire function with the roots of Z + Λ, over λ; and what it has too many of, over λ.
+        """An entire function with the roots of Z + Λ, over λ; and one with its extra roots, over λ.
 
         The second one is 1 - ψ e^(-λ τ_d), whose roots are those of the contacts alone, all of them
         with a negative real part but for that at 0.
@@ -317,20 +316,20 @@ class SteadySliding:
 
     @cached_property
     def _path(self) -> Array:
-        """Frequencies along which the argument of the characteristic function is followed."""
+        """Frequencies along which the argument of the characteristic function is computed."""
         lives = self.lives
         turn = lives.mean_life / self._rate + self.delay
-        # Beyond the last frequency the slider outweighs whatever the contacts answer.
+        # Beyond the last frequency the slider outweighs any response of the contacts.
         coarse = self._scale * np.geomspace(1e-2, 1e6, 1500)
         rate = 1j * coarse
         slider = self.config.slider.dynamic_stiffness(rate)
         assert slider is not None
         parts = self._parts(rate)
         whole = np.abs(slider.numerator + slider.denominator * parts.free)
-        most = np.abs(slider.denominator * parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
-        weak = np.flatnonzero(whole < 3 * most)
+        upper = np.abs(slider.denominator * parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
+        weak = np.flatnonzero(whole < 3 * upper)
         last = coarse[weak[-1]] if weak.size else coarse[0]
-        # And it goes with the power of λ, also off the axis, where no part is real.
+        # There it grows as the power of λ, off the axis as well, where no part is real.
         slanting = np.exp(0.25j * math.pi)
         free = self.config.slider.dynamic_stiffness(slanting * coarse)
         assert free is not None
@@ -347,10 +346,10 @@ class SteadySliding:
         return frequencies
 
     def _right_of(self, real: float) -> int:
-        """Number of roots with a real part greater than a positive one, by the argument principle.
+        """Number of roots with a real part above a positive one, by the argument principle.
 
-        Z + Λ has no poles there. It grows like a power of λ, by whose degree its argument turns on
-        the way around the half-plane; what turns on the way up the line itself is seen.
+        Z + Λ has no poles there. It grows as a power of λ, whose degree gives the change of its
+        argument around the half-plane; the change along the line itself is computed.
 
         Raises
         ------
@@ -361,10 +360,10 @@ class SteadySliding:
         assert slider is not None
         path = self._path
         values = self._values(real + 1j * path)
-        for _ in range(MOST_HALVINGS):
+        for _ in range(MAX_HALVINGS):
             turns = np.abs(np.angle(values[:, 1:] / values[:, :-1])).max(axis=0)
-            large = np.flatnonzero(turns > LARGEST_TURN)
-            if large.size == 0 or path.size > MOST_POINTS:
+            large = np.flatnonzero(turns > MAX_TURN)
+            if large.size == 0 or path.size > MAX_POINTS:
                 break
             between = (path[large] + path[large + 1]) / 2
             added = self._values(real + 1j * between)
@@ -372,7 +371,7 @@ class SteadySliding:
             values = np.insert(values, large + 1, added, axis=1)
         turned = np.sum(np.angle(values[:, 1:] / values[:, :-1]), axis=1)
         turned += np.angle(values[:, 0])
-        # What is left of the way turns with the power of λ.
+        # The rest of the path turns with the power of λ.
         angle = math.atan2(path[-1], real)
         last = complex(values[0, -1] / values[1, -1] * np.exp(-1j * slider.degree * angle))
         argument = float(turned[0] - turned[1]) - math.atan2(last.imag, last.real)
@@ -406,17 +405,18 @@ class SteadySliding:
     def is_stable(self) -> bool:
         """Whether no small perturbation of steady sliding grows.
 
-        Without delay none does: steady contacts, whose stretches are distributed as they stay, do
-        not answer at all, however the slider moves. Nor does one under a slider without inertia.
+        Without delay none does: the force of steady contacts, whose distribution of stretches is
+        stationary, does not change, however the slider moves. Nor does one grow under a slider
+        without inertia.
         """
         return self.unstable_count == 0
 
     @cached_property
     def is_stable_out_of_step(self) -> bool:
-        """Whether none grows of contacts whose lives differ by half a breaking stretch.
+        """Whether no perturbation grows for contacts whose lives differ by half a breaking stretch.
 
-        An oscillation that large makes lives differ so by itself: what needs contacts that break
-        in step stays smaller.
+        A large oscillation itself spreads lives by as much, so that an instability that needs
+        contacts breaking in step is self-limiting. This is a heuristic.
         """
         if self.relative_width >= OUT_OF_STEP:
             return self.is_stable
@@ -425,7 +425,7 @@ class SteadySliding:
 
     @cached_property
     def leading_root(self) -> complex | None:
-        """The root λ with the greatest real part [1/s], of those with an imaginary part ≥ 0.
+        """The root λ with the maximum real part [1/s], of those with an imaginary part ≥ 0.
 
         None for a slider without inertia.
         """
@@ -438,13 +438,13 @@ class SteadySliding:
         leading = found[np.argmax(found.real)] if found.size else 0j
         margin = 1e-3 * max(abs(leading.real), NO_GROWTH * self._scale)
         if leading.real <= 0 or self._right_of(leading.real + margin) > 0:
-            leading = self._farthest(max(leading.real + margin, NO_GROWTH * self._scale))
+            leading = self._rightmost(max(leading.real + margin, NO_GROWTH * self._scale))
         return complex(leading)
 
-    def _farthest(self, low: float) -> complex:
-        """The root farthest to the right, if that is right of a real part, by halving."""
+    def _rightmost(self, low: float) -> complex:
+        """The root with the maximum real part, if that is above a given one, by bisection."""
         high = 2 * low
-        while high < FASTEST * self._scale and self._right_of(high) > 0:
+        while high < MAX_GROWTH * self._scale and self._right_of(high) > 0:
             low, high = high, 2 * high
         while high - low > 1e-3 * high:
             middle = (low + high) / 2
@@ -459,9 +459,9 @@ class SteadySliding:
         starts = real + 1j * path[1:]
         size = np.log(np.abs(self._characteristic(starts)[0]))
         low = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
-        # The deepest below what is around them first.
+        # The deepest minima first.
         around = np.convolve(size, np.ones(15) / 15, "same")
-        low = low[np.argsort(size[low] - around[low])][:MOST_CANDIDATES]
+        low = low[np.argsort(size[low] - around[low])][:MAX_CANDIDATES]
         own = math.sqrt(self.config.contacts.stiffness / self._mass)
         root = np.concatenate([starts[low], 1j * np.geomspace(0.1 * self._scale, own, 8)])
         change = np.full(root.shape, np.inf)
@@ -470,9 +470,9 @@ class SteadySliding:
             for _ in range(STEPS):
                 here = self._characteristic(root)[0]
                 move = here * step / (self._characteristic(root + step)[0] - here)
-                # Not too far at a time.
-                most = 0.3 * (np.abs(root) + self._scale)
-                move *= np.minimum(1, most / np.maximum(np.abs(move), 1e-300))
+                # Steps are bounded.
+                max_step = 0.3 * (np.abs(root) + self._scale)
+                move *= np.minimum(1, max_step / np.maximum(np.abs(move), 1e-300))
                 root = root - move
                 change = np.abs(move) / np.abs(root)
                 if not np.any(change > ROOT_TOLERANCE):
@@ -491,12 +491,12 @@ class SteadySliding:
 
     @property
     def growth_rate(self) -> float:
-        """Real part of the leading root [1/s]; below 0 it is how fast perturbations die away."""
+        """Real part of the leading root [1/s]; negative if perturbations decay."""
         return math.nan if self.leading_root is None else self.leading_root.real
 
     @property
     def frequency(self) -> float:
-        """Imaginary part of the leading root, the frequency of what grows or dies last [1/s]."""
+        """Imaginary part of the leading root, the angular frequency of its perturbation [1/s]."""
         return math.nan if self.leading_root is None else self.leading_root.imag
 
     @property
@@ -512,33 +512,35 @@ class SteadySliding:
         return len(self._path) * slider.degree
 
     @property
-    def told(self) -> str | None:
-        """What follows for the motion, and what does not; None for a slider without inertia."""
+    def summary(self) -> str | None:
+        """Conclusions for the motion, and their limits; None for a slider without inertia."""
         if not self._has_motion:
             return None
-        where = f"steady sliding at {self.velocity:.3g} m/s"
+        where = f"steady sliding at {with_unit(self.velocity, 'm/s', 3)}"
         if self.delay == 0:
             return (
-                f"{where} is stable, as there is no delay: steady contacts do not answer to how "
-                "the slider moves. Slips from another start die away with the memory of it"
+                f"{where} is linearly stable, as there is no delay: the force of steady contacts "
+                "does not depend on the motion of the slider. Oscillations from another start may "
+                "persist"
             )
         if self.is_stable:
             return (
-                f"{where} is stable, with delay: small perturbations die away at "
-                f"{-self.growth_rate:.2g} 1/s. Oscillations that are large already, as after the "
-                "first slip, may go on all the same"
+                f"{where} is linearly stable, with delay: small perturbations decay at "
+                f"{-self.growth_rate:.2g} 1/s. Large oscillations, as after the first slip, may "
+                "persist: only a run shows"
             )
         grows = (
-            f"{where} is unstable, with delay: {self._perturbation} grows at "
+            f"{where} is linearly unstable, with delay: {self._perturbation} grows at "
             f"{self.growth_rate:.2g} 1/s"
         )
         if self.is_stable_out_of_step:
             return (
-                f"{grows}, but only while contacts break in step, which it ends itself: mostly it "
-                "comes to a few hundredths of the force and no more. Slips that have begun may "
-                "die away or, of stiff springs, go on"
+                f"{grows}, but not for contacts that break out of step, so that it may be "
+                "self-limiting. Linear theory gives no amplitude: only a run shows it"
             )
-        return f"{grows}, also of contacts that break out of step: it comes to slips as a rule"
+        return (
+            f"{grows}, for contacts that break out of step too: it usually develops into stick-slip"
+        )
 
     @property
     def _perturbation(self) -> str:
@@ -548,10 +550,10 @@ class SteadySliding:
 
 
 @lru_cache(maxsize=16)
-def steady_sliding(config: Config, most_work: int) -> SteadySliding | None:
-    """Steady sliding of a configuration, if there is a theory of it that takes no more work.
+def steady_sliding(config: Config, max_work: int) -> SteadySliding | None:
+    """Steady sliding of a configuration; None without a theory, or if it takes more work.
 
-    The last ones are kept, as several are asked for the same configuration one after another.
+    The latest results are cached, as several functions ask for the same configuration.
     """
     if config.interaction is not None and config.interaction.strength > 0:
         return None
@@ -559,10 +561,10 @@ def steady_sliding(config: Config, most_work: int) -> SteadySliding | None:
         sliding = SteadySliding(config)
     except ConfigError:
         return None
-    if sliding.work > most_work:
+    if sliding.work > max_work:
         return None
     try:
-        # What is told of it needs both, and keeps them. Far from all experiments it may overflow.
+        # The summary needs both, and caches them. Extreme parameters may overflow.
         with np.errstate(all="ignore"):
             if sliding.leading_root is not None and not sliding.is_stable:
                 _ = sliding.is_stable_out_of_step
@@ -581,10 +583,10 @@ class _Parts(NamedTuple):
 
 
 def _spaced(low: float, high: float, step: float) -> Array:
-    """Points between two others, at most a step apart unless there would be too many."""
+    """Points between two limits, at most a step apart unless there would be too many."""
     if high <= low:
         return np.empty(0)
-    return np.linspace(low, high, min(math.ceil((high - low) / step) + 1, MOST_POINTS // 4))
+    return np.linspace(low, high, min(math.ceil((high - low) / step) + 1, MAX_POINTS // 4))
 
 
 @cache
@@ -632,12 +634,12 @@ def stability_boundary(
     key
         A key such as "contacts.delay" or "slider.stiffness"; or "drive.velocity".
     low, high
-        Positive values, in SI, between which is looked; on a logarithmic scale.
+        Positive values, in SI, between which to search, on a logarithmic scale.
     tolerance
         Relative.
     out_of_step
-        Whether contacts that break out of step count, as after slips
-        (`SteadySliding.is_stable_out_of_step`): that boundary is nearer to what runs do.
+        Whether stability is that of contacts that break out of step, as after slips
+        (`SteadySliding.is_stable_out_of_step`): that boundary is nearer to the results of runs.
 
     Returns
     -------
@@ -655,7 +657,10 @@ def stability_boundary(
     if begins == is_stable(last):
         return None
     found: float = optimize.bisect(
-        lambda place: 1.0 if is_stable(place) == begins else -1.0, first, last, xtol=tolerance
+        lambda logarithm: 1.0 if is_stable(logarithm) == begins else -1.0,
+        first,
+        last,
+        xtol=tolerance,
     )
     return math.exp(found)
 
@@ -666,10 +671,11 @@ def _is_stable(config: Config, key: str, value: float, *, out_of_step: bool) -> 
 
 
 def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | None:
-    """Stiffness of the spring from which on steady sliding at the drive's velocity is stable [N/m].
+    """Stiffness of the spring above which steady sliding at the drive's velocity is stable [N/m].
 
-    All else stays as it is, the mass of the slider for example. It is looked for from a spring
-    `STIFFEST` times as stiff as the contacts down to one `SOFTEST` times, to a thousandth.
+    All other parameters are those of the configuration, the mass of the slider for example. It is
+    sought from `MAX_STIFFNESS` down to `MIN_STIFFNESS` times the stiffness of the contacts, with a
+    relative tolerance of a thousandth.
 
     Parameters
     ----------
@@ -683,11 +689,11 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     float or None
         None if sliding is stable with all of these springs, or unstable with the stiffest one.
     """
-    key, stiffest = "slider.stiffness", STIFFEST * config.contacts.stiffness
-    stiffness = stiffest
-    while stiffness > SOFTEST * config.contacts.stiffness:
+    key, max_stiffness = "slider.stiffness", MAX_STIFFNESS * config.contacts.stiffness
+    stiffness = max_stiffness
+    while stiffness > MIN_STIFFNESS * config.contacts.stiffness:
         if not _is_stable(config, key, stiffness, out_of_step=out_of_step):
-            if stiffness == stiffest:
+            if stiffness == max_stiffness:
                 return None
             return stability_boundary(
                 config, key, stiffness, 2 * stiffness, out_of_step=out_of_step
@@ -696,25 +702,26 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     return None
 
 
-def told_of_stiffness(config: Config, most_work: int) -> str | None:
-    """From which stiffness of the spring on sliding is stable, in words; None if that takes more
-    work than some ten times the stability of one, or there is none."""
-    sliding = steady_sliding(config, most_work // 10)
+def stiffness_summary(config: Config, max_work: int) -> str | None:
+    """Range of stable spring stiffnesses in words; None if it takes more than some ten times the
+    work for one stiffness, or there is none."""
+    sliding = steady_sliding(config, max_work // 10)
     if sliding is None or sliding.delay == 0 or not 0 < config.spring_stiffness < math.inf:
         return None
     try:
-        stable, most = stable_stiffness(config), stable_stiffness(config, out_of_step=True)
+        stable = stable_stiffness(config)
+        out_of_step = stable_stiffness(config, out_of_step=True)
     except RunError:
         return None
     if stable is None:
         return None
-    told = (
-        f"steady sliding at {sliding.velocity:.3g} m/s is stable with springs from "
-        f"{with_unit(stable, 'N/m', 3)} on"
+    sentence = (
+        f"steady sliding at {with_unit(sliding.velocity, 'm/s', 3)} is linearly stable with "
+        f"springs stiffer than {with_unit(stable, 'N/m', 3)}"
     )
-    if most is None or most >= stable:
-        return told
+    if out_of_step is None or out_of_step >= stable:
+        return sentence
     return (
-        f"{told}; of contacts that break out of step from {with_unit(most, 'N/m', 3)} on, and with "
-        "springs in between oscillations stay at a few hundredths of the force, mostly"
+        f"{sentence}; for contacts that break out of step, stiffer than "
+        f"{with_unit(out_of_step, 'N/m', 3)}. Between the two an instability may be self-limiting"
     )

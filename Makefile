@@ -15,7 +15,7 @@ DOCUMENTATION := $(VENV)/.documentation
 
 # .git/logs/HEAD, as outputs tell the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
-  $(wildcard fortran/meson.build fortran/*.f90 fortran/*/* fortran/*/*/* python/meson.build python/f2cmap) \
+  $(wildcard fortran/meson.build fortran/*.f90 fortran/*.in fortran/*/* fortran/*/*/* python/meson.build python/f2cmap) \
   $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
   $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi runs/meson.build .git/logs/HEAD)
 

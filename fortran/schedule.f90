@@ -15,7 +15,7 @@ module mesoslip_schedule
 
    public :: schedule_type, max_events
 
-   !> Breaks, and attachments, in the longest schedule
+   !> Maximum number of breaks, and of attachments, in a schedule
    integer, parameter :: max_events = 64
 
    !> Events to come, and those that came.
@@ -33,7 +33,7 @@ module mesoslip_schedule
       type(accumulator_type) :: stiffness, offset, drag
       !> Contacts that are pinned and detached
       integer :: pinned = 0, detached = 0
-      !> Greatest coordinate at which a contact breaks on the way back [m]
+      !> Maximum coordinate at which a contact breaks in a motion back [m]
       real(wp) :: behind = -huge(1.0_wp)
       !> Time after which a contact that breaks attaches; huge if it does not [s]
       real(wp) :: delay = 0.0_wp

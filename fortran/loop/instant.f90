@@ -35,7 +35,7 @@ contains
          call finish(state, ending_broken)
          return
       end if
-      if (slides(state, slider)) then
+      if (state%avalanches%size > max_size(state, slider)) then
          call finish(state, ending_slides)
          return
       end if
@@ -66,12 +66,13 @@ contains
       type(interface_law_type), intent(out) :: law
 
       type(window_type) :: window
-      real(wp) :: end_time
+      real(wp) :: end_time, max_breaks
       integer(i8) :: last
 
       last = segment%last_advance(state%advances, slider%cost + state%contacts%cost)
       end_time = min(slider%drive%next_change(), state%steady%block_end, &
          & slider%time + max_step(state))
+      max_breaks = max_size(state, slider)
       before = slider%pose()
       call state%contacts%offer(before, law, window)
       if (is_broken(state, law, window)) then
@@ -87,20 +88,21 @@ contains
          before = slider%pose()
          call state%contacts%respond(before, before)
          call state%avalanches%count_breaks(slider, state%contacts, law)
-         if (allocated(state%contacts%failure) .or. slides(state, slider)) exit
+         if (allocated(state%contacts%failure) .or. state%avalanches%size > max_breaks) exit
          call shift_origin(state)
          before = slider%pose()
          call state%contacts%offer(before, law, window)
       end do
    end subroutine jump
 
-   !> Whether contacts break without end.
-   pure function slides(state, slider)
+   !> Breaks in an avalanche from which on contacts break without end.
+   pure function max_size(state, slider) result(breaks)
       class(state_type), intent(in), target :: state
       class(instant_slider_type), intent(in), target :: slider
-      logical :: slides
+      real(wp) :: breaks
 
-      slides = slider%slides_freely(state%avalanches%size / state%contacts%parameters%count)
-   end function slides
+      breaks = slider%max_breaks()
+      if (breaks < huge(1.0_wp)) breaks = breaks * state%contacts%parameters%count
+   end function max_size
 
 end module mesoslip_loop_instant

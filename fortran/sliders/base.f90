@@ -157,7 +157,7 @@ contains
          & self%direction)
    end function pose
 
-   !> Take note that the drive has changed: most sliders see it in their next advance.
+   !> Take note that the drive has changed: most sliders need nothing more.
    subroutine adapt_to_drive(self)
       !> The slider
       class(slider_type), intent(inout) :: self

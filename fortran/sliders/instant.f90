@@ -18,8 +18,8 @@ module mesoslip_sliders_instant
       !> Whether no equilibrium is left: neither contacts nor a spring hold it
       logical :: is_unbound = .false.
    contains
-      !> Whether it will never settle
-      procedure :: slides_freely
+      !> Breaks of each contact in one avalanche after which it will never settle
+      procedure :: max_breaks
       !> The force of the drive jumps: extremes are noted in each advance
       procedure :: note_extreme
       procedure :: select_extremes
@@ -29,17 +29,16 @@ module mesoslip_sliders_instant
 
 contains
 
-   !> Whether it will never settle: the force of a spring falls until it does.
-   pure function slides_freely(self, breaks) result(is_free)
+   !> Breaks of each contact in one avalanche after which it will never settle: the force of a
+   !> spring falls until it does.
+   pure function max_breaks(self) result(breaks)
       !> The slider
       class(instant_slider_type), intent(in) :: self
-      !> Breaks in the present avalanche, for each contact
-      real(wp), intent(in) :: breaks
-      !> Whether it will not
-      logical :: is_free
+      !> Their mean number
+      real(wp) :: breaks
 
-      is_free = .false.
-   end function slides_freely
+      breaks = huge(1.0_wp)
+   end function max_breaks
 
    !> Extremes are noted in each advance.
    subroutine note_extreme(self)

@@ -108,7 +108,7 @@ contains
    subroutine run_ahead(self, schedule, filter)
       !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> What happens on the way
+      !> Coming changes of the contact force
       type(schedule_type), intent(inout) :: schedule
       !> Which steps are of interest; the slider stops after one
       type(step_filter_type), intent(inout) :: filter
@@ -167,7 +167,7 @@ contains
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
 
-      real(wp) :: limit, start, step, way, early, late, time, pace
+      real(wp) :: limit, start, step, distance, early, late, time, pace
 
       self%law = law
       self%step_time = self%time
@@ -179,15 +179,15 @@ contains
 
       self%displacement = self%drive%at(window%end_time)
       if (self%drive%direction * (self%displacement - limit) >= 0.0_wp) then
-         way = limit - self%drive%value
+         distance = limit - self%drive%value
          late = self%drive%direction * sqrt(max(0.0_wp, &
-            & self%drive%rate**2 + 2.0_wp * self%drive%acceleration * way))
+            & self%drive%rate**2 + 2.0_wp * self%drive%acceleration * distance))
          ! Of two forms of the root the one in which nothing cancels.
          pace = self%drive%rate + late
          if (self%drive%direction * self%drive%rate < 0.0_wp) then
             time = (late - self%drive%rate) / self%drive%acceleration
          else if (abs(pace) > 0.0_wp) then
-            time = 2.0_wp * way / pace
+            time = 2.0_wp * distance / pace
          else
             time = 0.0_wp
          end if
@@ -200,13 +200,13 @@ contains
       self%velocity = late
       if (abs(late) > 0.0_wp) self%direction = sign(1.0_wp, late)
 
-      way = self%displacement - start
+      distance = self%displacement - start
       step = self%time - self%step_time
-      call self%drive%earlier_work%add(way * (law%stiffness * (start + 0.5_wp * way) - law%offset) &
-         & + law%drag * square())
+      call self%drive%earlier_work%add(distance * (law%stiffness * (start + 0.5_wp * distance) &
+         & - law%offset) + law%drag * square())
       call self%drag_loss%add(law%drag * square())
       call self%drive%earlier_impulse%add(step * (law%stiffness * (start + step * (0.5_wp * early &
-         & + self%drive%acceleration * step / 6.0_wp)) - law%offset) + law%drag * way)
+         & + self%drive%acceleration * step / 6.0_wp)) - law%offset) + law%drag * distance)
       call note(self, self%step_time, start, early)
       call note(self, self%time, self%displacement, late)
       if (law%stiffness > 0.0_wp) then

@@ -1,7 +1,7 @@
 !> A slider without inertia that follows the stable equilibrium of spring and contacts.
 !>
 !> Under a linear law of the contact force the equilibrium is one division away. Where contacts have
-!> changed since, the slider jumps to it, or to the first contact on the way, while the drive
+!> changed since, the slider jumps to it, or to the first contact before it, while the drive
 !> stands still; then it goes with the drive, which moves the end of the spring.
 module mesoslip_sliders_quasistatic
    use mesoslip_interface_law, only: interface_law_type, window_type
@@ -23,6 +23,9 @@ module mesoslip_sliders_quasistatic
    type, extends(instant_slider_type) :: slider_quasistatic_type
       !> Stiffness of the drive's spring K [N/m]; 0 for none
       real(wp) :: stiffness = 0.0_wp
+      !> Force of the drive on the slider at displacement 0, over the drive's value: K [N/m] of a
+      !> spring, 1 [N/N] for a force
+      real(wp) :: pull_over_value = 0.0_wp
       !> Contact force during the last advance
       type(interface_law_type) :: law
    contains
@@ -31,12 +34,10 @@ module mesoslip_sliders_quasistatic
       procedure :: observe => observe_quasistatic
       procedure :: energy
       procedure :: exchange
-      !> Force of the drive on the slider at displacement 0, and its rate and acceleration
-      procedure :: pull
-      procedure :: pull_rate
-      procedure :: pull_acceleration
-      !> Let the drive pull with a force at the start
-      procedure :: set_pull
+      !> Force of the drive on the slider at displacement 0
+      procedure, non_overridable :: pull
+      !> Value of the drive that pulls with a force
+      procedure :: value_of_pull
       !> Add to the work and the impulse of the drive what a jump and a motion add
       procedure :: add_jump
       procedure :: add_motion
@@ -60,6 +61,7 @@ contains
       call parameters%take("stiffness", self%stiffness, error)
       call parameters%finish(error)
       if (allocated(error)) return
+      self%pull_over_value = self%stiffness
       call move_alloc(self, slider)
    end subroutine make_slider_quasistatic
 
@@ -71,11 +73,11 @@ contains
       type(interface_law_type), intent(in) :: law
 
       self%law = law
-      call self%set_pull(law%stiffness * self%displacement - law%offset)
+      self%drive%value = self%value_of_pull(law%stiffness * self%displacement - law%offset)
       self%rest_displacement = self%displacement
    end subroutine start
 
-   !> Jump to equilibrium or to the first contact on the way; then move until the window's end.
+   !> Jump to equilibrium or to the first contact before it; then move until the window's end.
    subroutine advance(self, law, window)
       !> The slider
       class(slider_quasistatic_type), intent(inout) :: self
@@ -83,6 +85,8 @@ contains
       type(interface_law_type), intent(in) :: law
       !> Where the law holds
       type(window_type), intent(in) :: window
+
+      real(wp) :: pull
 
       self%law = law
       self%step_time = self%time
@@ -93,23 +97,25 @@ contains
          self%is_unbound = .true.
          return
       end if
-      call self%jump(window)
-      call note(self)
+      pull = self%pull(self%time)
+      call self%jump(window, pull)
+      call note(self, pull)
       if (.not. self%is_settled) return
       call self%go_with_drive(window)
-      call note(self)
+      call note(self, self%pull(self%time))
    end subroutine advance
 
-   !> Jump to equilibrium or to the first contact on the way.
-   subroutine jump(self, window)
+   !> Jump to equilibrium or to the first contact before it.
+   subroutine jump(self, window, pull)
       class(slider_quasistatic_type), intent(inout) :: self
       type(window_type), intent(in) :: window
+      !> Force of the drive at displacement 0 [N]
+      real(wp), intent(in) :: pull
 
-      real(wp) :: stiffness, start, target, distance, pull
+      real(wp) :: stiffness, start, target, distance
 
       stiffness = self%stiffness + self%law%stiffness
       start = self%displacement
-      pull = self%pull(self%time)
       target = (pull + self%law%offset) / stiffness
       self%is_settled = target < window%upper .and. target > window%lower
       self%displacement = min(max(target, window%lower), window%upper)
@@ -130,8 +136,8 @@ contains
       stiffness = self%stiffness + self%law%stiffness
       start = self%displacement
       self%rest_displacement = start
-      self%velocity = self%pull_rate(self%time) / stiffness
-      self%acceleration = self%pull_acceleration() / stiffness
+      self%velocity = self%drive%rate_at(self%time) * self%pull_over_value / stiffness
+      self%acceleration = self%drive%acceleration * self%pull_over_value / stiffness
       limit = window%upper
       if (self%drive%direction < 0.0_wp) limit = window%lower
       arrival = time_of(limit - start, self%velocity, self%acceleration)
@@ -209,11 +215,13 @@ contains
    end function time_of
 
    !> Note the force of the drive where the slider is.
-   subroutine note(self)
+   subroutine note(self, pull)
       class(slider_quasistatic_type), intent(inout) :: self
+      !> Force of the drive at displacement 0 [N]
+      real(wp), intent(in) :: pull
 
-      call self%drive%extremes%note(self%pull(self%time) - self%stiffness * self%displacement, &
-         & self%time, self%origin + self%displacement)
+      call self%drive%extremes%note(pull - self%stiffness * self%displacement, self%time, &
+         & self%origin + self%displacement)
    end subroutine note
 
    !> Force of the drive on the slider at displacement 0.
@@ -225,40 +233,20 @@ contains
       !> Force [N]
       real(wp) :: force
 
-      force = self%drive%at(time) * self%stiffness
+      force = self%drive%at(time) * self%pull_over_value
    end function pull
 
-   !> Rate of that force.
-   pure function pull_rate(self, time) result(rate)
+   !> Value of the drive that pulls with a force.
+   pure function value_of_pull(self, force) result(value)
       !> The slider
       class(slider_quasistatic_type), intent(in) :: self
-      !> Time [s]
-      real(wp), intent(in) :: time
-      !> Rate [N/s]
-      real(wp) :: rate
-
-      rate = self%drive%rate_at(time) * self%stiffness
-   end function pull_rate
-
-   !> Acceleration of that force.
-   pure function pull_acceleration(self) result(acceleration)
-      !> The slider
-      class(slider_quasistatic_type), intent(in) :: self
-      !> Acceleration [N/s2]
-      real(wp) :: acceleration
-
-      acceleration = self%drive%acceleration * self%stiffness
-   end function pull_acceleration
-
-   !> Let the drive pull with a force at the start.
-   subroutine set_pull(self, force)
-      !> The slider
-      class(slider_quasistatic_type), intent(inout) :: self
       !> Force at displacement 0 [N]
       real(wp), intent(in) :: force
+      !> Displacement of the end of the spring [m]
+      real(wp) :: value
 
-      self%drive%value = self%displacement + force / self%stiffness
-   end subroutine set_pull
+      value = self%displacement + force / self%pull_over_value
+   end function value_of_pull
 
    !> The motion at a time of the last advance.
    pure function observe_quasistatic(self, time) result(motion)

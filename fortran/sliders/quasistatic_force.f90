@@ -12,18 +12,11 @@ module mesoslip_sliders_quasistatic_force
 
    public :: slider_quasistatic_force_type, make_slider_quasistatic_force
 
-   !> Breaks of each contact in one avalanche, on average, from which on the slider is taken to
-   !> slide for ever.
-   real(wp), parameter :: max_lives = 1000.0_wp
-
    !> A slider in equilibrium under a force.
    type, extends(slider_quasistatic_type) :: slider_quasistatic_force_type
    contains
-      procedure :: slides_freely
-      procedure :: pull
-      procedure :: pull_rate
-      procedure :: pull_acceleration
-      procedure :: set_pull
+      procedure :: max_breaks
+      procedure :: value_of_pull
       procedure :: add_jump
       procedure :: add_motion
       procedure :: observe
@@ -47,64 +40,31 @@ contains
       allocate (self)
       call parameters%finish(error)
       if (allocated(error)) return
+      self%pull_over_value = 1.0_wp
       call move_alloc(self, slider)
    end subroutine make_slider_quasistatic_force
 
-   !> Whether it will never settle.
-   pure function slides_freely(self, breaks) result(is_free)
+   !> Breaks of each contact in one avalanche from which on it is taken to slide for ever.
+   pure function max_breaks(self) result(breaks)
       !> The slider
       class(slider_quasistatic_force_type), intent(in) :: self
-      !> Breaks in the present avalanche, for each contact
-      real(wp), intent(in) :: breaks
-      !> Whether it will not
-      logical :: is_free
+      !> Their mean number
+      real(wp) :: breaks
 
-      is_free = breaks > max_lives
-   end function slides_freely
+      breaks = 1000.0_wp
+   end function max_breaks
 
-   !> Force of the drive.
-   pure function pull(self, time) result(force)
+   !> Value of the drive that pulls with a force: the force.
+   pure function value_of_pull(self, force) result(value)
       !> The slider
       class(slider_quasistatic_force_type), intent(in) :: self
-      !> Time [s]
-      real(wp), intent(in) :: time
-      !> Force [N]
-      real(wp) :: force
-
-      force = self%drive%at(time)
-   end function pull
-
-   !> Rate of that force.
-   pure function pull_rate(self, time) result(rate)
-      !> The slider
-      class(slider_quasistatic_force_type), intent(in) :: self
-      !> Time [s]
-      real(wp), intent(in) :: time
-      !> Rate [N/s]
-      real(wp) :: rate
-
-      rate = self%drive%rate_at(time)
-   end function pull_rate
-
-   !> Acceleration of that force.
-   pure function pull_acceleration(self) result(acceleration)
-      !> The slider
-      class(slider_quasistatic_force_type), intent(in) :: self
-      !> Acceleration [N/s2]
-      real(wp) :: acceleration
-
-      acceleration = self%drive%acceleration
-   end function pull_acceleration
-
-   !> Let the drive pull with a force at the start.
-   subroutine set_pull(self, force)
-      !> The slider
-      class(slider_quasistatic_force_type), intent(inout) :: self
       !> Force [N]
       real(wp), intent(in) :: force
+      !> The same [N]
+      real(wp) :: value
 
-      self%drive%value = force
-   end subroutine set_pull
+      value = force
+   end function value_of_pull
 
    !> Add the work of the force in a jump.
    subroutine add_jump(self, distance, pull)
@@ -126,8 +86,8 @@ contains
       real(wp) :: pull, rate, acceleration
 
       pull = self%pull(self%step_time)
-      rate = self%pull_rate(self%step_time)
-      acceleration = self%pull_acceleration()
+      rate = self%drive%rate_at(self%step_time)
+      acceleration = self%drive%acceleration
       ! The displacement grows with the force, so the work is that of their mean.
       call self%drive%earlier_work%add(distance &
          & * (pull + step * (0.5_wp * rate + 0.25_wp * acceleration * step)))

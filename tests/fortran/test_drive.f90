@@ -85,7 +85,7 @@ contains
       type(window_type) :: window
       real(wp) :: series, drive
 
-      slider = slider_quasistatic_type(stiffness=spring)
+      slider = slider_quasistatic_type(stiffness=spring, pull_over_value=spring)
       law%stiffness = contacts
       series = spring * contacts / (spring + contacts)
       call slider%start(law)
@@ -113,6 +113,7 @@ contains
       type(window_type) :: window
       real(wp) :: force
 
+      slider%pull_over_value = 1.0_wp
       law%stiffness = contacts
       call slider%start(law)
       call slider%drive%change(0.0_wp, rate, acceleration)
@@ -130,8 +131,7 @@ contains
       call check_close(slider%drive%stage_impulse(), &
          & 0.5_wp * rate * times(2)**2 + acceleration * times(2)**3 / 6.0_wp, 1.0e-15_wp, &
          & "impulse of a force")
-      call check(.not. slider%slides_freely(1000.0_wp) .and. slider%slides_freely(1001.0_wp), &
-         & "contacts break without end")
+      call check(slider%max_breaks() < huge(1.0_wp), "contacts can break without end")
    end subroutine pulls_with_a_force
 
 end program test_drive

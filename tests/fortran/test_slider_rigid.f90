@@ -67,7 +67,7 @@ contains
    !> A ladder of crossings, from rest under a steady drive: each is met to the bit in displacement,
    !> and its time, from the closed form, and the velocity there to rounding.
    subroutine climbs(rung)
-      !> Way from one crossing to the next
+      !> Distance from one crossing to the next
       real(wp), intent(in) :: rung
 
       type(slider_rigid_type) :: slider
@@ -106,7 +106,7 @@ contains
    !> The damper leaves the momentum to block and damper alike: M (V + W) is the impulse of the
    !> drive, its work over its velocity. What the damper takes of the energy is its loss.
    subroutine damps(rung)
-      !> Way from one crossing to the next; it settles whether steps are short or long
+      !> Distance from one crossing to the next; it settles whether steps are short or long
       real(wp), intent(in) :: rung
 
       real(wp), parameter :: mass = 2.0_wp, damping = 1.3_wp

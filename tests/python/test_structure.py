@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
 
 FORTRAN = ROOT / "fortran"
@@ -205,6 +206,37 @@ def test_nobody_asks_for_a_kind(pattern):
         if re.search(pattern, line)
     ]
     assert asking == []
+
+
+def test_sliders_are_the_same_on_both_sides():
+    """A kind of slider that the build does not name, or that no configuration asks for."""
+    room = FORTRAN / "sliders"
+    named = re.search(r"slider_kinds = \[(.*?)\]", (room / "meson.build").read_text(), re.DOTALL)
+    kinds = sorted(re.findall(r"'(\w+)\.f90'", named[1]))
+    made = r"subroutine make_slider_(\w+)\("
+    assert kinds == sorted(
+        kind for path in room.rglob("*.f90") for kind in re.findall(made, path.read_text())
+    )
+    configured = (ROOT / "python/mesoslip/configuration/sliders").glob("*.py")
+    asked = {kind for path in configured for kind in re.findall(r"\"(\w+)\"", path.read_text())}
+    assert not set(kinds) - asked
+    assert not set(SLIDERS) - set(kinds)
+
+
+def test_procedures_of_sliders_and_the_loop_are_short():
+    """None has more than 100 lines."""
+    kind = "(?:subroutine|function)"
+    procedure = re.compile(
+        rf"^ {{3}}(?:pure |elemental )*{kind} (\w+).*?^ {{3}}end {kind}", re.MULTILINE | re.DOTALL
+    )
+    lines = {
+        f"{path.name}: {found[1]}": found[0].count("\n") + 1
+        for folder in ("sliders", "loop")
+        for path in (FORTRAN / folder).rglob("*.f90")
+        for found in procedure.finditer(path.read_text())
+    }
+    assert len(lines) > 100
+    assert not {name: length for name, length in lines.items() if length > 100}
 
 
 def test_threshold_laws_are_the_same_on_both_sides():

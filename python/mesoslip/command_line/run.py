@@ -68,11 +68,14 @@ def run(
     from mesoslip import api
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
+    from mesoslip.simulation.memory import check_memory
 
     checked = load(config, changes)
     interval = quantity(checkpoint_interval, "--checkpoint-interval", "s", "30 s", negative=False)
     path = output or Path("out") / f"{Path(config).stem}.nc"
     targets.check_output(path, [config])
+    if scheduler is None:
+        check_memory(checked)
 
     def report(text: str) -> None:
         say(f"{path}: {text}")

@@ -1,11 +1,8 @@
-"""What may be wrong between the tables of a configuration whatever the kinds of its slider and
-contacts, and what is too much for the machine.
-"""
+"""Checks between the tables of a configuration, whatever the kinds of its slider and contacts."""
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
@@ -13,14 +10,6 @@ from mesoslip.configuration.drive import DrivePart
 from mesoslip.configuration.sliders import SLIDERS, base
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Curve, Run
-
-# What a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
-# snapshot [bytes].
-BYTES_PER_SAMPLE = 3 * 7 * 8
-BYTES_PER_SAMPLE_OF_SLIP = 3 * 10 * 8
-BYTES_PER_LAYER = 2 * 8
-BYTES_PER_AVALANCHE = 3 * 10 * 8
-BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
 
 
 class Setting(base.Setting, Protocol):
@@ -161,73 +150,6 @@ def curve_problems(config: Setting) -> Complaints:
             'must be 0 with contacts.initial = "steady", the state of contacts without a spread',
             width,
         )
-
-
-def memory_problems(config: Setting) -> Complaints:
-    """What does not fit into the machine's memory."""
-    run, output, contacts = config.run, config.output, config.contacts
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    together = min(run.realizations, os.cpu_count() or 1)
-    in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
-    per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
-    finer = 0.0 if output.slip_interval is None else _time_in_slips(config) / output.slip_interval
-    lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
-    after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
-    for key, needed, value in (
-        (
-            "contacts.count",
-            config.contact_kind.bytes_per_contact * contacts.count * together,
-            contacts.count,
-        ),
-        ("run.avalanches", BYTES_PER_AVALANCHE * in_catalogue * run.realizations, run.avalanches),
-        (
-            "output.snapshots",
-            lattices * len(output.snapshots),
-            f"{len(output.snapshots)} times",
-        ),
-        (
-            "output.snapshot_size",
-            lattices * min(after, run.avalanches or math.inf),
-            output.snapshot_size,
-        ),
-        (
-            "output.interval",
-            per_sample * config.expected_duration / config.output_interval * run.realizations,
-            config.output_interval,
-        ),
-        (
-            "output.slip_interval",
-            BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations,
-            output.slip_interval,
-        ),
-    ):
-        if needed > memory:
-            yield Complaint(
-                key,
-                f"the run may need {needed / 2**30:.3g} GiB for this, and the machine has "
-                f"{memory / 2**30:.3g} GiB",
-                value,
-            )
-
-
-def _time_in_slips(config: Setting) -> float:
-    """About how long slips take together, if each lasts two periods, after the spring's loading to
-    the static force [s]."""
-    slider = config.slider
-    if config.drive_speed == 0 or slider.slip_velocity(config) == 0:
-        return 0.0
-    loading = config.contacts.static_force / slider.spring_stiffness / config.drive_speed
-    return config.expected_duration * min(1.0, 4 * slider.quiet_time / loading)
-
-
-def _breaks(config: Setting) -> float:
-    """About how many contacts break: one after each mean breaking stretch, and under a force that
-    grows each of them about once, before the slider slides without end."""
-    contacts = config.contacts
-    if not contacts.reattach or config.drive.force_rate is not None:
-        return contacts.count
-    way = math.fsum(part.way for part in config.drive_parts)
-    return contacts.count * way / contacts.break_stretch
 
 
 def _below(bound: float, value: float) -> str:

@@ -103,7 +103,7 @@ class Config(Table):
             *checks.curve_problems(self),
         ]
         # Without a drive there is no length of the run, to which what is recorded is compared.
-        return complaints or [*checks.output_problems(self)] or [*checks.memory_problems(self)]
+        return complaints or [*checks.output_problems(self)]
 
     @property
     def contact_kind(self) -> ContactKind:

@@ -16,6 +16,7 @@ import numpy as np
 
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.tables import (
     COLUMNS,
     CONTACT_COLUMNS,
@@ -117,6 +118,7 @@ class Realization:
     """
 
     def __init__(self, config: Config, number: int) -> None:
+        check_memory(config)
         self.config = config
         self.number = number
         self.time = 0.0

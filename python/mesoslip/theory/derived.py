@@ -10,6 +10,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.lives import scales
+from mesoslip.theory.sliders import quantities
 from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
 
 # Maximum work for the stability of steady sliding, about a tenth of a second.
@@ -42,7 +43,7 @@ def derived(config: ConfigLike) -> dict[str, Derived]:
         name: Derived(value, unit, meaning)
         for name, value, unit, meaning in (
             *_contacts(config),
-            *config.slider.quantities(config),
+            *quantities(config.slider, config),
             *_stability(steady_sliding(config, MAX_WORK)),
             *_drive(config),
         )

@@ -29,6 +29,7 @@ from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.simulation.kernel import checked, named
 from mesoslip.theory.lives import law_parameters, scales
+from mesoslip.theory.sliders import loading_rate
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -634,7 +635,7 @@ class ForceCurve:
             "X_peak": peak_displacement if self.falls else None,
             "F_steady": self.steady_force,
             "D0": critical.D0 if critical else None,
-            "D1": self.config.slider.loading_rate(self.config),
+            "D1": loading_rate(self.config.slider, self.config),
             "D2": critical.D2 if critical else None,
             "D3": critical.D3 if critical else None,
             "error": self.error,

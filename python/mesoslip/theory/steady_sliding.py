@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import with_unit
+from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -293,7 +294,7 @@ class SteadySliding:
         The second one is 1 - ψ e^(-λ τ_d), whose roots are those of the contacts alone, all of them
         with a negative real part but for that at 0.
         """
-        slider = self.config.slider.dynamic_stiffness(rate)
+        slider = dynamic_stiffness(self.config.slider, rate)
         assert slider is not None
         parts = self._parts(rate)
         whole = slider.numerator + slider.denominator * parts.free
@@ -312,7 +313,7 @@ class SteadySliding:
     def _has_motion(self) -> bool:
         """Whether the slider has a motion of its own that the contacts may feed."""
         rate = np.array([1j * self._scale])
-        return self.config.slider.dynamic_stiffness(rate) is not None
+        return dynamic_stiffness(self.config.slider, rate) is not None
 
     @cached_property
     def _path(self) -> Array:
@@ -322,7 +323,7 @@ class SteadySliding:
         # Beyond the last frequency the slider outweighs any response of the contacts.
         coarse = self._scale * np.geomspace(1e-2, 1e6, 1500)
         rate = 1j * coarse
-        slider = self.config.slider.dynamic_stiffness(rate)
+        slider = dynamic_stiffness(self.config.slider, rate)
         assert slider is not None
         parts = self._parts(rate)
         whole = np.abs(slider.numerator + slider.denominator * parts.free)
@@ -331,7 +332,7 @@ class SteadySliding:
         last = coarse[weak[-1]] if weak.size else coarse[0]
         # There it grows as the power of λ, off the axis as well, where no part is real.
         slanting = np.exp(0.25j * math.pi)
-        free = self.config.slider.dynamic_stiffness(slanting * coarse)
+        free = dynamic_stiffness(self.config.slider, slanting * coarse)
         assert free is not None
         turn_left = np.angle(free.numerator * slanting**-free.degree)
         unlike = np.flatnonzero(np.abs(turn_left) > UNLIKE_POWER)
@@ -356,7 +357,7 @@ class SteadySliding:
         RunError
             If that leaves the range of floating-point numbers.
         """
-        slider = self.config.slider.dynamic_stiffness(np.array([1j * self._scale]))
+        slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))
         assert slider is not None
         path = self._path
         values = self._values(real + 1j * path)
@@ -485,7 +486,7 @@ class SteadySliding:
     def _mass(self) -> float:
         """Inertia of the slider at high frequencies [kg]."""
         high = 1e3 * self._scale
-        slider = self.config.slider.dynamic_stiffness(np.array([high + 0j]))
+        slider = dynamic_stiffness(self.config.slider, np.array([high + 0j]))
         assert slider is not None
         return float((slider.numerator / slider.denominator).real[0]) / high**2
 
@@ -507,7 +508,7 @@ class SteadySliding:
         """
         if not self._has_motion or self.delay == 0:
             return 0
-        slider = self.config.slider.dynamic_stiffness(np.array([1j * self._scale]))
+        slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))
         assert slider is not None
         return len(self._path) * slider.degree
 

@@ -4,29 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import Contacts
 from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.table import Complaints, Table
 from mesoslip.configuration.tables import Output
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Complex = NDArray[np.complexfloating[Any, Any]]
-
-
-class Quantity(NamedTuple):
-    """A derived quantity: its value in SI, the unit, and what it is."""
-
-    name: str
-    value: float
-    unit: str
-    meaning: str
 
 
 class Oscillator(NamedTuple):
@@ -40,18 +24,6 @@ class Oscillator(NamedTuple):
     def frequency(self) -> float:
         """Ω_S = √(K/M) [1/s]."""
         return math.sqrt(self.stiffness / self.mass)
-
-
-class DynamicStiffness(NamedTuple):
-    """The force that moves a slider without contacts by e^(λt), over its displacement [N/m].
-
-    A ratio of two polynomials in λ, up to a positive factor; ``degree`` is that of the numerator,
-    whose leading coefficient is positive.
-    """
-
-    numerator: Complex
-    denominator: Complex
-    degree: int
 
 
 class Setting(Protocol):
@@ -116,18 +88,9 @@ class SliderTable(Table):
         """Velocity above the drive's that makes a slip [m/s]; 0 where there are no slips."""
         return 0.0
 
-    def loading_rate(self, config: Setting) -> float | None:  # noqa: ARG002
-        """D1 = v_d √(KM)/F_s (S46); None if the drive stands, or without spring or mass."""
-        return None
-
     @property
     def oscillator(self) -> Oscillator | None:
         """The slider as one mass on a spring (S40, S41); None if it is not one."""
-        return None
-
-    def dynamic_stiffness(self, rate: Complex) -> DynamicStiffness | None:  # noqa: ARG002
-        """The slider alone, moved at its contacts by e^(λt), for rates λ [1/s]; None without
-        inertia."""
         return None
 
     @property
@@ -159,8 +122,4 @@ class SliderTable(Table):
 
     def problems(self, config: Setting) -> Complaints:  # noqa: ARG002
         """The combinations that this kind refuses."""
-        yield from ()
-
-    def quantities(self, config: Setting) -> Iterator[Quantity]:  # noqa: ARG002
-        """What follows from the slider's keys in closed form."""
         yield from ()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -14,7 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from mesoslip.configuration.sliders.base import DynamicStiffness, Quantity, Setting
+from mesoslip.configuration.sliders.base import Setting
 from mesoslip.configuration.sliders.inertial import InertialSlider
 from mesoslip.configuration.table import (
     Complaint,
@@ -30,9 +30,6 @@ from mesoslip.configuration.table import (
     Whole,
     choice,
 )
-
-if TYPE_CHECKING:
-    from mesoslip.configuration.sliders.base import Complex
 
 # Methods of integration, and their codes in the kernel.
 SOLVERS = ("series", "adams", "bdf")
@@ -180,27 +177,6 @@ class LayeredSlider(InertialSlider):
             / self.stiffness,
         }
 
-    def dynamic_stiffness(self, rate: Complex) -> DynamicStiffness:
-        """The chain from the drive's spring down to layer 1; with a base, moved against it."""
-        mass = self.mass / self.layers
-        spring = self.layers * self.stiffness
-        inertia = mass * rate**2
-        joint = spring + self.layer_damping * mass * rate
-        numerator, denominator = inertia + spring, rate**0
-        for _ in range(self.layers - 1):
-            above = joint * numerator
-            denominator = joint * denominator + numerator
-            numerator = inertia * denominator + above
-            # Products of very many layers would overflow; only the ratio matters.
-            size = abs(denominator)
-            numerator, denominator = numerator / size, denominator / size
-        degree = 2 * self.layers
-        if self.base is not None:
-            ground = self.base.mass * rate * (rate + self.base.damping) + self.base.stiffness
-            numerator, denominator = numerator * ground, numerator + denominator * ground
-            degree += 2
-        return DynamicStiffness(numerator, denominator, degree)
-
     @property
     def layer_count(self) -> int:
         return self.layers
@@ -252,36 +228,3 @@ class LayeredSlider(InertialSlider):
                 'must be "series" with engine "me", whose contacts change their law at every step',
                 self.solver.method,
             )
-
-    def quantities(self, config: Setting) -> Iterator[Quantity]:
-        yield Quantity("slider_mass", self.mass, "kg", "mass of all layers, M")
-        yield Quantity(
-            "slider_stiffness", self.stiffness, "N/m", "static stiffness of all springs, K"
-        )
-        frequencies = self.frequencies
-        yield Quantity(
-            "chain_frequency",
-            frequencies[0],
-            "1/s",
-            "lowest frequency of the chain without contacts",
-        )
-        yield Quantity("chain_frequency_highest", frequencies[-1], "1/s", "highest one")
-        if self.base is not None:
-            film_mass = config.contacts.count * config.contacts.contact_mass
-            mass = self.base.mass + self.mass + film_mass
-            yield Quantity(
-                "pinned_base_frequency",
-                math.sqrt(self.base.stiffness / mass),
-                "1/s",
-                "frequency of base and slider pinned together, [K_B/(M_B + M + Nm)]^(1/2)",
-            )
-        if self.cantilever is not None:
-            bending = self.cantilever.bending_frequency
-            yield Quantity(
-                "bending_frequency", bending, "1/s", "lowest bending frequency of the cantilever"
-            )
-            ratio = bending / math.sqrt(self.cantilever.stiffness / self.cantilever.mass)
-            yield Quantity(
-                "bending_ratio", ratio, "1", "that over (K/M)^(1/2) of the cantilever, 2.03"
-            )
-        yield from super().quantities(config)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from mesoslip.configuration.sliders.base import Quantity, Setting, SliderTable
+from mesoslip.configuration.sliders.base import Setting, SliderTable
 from mesoslip.configuration.table import Complaint, Complaints, Stiffness
 
 
@@ -54,13 +53,4 @@ class QuasistaticSlider(SliderTable):
                 'needs engine "eq"; the force of infinitely many contacts over the displacement '
                 "of a slider without inertia is that of mesoslip curve",
                 self.kind,
-            )
-
-    def quantities(self, config: Setting) -> Iterator[Quantity]:
-        if self.stiffness is not None and config.contacts.reattach:
-            yield Quantity(
-                "mean_avalanche_size",
-                1 + config.contacts.stiffness / self.stiffness,
-                "1",
-                "mean size of avalanches in stationary sliding without interaction, 1 + Nk/K",
             )

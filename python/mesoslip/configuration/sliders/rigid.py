@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from mesoslip.configuration.sliders.base import DynamicStiffness, Oscillator, Quantity, Setting
+from mesoslip.configuration.sliders.base import Oscillator, Setting
 from mesoslip.configuration.sliders.inertial import InertialSlider
 from mesoslip.configuration.table import Number, Rate, problem
-
-if TYPE_CHECKING:
-    from mesoslip.configuration.sliders.base import Complex
 
 
 class RigidSlider(InertialSlider):
@@ -44,16 +40,3 @@ class RigidSlider(InertialSlider):
     @property
     def oscillator(self) -> Oscillator:
         return Oscillator(self.mass, self.stiffness, self.damping_rate)
-
-    def dynamic_stiffness(self, rate: Complex) -> DynamicStiffness:
-        """M λ² + K + M η_S λ²/(λ + η_S) (S40, S41)."""
-        free = self.mass * rate**2 + self.stiffness
-        damping = self.damping_rate
-        if damping == 0:
-            return DynamicStiffness(free, rate**0, 2)
-        mean = rate + damping
-        return DynamicStiffness(free * mean + self.mass * damping * rate**2, mean, 3)
-
-    @property
-    def damping_quantities(self) -> Iterator[Quantity]:
-        yield Quantity("damping_rate", self.damping_rate, "1/s", "setup damping, eta_S")

@@ -1,0 +1,217 @@
+"""What follows from a slider's keys alone: its dynamic stiffness, and quantities in closed form.
+
+Each function has a form for each kind of slider, chosen by the type of its table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from mesoslip.configuration.sliders.base import SliderTable
+from mesoslip.configuration.sliders.inertial import InertialSlider
+from mesoslip.configuration.sliders.layered import LayeredSlider
+from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
+from mesoslip.configuration.sliders.rigid import RigidSlider
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from mesoslip.configuration.config import Config
+
+    Complex = NDArray[np.complexfloating[Any, Any]]
+
+
+class Quantity(NamedTuple):
+    """A derived quantity: its name, its value in SI, the unit, and its meaning."""
+
+    name: str
+    value: float
+    unit: str
+    meaning: str
+
+
+class DynamicStiffness(NamedTuple):
+    """The force that moves a slider without contacts by e^(λt), over its displacement [N/m].
+
+    A ratio of two polynomials in λ, up to a positive factor; ``degree`` is that of the numerator,
+    whose leading coefficient is positive.
+    """
+
+    numerator: Complex
+    denominator: Complex
+    degree: int
+
+
+@singledispatch
+def dynamic_stiffness(slider: SliderTable, rate: Complex) -> DynamicStiffness | None:  # noqa: ARG001
+    """The slider alone, moved at its contacts by e^(λt), for rates λ [1/s]; None without
+    inertia."""
+    return None
+
+
+@dynamic_stiffness.register
+def _rigid_stiffness(slider: RigidSlider, rate: Any) -> DynamicStiffness:
+    """M λ² + K + M η_S λ²/(λ + η_S) (S40, S41)."""
+    free = slider.mass * rate**2 + slider.stiffness
+    damping = slider.damping_rate
+    if damping == 0:
+        return DynamicStiffness(free, rate**0, 2)
+    mean = rate + damping
+    return DynamicStiffness(free * mean + slider.mass * damping * rate**2, mean, 3)
+
+
+@dynamic_stiffness.register
+def _layered_stiffness(slider: LayeredSlider, rate: Any) -> DynamicStiffness:
+    """The chain from the drive's spring down to layer 1; with a base, moved against it."""
+    mass = slider.mass / slider.layers
+    spring = slider.layers * slider.stiffness
+    inertia = mass * rate**2
+    joint = spring + slider.layer_damping * mass * rate
+    numerator, denominator = inertia + spring, rate**0
+    for _ in range(slider.layers - 1):
+        above = joint * numerator
+        denominator = joint * denominator + numerator
+        numerator = inertia * denominator + above
+        # Products of very many layers would overflow; only the ratio matters.
+        size = abs(denominator)
+        numerator, denominator = numerator / size, denominator / size
+    degree = 2 * slider.layers
+    if slider.base is not None:
+        ground = slider.base.mass * rate * (rate + slider.base.damping) + slider.base.stiffness
+        numerator, denominator = numerator * ground, numerator + denominator * ground
+        degree += 2
+    return DynamicStiffness(numerator, denominator, degree)
+
+
+@singledispatch
+def loading_rate(slider: SliderTable, config: Config) -> float | None:  # noqa: ARG001
+    """D1 = v_d √(KM)/F_s (S46); None if the drive stands, or without spring or mass."""
+    return None
+
+
+@loading_rate.register
+def _inertial_loading_rate(slider: InertialSlider, config: Any) -> float | None:
+    if config.drive_speed == 0:
+        return None
+    root = math.sqrt(slider.stiffness * slider.mass)
+    return float(config.drive_speed * root / config.contacts.static_force)
+
+
+@singledispatch
+def quantities(slider: SliderTable, config: Config) -> Iterator[Quantity]:  # noqa: ARG001
+    """Quantities that follow from the slider's keys in closed form."""
+    yield from ()
+
+
+@quantities.register
+def _quasistatic_quantities(slider: QuasistaticSlider, config: Any) -> Iterator[Quantity]:
+    if slider.stiffness is not None and config.contacts.reattach:
+        yield Quantity(
+            "mean_avalanche_size",
+            1 + config.contacts.stiffness / slider.stiffness,
+            "1",
+            "mean size of avalanches in stationary sliding without interaction, 1 + Nk/K",
+        )
+
+
+@quantities.register
+def _rigid_quantities(slider: RigidSlider, config: Any) -> Iterator[Quantity]:
+    yield Quantity("damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S")
+    yield from _inertial_quantities(slider, config)
+
+
+def _inertial_quantities(slider: InertialSlider, config: Config) -> Iterator[Quantity]:
+    contacts, omega_s = config.contacts, slider.omega_s
+    omega_l = math.sqrt(contacts.stiffness / slider.mass)
+    yield Quantity("omega_s", omega_s, "1/s", "setup frequency, Omega_S = (K/M)^(1/2)")
+    period = 2 * math.pi / omega_s
+    yield Quantity("setup_period", period, "s", "period of the setup, tau_S = 2 pi/Omega_S")
+    yield Quantity(
+        "omega_l", omega_l, "1/s", "ringing frequency of the pinned slider, Omega_L = (Nk/M)^(1/2)"
+    )
+    yield Quantity(
+        "ringing_period", 2 * math.pi / omega_l, "s", "period of the ringing, 2 pi/Omega_L"
+    )
+    film = contacts.count * contacts.contact_drag / slider.mass
+    yield Quantity(
+        "film_drag_rate", film, "1/s", "drag of the whole molten film per slider mass, N m eta/M"
+    )
+    scale = slider.velocity_scale(config)
+    yield Quantity("slip_velocity_scale", scale, "m/s", "velocity of a slip, Omega_S F_s/K")
+    yield from _first_slip(slider, config, film)
+
+
+@quantities.register
+def _layered_quantities(slider: LayeredSlider, config: Any) -> Iterator[Quantity]:
+    yield Quantity("slider_mass", slider.mass, "kg", "mass of all layers, M")
+    stiffness = "static stiffness of all springs, K"
+    yield Quantity("slider_stiffness", slider.stiffness, "N/m", stiffness)
+    lowest, *_, highest = (slider.frequencies[0], *slider.frequencies)
+    yield Quantity(
+        "chain_frequency", lowest, "1/s", "lowest frequency of the chain without contacts"
+    )
+    yield Quantity("chain_frequency_highest", highest, "1/s", "highest frequency of the chain")
+    if slider.base is not None:
+        film_mass = config.contacts.count * config.contacts.contact_mass
+        mass = slider.base.mass + slider.mass + film_mass
+        yield Quantity(
+            "pinned_base_frequency",
+            math.sqrt(slider.base.stiffness / mass),
+            "1/s",
+            "frequency of base and slider pinned together, [K_B/(M_B + M + Nm)]^(1/2)",
+        )
+    if slider.cantilever is not None:
+        bending = slider.cantilever.bending_frequency
+        yield Quantity(
+            "bending_frequency", bending, "1/s", "lowest bending frequency of the cantilever"
+        )
+        ratio = bending / math.sqrt(slider.cantilever.stiffness / slider.cantilever.mass)
+        yield Quantity(
+            "bending_ratio", ratio, "1", "bending frequency over (K/M)^(1/2) of the cantilever"
+        )
+    yield from _inertial_quantities(slider, config)
+
+
+def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator[Quantity]:
+    """What is known of the first slip without the force curve; ``film`` in 1/s."""
+    contacts, omega_s = config.contacts, slider.omega_s
+    d_1 = loading_rate(slider, config)
+    if not d_1:
+        return
+    loading = contacts.static_force / slider.stiffness / config.drive_speed
+    yield Quantity(
+        "loading_time", loading, "s", "time in which the spring alone loads to F_s, F_s/(K v_d)"
+    )
+    yield Quantity("D1", d_1, "1", "v_d (K M)^(1/2)/F_s (S46)")
+    alpha = (6 / d_1) ** (1 / 3)
+    yield Quantity(
+        "alpha",
+        alpha,
+        "1",
+        "duration of a slip by sequential breaking times Omega_S, (6/D1)^(1/3); for Klein's case "
+        "14.2, not 2.21 as in the source",
+    )
+    yield Quantity(
+        "slip_time_sequential", alpha / omega_s, "s", "duration of a slip by sequential breaking"
+    )
+    # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
+    start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s
+    yield Quantity(
+        "B", start / 2, "1", "(D0 - eta D1/Omega_S)/2, the film melting at once, D0 ~ 1 - delta"
+    )
+    if start > 0:
+        beta = math.sqrt(2 / start)
+        yield Quantity(
+            "beta",
+            beta,
+            "1",
+            "duration of a slip by instant melting times Omega_S, [2/(D0 - eta D1/Omega_S)]^(1/2), "
+            "with D0 ~ 1 - delta",
+        )
+        yield Quantity(
+            "slip_time_melting", beta / omega_s, "s", "duration of a slip by instant melting"
+        )

@@ -31,7 +31,7 @@ export UV_COMPILE_BYTECODE := 1
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser figures \
-  claims campaign docs bench fuzz reference lint clean
+  claims campaign docs bench fuzz mutants reference lint clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -76,6 +76,11 @@ fuzz: $(INSTALLED) ## Attack the program with some thousand cases at random
 	$(VENV)/bin/python tests/fuzz/fuzz.py $(FUZZ)
 	$(if $(FUZZ),,OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 -q -m long \
 	  --ignore=tests/python/test_documentation.py)
+
+# A part of a file's name or of a mutant's text: make mutants MUTANTS=likelihood.
+MUTANTS ?=
+mutants: $(INSTALLED) ## Break the program in forty places, and see whether the tests notice
+	$(VENV)/bin/python tests/mutants/mutants.py $(MUTANTS)
 
 reference: $(INSTALLED) ## Write the reference outputs of the tests anew, on purpose only
 	$(VENV)/bin/python tests/python/make_reference.py

@@ -25,8 +25,11 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["MPLBACKEND"] = "agg"
 
 import attacks  # noqa: E402
+import files  # noqa: E402
 from apart import Apart, result_of, wait_for_any  # noqa: E402
-from attacks import ATTACKS, Report, check_configuration, prepare  # noqa: E402
+from attacks import Report, check_configuration, prepare  # noqa: E402
+
+ATTACKS = attacks.ATTACKS | files.ATTACKS
 
 # Time that a case has [s]; what is interrupted in it takes less.
 CASE_SECONDS = 120.0

@@ -49,7 +49,7 @@ demo: out/klein.nc out/klein.png ## Simulate Klein's experiment, and draw it
 test: test-fortran test-debug test-python ## Build, and pass all tests
 
 test-python: $(INSTALLED)
-	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 -q
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 --dist worksteal -q
 
 test-fortran: build/release/build.ninja
 	@ninja --quiet -C build/release

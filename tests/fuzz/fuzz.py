@@ -39,6 +39,9 @@ SMALLEST_SECONDS = 20.0
 # Cases of one problem for which it is sought.
 MOST_SMALLEST = 2
 
+# Attacks that start from outputs which are made before.
+NEED_OUTPUTS = {"outputs", "signals", "disks", "terminals", "bits", "links"}
+
 NUMBER = re.compile(rb"(?<== )-?[0-9.]+(e-?[0-9]+)?$")
 
 
@@ -160,7 +163,7 @@ def fuzz(
         store = folder / "store" / "files"
         store.mkdir(parents=True)
         os.environ["FUZZ_STORE"] = str(store)
-        if any(not name.startswith(("configurations", "mutations")) for name in names):
+        if any(name.partition(":")[0] in NEED_OUTPUTS for name in names):
             with_long = any(name.startswith(("signals", "disks")) for name in names)
             function = partial(prepare, store, with_long)
             is_whole, why = result_of(function, 600.0, folder / "prepare.log")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip import _core
 from mesoslip.simulation.kernel import named
 from mesoslip.theory.force_curve import ForceCurve
@@ -212,7 +213,10 @@ def test_the_error_estimate_holds(klein):
 @pytest.mark.parametrize("coupling", ["scaled", "equal"])
 @pytest.mark.parametrize(
     ("initial", "newborn_width"),
-    [("relaxed", 0.0), ("uniform", 0.0), ("steady", 0.0), ("relaxed", 2e-10), ("uniform", 2e-10)],
+    [
+        *(("relaxed", 0.0), ("steady", 0.0), ("uniform", 2e-10)),
+        *(long("uniform", 0.0), long("relaxed", 2e-10)),
+    ],
 )
 def test_the_distribution_of_stretches(klein, coupling, initial, newborn_width):
     """Its integral is 1, and with equal stiffness its first moment is the force."""
@@ -265,7 +269,10 @@ def test_a_rough_law_tells_its_digits(klein):
 
 @pytest.mark.parametrize(
     ("width", "newborn_width"),
-    [(0.01, 9e-11), (0.05, 9e-10), (0.05, 2e-9), (0.2, 9e-11), (0.2, 9e-10), (0.2, 2e-9)],
+    [
+        *((0.01, 9e-11), (0.05, 2e-9), (0.2, 9e-10)),
+        *(long(0.05, 9e-10), long(0.2, 9e-11), long(0.2, 2e-9)),
+    ],
 )
 def test_newborns_of_any_spread_are_conserved(klein, width, newborn_width):
     curve = ForceCurve(klein(curve={"newborn_width": newborn_width}, **dispersion(width)))

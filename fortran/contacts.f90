@@ -1,6 +1,6 @@
 !> The kinds of contacts by name: the only place that knows them all.
 module mesoslip_contacts
-   use mesoslip_contacts_ageing, only: make_contact_ageing
+   use mesoslip_contacts_ageing_contacts, only: make_contact_ageing
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
    use mesoslip_contacts_lattice, only: make_contact_lattice

@@ -217,7 +217,8 @@ subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, sn
       parameters%snapshot_size = snapshot_size
       if (most_avalanches > 0) parameters%most_avalanches = most_avalanches
       if (allocated(simulation%contacts)) then
-         call simulation%avalanches%open(parameters, snapshot_time, simulation%contacts%followed())
+         call simulation%avalanches%open(parameters, snapshot_time, &
+            & simulation%contacts%individual_count())
       else
          call raise(error, status_invalid, "contacts come before what is recorded of them")
       end if
@@ -365,7 +366,7 @@ subroutine ask_contacts(handle, count, values, status, message)
    values = 0.0d0
    call find_simulation(handle, .true., simulation, error)
    if (.not. allocated(error)) then
-      if (simulation%contacts%followed() == count) then
+      if (simulation%contacts%individual_count() == count) then
          call simulation%contacts%records(values)
       else
          call raise(error, status_invalid, "contacts are not followed one by one, or not as many")

@@ -68,7 +68,7 @@ module mesoslip_contacts_base
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
-      !> Estimated error of the contact force [N]; none where contacts are followed one by one
+      !> Estimated error of the contact force [N]; none where contacts are kept one by one
       real(wp) :: error_estimate = 0.0_wp
       !> Cost of a response over that of one contact that breaks
       real(wp) :: cost = 1.0_wp
@@ -96,8 +96,8 @@ module mesoslip_contacts_base
       procedure(rebuild_interface), deferred :: rebuild
       !> Extent of the avalanche that is over; it is forgotten
       procedure :: take_extent
-      !> Number of contacts that are followed one by one
-      procedure :: followed
+      !> Number of contacts that are kept one by one
+      procedure :: individual_count
       !> How the contacts are
       procedure :: snapshot
       !> What each contact is
@@ -197,13 +197,13 @@ module mesoslip_contacts_base
 contains
 
    !> Write a schedule of what comes next: nothing unless a kind of contacts knows.
-   subroutine plan(self, pose, most, schedule)
+   subroutine plan(self, pose, limit, schedule)
       !> The contacts
       class(contacts_type), intent(inout) :: self
       !> Where the slider is
       type(pose_type), intent(in) :: pose
-      !> Greatest number of breaks, and of attachments
-      integer, intent(in) :: most
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
       !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
@@ -221,7 +221,7 @@ contains
 
    end subroutine settle
 
-   !> Extent of the avalanche that is over; nothing for contacts without a place.
+   !> Extent of the avalanche that is over; nothing for contacts that are not on a lattice.
    subroutine take_extent(self, extent)
       !> The contacts
       class(contacts_type), intent(inout) :: self
@@ -231,17 +231,17 @@ contains
       extent = 0
    end subroutine take_extent
 
-   !> Number of contacts that are followed one by one: none unless a kind of contacts says so.
-   pure function followed(self) result(number)
+   !> Number of contacts that are kept one by one: none unless a kind of contacts says so.
+   pure function individual_count(self) result(number)
       !> The contacts
       class(contacts_type), intent(in) :: self
       !> Their number, which is that of the columns of snapshot and records
       integer :: number
 
       number = 0
-   end function followed
+   end function individual_count
 
-   !> How the contacts are; nothing for contacts that are not followed one by one.
+   !> How the contacts are; nothing for contacts that are not kept one by one.
    pure subroutine snapshot(self, displacement, values)
       !> The contacts
       class(contacts_type), intent(in) :: self
@@ -253,11 +253,12 @@ contains
       values = 0.0_wp
    end subroutine snapshot
 
-   !> What each contact is; nothing for contacts that are not followed one by one.
+   !> What each contact is; nothing for contacts that are not kept one by one.
    pure subroutine records(self, values)
       !> The contacts
       class(contacts_type), intent(in) :: self
-      !> Numbers in the order of contact_record_length, shape (contact_record_length, followed)
+      !> Numbers in the order of contact_record_length, shape (contact_record_length,
+      !> individual_count)
       real(wp), intent(out) :: values(:, :)
 
       values = 0.0_wp

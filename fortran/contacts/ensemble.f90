@@ -9,11 +9,13 @@ module mesoslip_contacts_ensemble
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
-   use mesoslip_contacts_set, only: contact_set_type, drag_of, exchange_set, law_set
+   use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &
+      & total_law
+   use mesoslip_contacts_individual_births, only: drag_of
+   use mesoslip_contacts_individual_queue, only: contact_queue_type, new_contact_queue
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness, &
+      & ahead_coordinate
    use mesoslip_schedule, only: max_events, schedule_type
-   use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness, &
-      & ahead_coordinate, behind_coordinate
-   use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue
    implicit none
    private
 
@@ -23,12 +25,7 @@ module mesoslip_contacts_ensemble
    real(wp), parameter :: rare = 1.0e-4_wp
 
    !> An ensemble of contacts.
-   type, extends(contact_set_type) :: contact_ensemble_type
-      !> Bound on the coordinates at which contacts break on the way back [m]
-      real(wp) :: behind = -huge(1.0_wp)
-      !> Direction of motion for which the queue is kept, +1 or -1
-      real(wp) :: direction = 1.0_wp
-
+   type, extends(individual_contacts_type) :: contact_ensemble_type
       type(contact_queue_type), private :: queue
       !> Contacts of the breaks in the schedule
       integer, private :: listed(max_events) = 0
@@ -38,10 +35,10 @@ module mesoslip_contacts_ensemble
       procedure :: respond
       procedure :: plan
       procedure :: settle
-      procedure :: shift_origin
+      procedure :: join
       procedure :: exchange
       procedure :: rebuild
-      procedure, non_overridable, private :: break_due, attach_due, face, farthest_behind
+      procedure, non_overridable, private :: break_due
    end type contact_ensemble_type
 
 contains
@@ -52,20 +49,20 @@ contains
       type(contact_ensemble_type), intent(out) :: self
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters
-      !> Columns and rows of a lattice on which contacts have places; no columns for none
+      !> Columns and rows of a lattice of which contacts have sites; no columns for none
       integer, intent(in) :: columns, rows
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(out) :: error
 
-      real(wp) :: longest
+      real(wp) :: max_distance
 
       self%parameters = parameters
       call self%allocate_records(columns, rows, error)
       if (allocated(error)) return
       ! A contact attached while the slider moves back has the back force to lose as well.
-      longest = parameters%static_force / parameters%stiffness &
+      max_distance = parameters%static_force / parameters%stiffness &
          & * max(parameters%law%quantile(rare), 1.0_wp) * (1.0_wp + parameters%back_force_ratio)
-      call new_contact_queue(self%queue, parameters%count, 1.1_wp * longest, error)
+      call new_contact_queue(self%queue, parameters%count, 1.1_wp * max_distance, error)
    end subroutine new_contact_ensemble
 
    !> Set up an ensemble from named numbers.
@@ -99,8 +96,7 @@ contains
       integer, intent(in) :: state
 
       call self%draw(state)
-      call self%rebuild(0.0_wp)
-      self%behind = self%farthest_behind()
+      call self%order_anew(0.0_wp)
    end subroutine initialize
 
    !> Contact force as a law, which holds until a contact breaks or attaches.
@@ -114,15 +110,8 @@ contains
       !> Where it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
-      law = law_set(self)
-      window%end_time = self%next_attachment
-      if (self%direction > 0.0_wp) then
-         window%upper = self%queue%first_key
-         window%lower = self%behind
-      else
-         window%upper = -self%behind
-         window%lower = -self%queue%first_key
-      end if
+      law = total_law(self)
+      window = self%window_between(self%behind, self%queue%first_key, self%detached%next_due)
    end subroutine offer
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
@@ -134,18 +123,17 @@ contains
 
       call self%break_due(after%displacement, after%time)
       call self%attach_due(after)
-      self%detached_count = real(self%waiting, wp)
    end subroutine respond
 
    !> Write a schedule of what comes next: the breaks at the front of the queue, as far as they are
    !> sorted, and about as many attachments.
-   subroutine plan(self, pose, most, schedule)
+   subroutine plan(self, pose, limit, schedule)
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
       !> Where the slider is
       type(pose_type), intent(in) :: pose
-      !> Greatest number of breaks, and of attachments
-      integer, intent(in) :: most
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
       !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
@@ -153,7 +141,7 @@ contains
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
-      call self%queue%preview(self%record, min(most, max_events), self%listed, &
+      call self%queue%preview(self%record, min(limit, max_events), self%listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return
       do event = 1, number
@@ -166,7 +154,7 @@ contains
       schedule%moments = 0
       schedule%direction = self%direction
       schedule%behind = self%behind
-      call self%list_attachments(min(most, max_events, 2 * number + 4), pose%direction, schedule)
+      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule)
       schedule%is_over = .false.
    end subroutine plan
 
@@ -181,9 +169,9 @@ contains
 
       integer :: event, contact(max_events)
 
-      call self%let_go_listed(self%listed(:schedule%broken), schedule)
+      call self%detach_listed(self%listed(:schedule%broken), schedule)
       if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
-      call self%take_hold_listed(schedule, contact)
+      call self%attach_listed(schedule, contact)
       do event = 1, schedule%attached
          call self%queue%insert(contact(event), &
             & ahead_coordinate(self%record(:, contact(event)), self%direction))
@@ -191,26 +179,25 @@ contains
       self%behind = schedule%behind
       ! What broke a moment ago and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
-      self%detached_count = real(self%waiting, wp)
+      self%detached_count = real(self%detached%count, wp)
    end subroutine settle
 
-   !> Attach all contacts that are due, in the order in which they broke.
-   subroutine attach_due(self, pose)
+   !> Queue a contact that has attached.
+   subroutine join(self, contact, pose)
+      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Where the slider is
       type(pose_type), intent(in) :: pose
 
-      integer :: contact
-      real(wp) :: origin, limit, back_force
+      real(wp) :: origin, limit
 
-      back_force = pose%direction * self%parameters%back_force_ratio * self%parameters%static_force
-      do while (self%next_attachment <= pose%time)
-         call self%take_hold(pose%displacement, back_force, 0.0_wp, contact)
-         origin = self%record(row_origin, contact)
-         limit = self%record(row_limit, contact)
-         call self%queue%insert(contact, self%direction * origin + limit)
-         self%behind = max(self%behind, self%direction * origin - limit)
-      end do
-   end subroutine attach_due
+      origin = self%record(row_origin, contact)
+      limit = self%record(row_limit, contact)
+      call self%queue%insert(contact, self%direction * origin + limit)
+      self%behind = max(self%behind, self%direction * origin - limit)
+   end subroutine join
 
    !> Break all contacts that are due.
    subroutine break_due(self, displacement, time)
@@ -221,40 +208,19 @@ contains
 
       if (self%direction * displacement <= self%behind) then
          ! The bound may be that of a contact which has broken since.
-         self%behind = self%farthest_behind()
-         if (self%direction * displacement <= self%behind) call self%face(displacement)
+         self%behind = self%max_behind()
+         if (self%direction * displacement <= self%behind) then
+            self%direction = -self%direction
+            call self%order_anew(displacement)
+         end if
       end if
       if (self%queue%first_key > self%direction * displacement) return
       self%track%generation = self%track%generation + 1
       do while (self%queue%first_key <= self%direction * displacement)
          call self%queue%pop(self%record, contact)
-         call self%let_go(contact, displacement, time)
+         call self%detach(contact, displacement, time)
       end do
    end subroutine break_due
-
-   !> Turn round: keep the queue for the other direction of motion.
-   subroutine face(self, displacement)
-      class(contact_ensemble_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement
-
-      self%direction = -self%direction
-      call self%rebuild(displacement)
-      self%behind = self%farthest_behind()
-   end subroutine face
-
-   !> Move the origin of displacements.
-   subroutine shift_origin(self, shift, displacement)
-      !> The ensemble
-      class(contact_ensemble_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
-      real(wp), intent(in) :: shift
-      !> Displacement of the slider from the new origin [m]
-      real(wp), intent(in) :: displacement
-
-      call self%shift_records(shift)
-      call self%rebuild(displacement)
-      self%behind = self%farthest_behind()
-   end subroutine shift_origin
 
    !> Order the queue anew, from the records.
    subroutine rebuild(self, displacement)
@@ -274,22 +240,6 @@ contains
       end do
    end subroutine rebuild
 
-   !> Greatest coordinate at which a pinned contact breaks on the way back.
-   pure function farthest_behind(self) result(coordinate)
-      class(contact_ensemble_type), intent(in) :: self
-      real(wp) :: coordinate
-
-      integer :: contact
-
-      coordinate = -huge(1.0_wp)
-      do contact = 1, self%parameters%count
-         if (self%record(row_stiffness, contact) > 0.0_wp) then
-            coordinate = max(coordinate, &
-               & behind_coordinate(self%record(:, contact), self%direction))
-         end if
-      end do
-   end function farthest_behind
-
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The ensemble
@@ -298,9 +248,7 @@ contains
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contact ensemble")
-      call exchange_set(self, archive)
-      call archive%exchange("behind", self%behind)
-      call archive%exchange("direction", self%direction)
+      call exchange_individual(self, archive)
    end subroutine exchange
 
 end module mesoslip_contacts_ensemble

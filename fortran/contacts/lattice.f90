@@ -15,18 +15,21 @@ module mesoslip_contacts_lattice
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory, &
       & status_stalled
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
-   use mesoslip_contacts_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
-   use mesoslip_contacts_set, only: contact_set_type, exchange_set, law_set, snapshot_set
-   use mesoslip_contacts_record, only: record_length, row_limit, row_origin, row_stiffness
-   use mesoslip_contacts_neighbours, only: coordination, find_neighbours, lattice_names
+   use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &
+      & snapshot_individual, total_law
+   use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
+   use mesoslip_contacts_individual_neighbours, only: coordination, find_neighbours, &
+      & lattice_names
+   use mesoslip_contacts_individual_record, only: record_length, row_limit, row_origin, &
+      & row_stiffness
    implicit none
    private
 
    public :: contact_lattice_type, interaction_type, new_contact_lattice, make_contact_lattice
 
    !> Breaks of each contact in one cascade, on average, beyond which it is taken to have no end.
-   real(wp), parameter :: most_lives = 1000.0_wp
+   real(wp), parameter :: max_breaks = 1000.0_wp
 
    !> What the neighbours are to a pinned contact: sum over the pinned ones of how far their origins
    !> are ahead of its own [m], and how many are detached
@@ -43,30 +46,29 @@ module mesoslip_contacts_lattice
    end type interaction_type
 
    !> Contacts on a lattice.
-   type, extends(contact_set_type) :: contact_lattice_type
-      !> Stiffness of a bond, and of all bonds of a contact [N/m]
-      real(wp), private :: bond = 0.0_wp, bonds = 0.0_wp
+   type, extends(individual_contacts_type) :: contact_lattice_type
+      !> Stiffness of a bond [N/m]
+      real(wp), private :: bond = 0.0_wp
       !> Neighbours of each contact, shape (neighbours, count)
       integer, allocatable, private :: neighbour(:, :)
       !> What these are to it while it is pinned, shape (surroundings_length, count)
       real(wp), allocatable, private :: surroundings(:, :)
       !> Contacts that let go together
       integer, allocatable, private :: generation(:)
-      !> Direction of motion for which the order of breaking is kept, +1 or -1
-      real(wp), private :: direction = 1.0_wp
-      !> Bound on the coordinates at which contacts break on the way back [m]
-      real(wp), private :: behind = -huge(1.0_wp)
       type(break_tree_type), private :: tree
    contains
       procedure :: initialize
       procedure :: offer
       procedure :: respond
-      procedure :: shift_origin
+      procedure :: join
+      procedure :: behind_of
+      procedure :: neighbour_force
+      procedure :: shift_order
       procedure :: rebuild
       procedure :: snapshot
       procedure :: exchange
-      procedure, private, non_overridable :: cascade, list_due, list_behind, attach_due, refresh, &
-         & look_around, tell_neighbours
+      procedure, private, non_overridable :: cascade, list_due, list_behind, sum_neighbours, &
+         & update_neighbours
    end type contact_lattice_type
 
 contains
@@ -139,14 +141,9 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
-      integer :: contact
-
       call self%draw(state)
-      do contact = 1, self%parameters%count
-         call self%look_around(contact)
-      end do
-      call self%rebuild(0.0_wp)
-      self%behind = farthest_behind(self)
+      call self%shift_order(0.0_wp)
+      call self%order_anew(0.0_wp)
       call self%respond(pose_type(), pose_type())
       call self%track%clear()
       self%breaks = 0.0_wp
@@ -165,15 +162,8 @@ contains
       !> Where it holds; a contact may break at the end that is behind
       type(window_type), intent(out) :: window
 
-      law = law_set(self)
-      window%end_time = self%next_attachment
-      if (self%direction > 0.0_wp) then
-         window%upper = self%tree%first()
-         window%lower = self%behind
-      else
-         window%upper = -self%behind
-         window%lower = -self%tree%first()
-      end if
+      law = total_law(self)
+      window = self%window_between(self%behind, self%tree%first(), self%detached%next_due)
    end subroutine offer
 
    !> Break all contacts that are due and those that they push over, then attach what is to attach.
@@ -187,62 +177,64 @@ contains
 
       breaks = self%breaks
       do
-         call self%cascade(after%displacement, after%time, after%direction)
-         if (self%next_attachment > after%time) exit
-         if (self%breaks - breaks > most_lives * self%parameters%count) then
+         call self%cascade(after)
+         if (self%detached%next_due > after%time) exit
+         if (self%breaks - breaks > max_breaks * self%parameters%count) then
             call raise(self%failure, status_stalled, "a cascade of contacts that break and " // &
                & "attach at once does not end: a delay (contacts.delay) or a weaker " // &
                & "interaction (interaction.strength) would end it")
             exit
          end if
-         call self%attach_due(after%displacement, after%time, after%direction)
+         call self%attach_due(after)
       end do
-      self%detached_count = real(self%waiting, wp)
+      self%detached_count = real(self%detached%count, wp)
    end subroutine respond
 
    !> Break all contacts that are due, then those that they push over, until none is left.
-   subroutine cascade(self, displacement, time, sense)
+   subroutine cascade(self, pose)
       class(contact_lattice_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement, time, sense
+      type(pose_type), intent(in) :: pose
 
-      integer :: number, place
+      integer :: number, listed
 
       do
-         call self%list_due(displacement, sense, number)
+         call self%list_due(pose, number)
          if (number == 0) return
          self%track%generation = self%track%generation + 1
-         do place = 1, number
-            call self%let_go(self%generation(place), displacement, time)
+         do listed = 1, number
+            call self%detach(self%generation(listed), pose%displacement, pose%time)
          end do
-         do place = 1, number
-            call self%tell_neighbours(self%generation(place), -1.0_wp)
+         do listed = 1, number
+            call self%update_neighbours(self%generation(listed), -1.0_wp)
          end do
       end do
    end subroutine cascade
 
    !> Take all contacts that are due out of the order of breaking.
-   subroutine list_due(self, displacement, sense, number)
+   subroutine list_due(self, pose, number)
       class(contact_lattice_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement, sense
+      type(pose_type), intent(in) :: pose
       !> How many they are
       integer, intent(out) :: number
 
       integer :: contact
 
-      if (self%direction * sense < 0.0_wp .and. self%direction * displacement <= self%behind) then
+      if (self%direction * pose%direction < 0.0_wp &
+         & .and. self%direction * pose%displacement <= self%behind) then
          self%direction = -self%direction
-         call self%rebuild(displacement)
-         self%behind = farthest_behind(self)
+         call self%order_anew(pose%displacement)
       end if
       number = 0
       do
-         contact = self%tree%due(self%direction * displacement)
+         contact = self%tree%due(self%direction * pose%displacement)
          if (contact == 0) exit
          call self%tree%remove(contact)
          number = number + 1
          self%generation(number) = contact
       end do
-      if (self%direction * displacement <= self%behind) call self%list_behind(displacement, number)
+      if (self%direction * pose%displacement <= self%behind) then
+         call self%list_behind(pose%displacement, number)
+      end if
    end subroutine list_due
 
    !> The same of contacts that their neighbours push over against the direction of motion.
@@ -272,48 +264,64 @@ contains
    end subroutine list_behind
 
    !> Greatest coordinate at which a pinned contact breaks on the way back.
-   pure function farthest_behind(self) result(coordinate)
+   pure function behind_of(self, contact) result(coordinate)
+      !> The contacts
       class(contact_lattice_type), intent(in) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> The coordinate [m]
       real(wp) :: coordinate
 
-      integer :: contact
       real(wp) :: centre, limit
 
-      coordinate = -huge(1.0_wp)
-      do contact = 1, self%parameters%count
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &
-            & limit)
-         coordinate = max(coordinate, self%direction * centre - limit)
-      end do
-   end function farthest_behind
+      call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, limit)
+      coordinate = self%direction * centre - limit
+   end function behind_of
 
-   !> Attach all contacts that are to, in the order in which they broke.
-   subroutine attach_due(self, displacement, time, sense)
+   !> Force of its neighbours on a contact that attaches.
+   pure function neighbour_force(self, contact, displacement) result(force)
+      !> The contacts
+      class(contact_lattice_type), intent(in) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Force of the neighbours where the stretch of the contact is zero [N]
+      real(wp) :: force
+
+      integer :: side
+      real(wp) :: pull
+
+      pull = 0.0_wp
+      do side = 1, size(self%neighbour, 1)
+         associate (record => self%record(:, self%neighbour(side, contact)))
+            if (record(row_stiffness) > 0.0_wp) pull = pull + (displacement - record(row_origin))
+         end associate
+      end do
+      force = self%bond * pull
+   end function neighbour_force
+
+   !> Put a contact that has attached into the order of breaking; its neighbours break elsewhere
+   !> now.
+   subroutine join(self, contact, pose)
+      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement, time, sense
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
 
-      integer :: contact, side
-      real(wp) :: pull, back_force
+      real(wp) :: centre, limit
 
-      back_force = sense * self%parameters%back_force_ratio * self%parameters%static_force
-      do while (self%next_attachment <= time)
-         contact = self%detached_contact(self%first_detached + 1)
-         pull = 0.0_wp
-         do side = 1, size(self%neighbour, 1)
-            associate (record => self%record(:, self%neighbour(side, contact)))
-               if (record(row_stiffness) > 0.0_wp) pull = pull + (displacement - record(row_origin))
-            end associate
-         end do
-         call self%take_hold(displacement, back_force + self%bond * pull, self%bonds, contact)
-         call self%look_around(contact)
-         call self%refresh(contact)
-         call self%tell_neighbours(contact, 1.0_wp)
-      end do
-   end subroutine attach_due
+      call self%sum_neighbours(contact)
+      call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, limit)
+      call self%tree%set(contact, self%direction * centre + limit)
+      self%behind = max(self%behind, self%direction * centre - limit)
+      call self%update_neighbours(contact, 1.0_wp)
+   end subroutine join
 
-   !> See what the neighbours are to a contact.
-   pure subroutine look_around(self, contact)
+   !> Sum what a contact keeps of its neighbours.
+   pure subroutine sum_neighbours(self, contact)
       class(contact_lattice_type), intent(inout) :: self
       integer, intent(in) :: contact
 
@@ -330,27 +338,27 @@ contains
          end associate
       end do
       self%surroundings(:, contact) = [ahead, free]
-   end subroutine look_around
+   end subroutine sum_neighbours
 
    !> Neighbours of a contact that broke (change -1) or attached (+1) break elsewhere now.
-   subroutine tell_neighbours(self, contact, change)
+   subroutine update_neighbours(self, contact, change)
       class(contact_lattice_type), intent(inout) :: self
       integer, intent(in) :: contact
       real(wp), intent(in) :: change
 
       ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
       if (size(self%neighbour, 1) == 6) then
-         call tell_all(contact, change, 6, self%neighbour(:, contact), self%parameters%count, &
+         call update_all(contact, change, 6, self%neighbour(:, contact), self%parameters%count, &
             & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
       else
-         call tell_all(contact, change, 4, self%neighbour(:, contact), self%parameters%count, &
+         call update_all(contact, change, 4, self%neighbour(:, contact), self%parameters%count, &
             & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
       end if
-   end subroutine tell_neighbours
+   end subroutine update_neighbours
 
-   !> Tell the pinned neighbours of a contact that it broke or attached: where do they break now?
-   pure subroutine tell_all(contact, change, sides, neighbour, count, record, surroundings, bond, &
-      & direction, tree, behind)
+   !> Update where the pinned neighbours of a contact break that broke or attached.
+   pure subroutine update_all(contact, change, sides, neighbour, count, record, surroundings, &
+      & bond, direction, tree, behind)
       !> The contact, -1 if it broke and +1 if it attached, and its neighbours, of so many in all
       integer, intent(in) :: contact, sides, count, neighbour(sides)
       real(wp), intent(in) :: change
@@ -376,19 +384,7 @@ contains
             behind = max(behind, direction * centre - limit)
          end associate
       end do
-   end subroutine tell_all
-
-   !> Find out where a pinned contact breaks.
-   subroutine refresh(self, contact)
-      class(contact_lattice_type), intent(inout) :: self
-      integer, intent(in) :: contact
-
-      real(wp) :: centre, limit
-
-      call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, limit)
-      call self%tree%set(contact, self%direction * centre + limit)
-      self%behind = max(self%behind, self%direction * centre - limit)
-   end subroutine refresh
+   end subroutine update_all
 
    !> Displacement at which a pinned contact bears no force, and how far from there it breaks.
    pure subroutine bearing(record, surroundings, bond, centre, limit)
@@ -404,24 +400,19 @@ contains
       limit = record(row_limit) * softness
    end subroutine bearing
 
-   !> Move the origin of displacements.
-   subroutine shift_origin(self, shift, displacement)
-      !> The contacts
+   !> Sum what contacts keep of their neighbours, which differences of origins are.
+   subroutine shift_order(self, shift)
+      !> The contacts, their records moved
       class(contact_lattice_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
-      !> Displacement of the slider from the new origin [m]
-      real(wp), intent(in) :: displacement
 
       integer :: contact
 
-      call self%shift_records(shift)
       do contact = 1, self%parameters%count
-         call self%look_around(contact)
+         call self%sum_neighbours(contact)
       end do
-      call self%rebuild(displacement)
-      self%behind = farthest_behind(self)
-   end subroutine shift_origin
+   end subroutine shift_order
 
    !> Make the order of breaking anew, from the records.
    subroutine rebuild(self, displacement)
@@ -456,7 +447,7 @@ contains
       integer :: contact
       real(wp) :: centre, limit
 
-      call snapshot_set(self, displacement, values)
+      call snapshot_individual(self, displacement, values)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &
@@ -473,10 +464,8 @@ contains
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contact lattice")
-      call exchange_set(self, archive)
+      call exchange_individual(self, archive)
       call archive%exchange("surroundings", self%surroundings)
-      call archive%exchange("direction", self%direction)
-      call archive%exchange("behind", self%behind)
    end subroutine exchange
 
 end module mesoslip_contacts_lattice

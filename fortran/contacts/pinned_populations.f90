@@ -317,7 +317,8 @@ contains
       if (self%ageing%is_old(time - self%last_birth)) return
       do place = 1, self%count
          associate (one => self%population(place, :))
-            call self%ageing%follow(one(row_broken), 1.0_wp, time - one(row_birth), threshold, rate)
+            call self%ageing%evaluate(one(row_broken), 1.0_wp, time - one(row_birth), threshold, &
+               & rate)
             if (.not. abs(rate) > 0.0_wp) cycle
             self%population(place, row_ahead) = &
                & max(displacement, self%next_break(place, 1.0_wp, time))

@@ -2,6 +2,7 @@
 program test_ageing_law
    use mesoslip_contacts_ageing_law, only: ageing_law_type, ageing_log, ageing_relax, &
       & take_ageing_law
+   use mesoslip_contacts_ageing_meeting, only: meet, meet_bound, meet_newborn
    use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_numerics_errors, only: error_type
@@ -34,7 +35,7 @@ program test_ageing_law
    call check_close(thresholds%minimum, 0.1_wp, 0.0_wp, "young like old: the same contacts attach")
    call check_close(law%threshold(1.2_wp, 1.0_wp, 0.3_wp), 1.2_wp, 0.0_wp, "young like old")
    call check(.not. law%acts() .and. law%is_constant(1.2_wp, 1.0_wp), "nothing changes")
-   call check_close(law%meet(1.2_wp, 1.0_wp, 0.3_wp, 0.1_wp, 0.7_wp), 1.2_wp, 0.0_wp, &
+   call check_close(meet(law, 1.2_wp, 1.0_wp, 0.3_wp, 0.1_wp, 0.7_wp), 1.2_wp, 0.0_wp, &
       & "young like old break where they would")
 
    call take("log", [0.05_wp])
@@ -89,7 +90,7 @@ contains
       integer :: place
 
       do place = 1, size(ages)
-         call law%follow(0.9_wp, 1.0_wp, ages(place) + step, threshold, rate)
+         call law%evaluate(0.9_wp, 1.0_wp, ages(place) + step, threshold, rate)
          difference = (law%threshold(0.9_wp, 1.0_wp, ages(place) + 2.0_wp * step) &
             & - law%threshold(0.9_wp, 1.0_wp, ages(place))) / (2.0_wp * step)
          call check_close(rate, difference, 1.0e-9_wp, "rate")
@@ -112,10 +113,10 @@ contains
       logical :: is_first
 
       do speed = 1, size(speeds)
-         call law%meet_newborn(configured, 1.0_wp, stretch, speeds(speed), together)
+         call meet_newborn(law, configured, 1.0_wp, stretch, speeds(speed), together)
          do age = 1, size(ages)
             do place = 1, size(configured)
-               found = law%meet(configured(place), 1.0_wp, ages(age), stretch, speeds(speed))
+               found = meet(law, configured(place), 1.0_wp, ages(age), stretch, speeds(speed))
                time = (found - stretch) / speeds(speed)
                call check_close(law%threshold(configured(place), 1.0_wp, ages(age) + time), found, &
                   & 1.0e-13_wp, "the threshold where it is met")
@@ -126,16 +127,16 @@ contains
                end do
                call check(is_first, "it was not met before")
                if (law%falls(configured(place), 1.0_wp)) cycle
-               call check(law%meet_least(configured(place), 1.0_wp, ages(age), stretch, &
+               call check(meet_bound(law, configured(place), 1.0_wp, ages(age), stretch, &
                   & speeds(speed)) <= found + 1.0e-15_wp, "a bound from below")
-               call check(law%meet_least(configured(place), 1.0_wp, ages(age), found - 1.0e-4_wp, &
+               call check(meet_bound(law, configured(place), 1.0_wp, ages(age), found - 1.0e-4_wp, &
                   & speeds(speed)) >= law%threshold(configured(place), 1.0_wp, ages(age)), &
                   & "not below the threshold of now")
             end do
          end do
          do place = 1, size(configured)
-            call check_close(together(place), law%meet(configured(place), 1.0_wp, 0.0_wp, stretch, &
-               & speeds(speed)), 0.0_wp, "many together, to the bit")
+            call check_close(together(place), meet(law, configured(place), 1.0_wp, 0.0_wp, &
+               & stretch, speeds(speed)), 0.0_wp, "many together, to the bit")
          end do
       end do
    end subroutine meeting

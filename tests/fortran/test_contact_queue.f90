@@ -1,8 +1,8 @@
 !> The queue against a plain search for the least key, through many shapes of load.
 program test_contact_queue
-   use mesoslip_contacts_queue, only: contact_queue_type, new_contact_queue, no_key
-   use mesoslip_contacts_record, only: ahead_coordinate, record_length, row_limit, row_origin, &
-      & row_stiffness
+   use mesoslip_contacts_individual_queue, only: contact_queue_type, new_contact_queue, no_key
+   use mesoslip_contacts_individual_record, only: ahead_coordinate, record_length, row_limit, &
+      & row_origin, row_stiffness
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_random, only: uniform_pair

@@ -1,17 +1,17 @@
 !> Contacts with a place: who breaks first, who is next to whom, how far an avalanche reaches.
 program test_lattice
-   use mesoslip_contacts_avalanche_track, only: avalanche_track_type, new_avalanche_track
-   use mesoslip_contacts_break_tree, only: break_tree_type, new_break_tree
+   use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, new_avalanche_track
+   use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_lattice, only: contact_lattice_type, interaction_type, &
       & new_contact_lattice
    use mesoslip_contacts_mechanics, only: coupling_equal, initial_uniform
-   use mesoslip_contacts_record, only: row_limit, row_origin, row_stiffness
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_contacts_base, only: contact_parameters_type, extent_length
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_contacts_neighbours, only: coordination, find_neighbours, lattice_square, &
-      & lattice_triangular
+   use mesoslip_contacts_individual_neighbours, only: coordination, find_neighbours, &
+      & lattice_square, lattice_triangular
    use mesoslip_numerics_random, only: uniform_pair
    use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use testing, only: check, check_close, finish

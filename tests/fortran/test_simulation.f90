@@ -417,7 +417,7 @@ contains
       call simulation%steady%open(0.0_wp, 1, 0.0_wp)
       call simulation%recorder%open(recorder)
       call simulation%avalanches%open(avalanche_parameters_type(least_size=1.0_wp, &
-         & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%followed())
+         & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%individual_count())
    end subroutine build
 
    !> A drive forward, in a hold, and back.

@@ -1,5 +1,5 @@
 !> The record of a contact: a column of numbers, in one line of the cache or two.
-module mesoslip_contacts_record
+module mesoslip_contacts_individual_record
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -46,4 +46,4 @@ contains
       coordinate = direction * record(row_origin) - record(row_limit)
    end function behind_coordinate
 
-end module mesoslip_contacts_record
+end module mesoslip_contacts_individual_record

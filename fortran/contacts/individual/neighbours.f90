@@ -1,12 +1,12 @@
 !> Lattices without edges: who is next to whom.
-module mesoslip_contacts_neighbours
+module mesoslip_contacts_individual_neighbours
    implicit none
    private
 
    public :: lattice_triangular, lattice_square, lattice_names
    public :: coordination, find_neighbours
 
-   !> Six neighbours; odd rows are half a place to the right of even ones, counted from 0
+   !> Six neighbours; odd rows are half a spacing to the right of even ones, counted from 0
    integer, parameter :: lattice_triangular = 1
    !> Four neighbours
    integer, parameter :: lattice_square = 2
@@ -15,7 +15,7 @@ module mesoslip_contacts_neighbours
 
 contains
 
-   !> Number of neighbours of each place; 0 for an unknown lattice.
+   !> Number of neighbours of each site; 0 for an unknown lattice.
    elemental function coordination(lattice) result(number)
       !> One of the lattice_ codes
       integer, intent(in) :: lattice
@@ -27,9 +27,9 @@ contains
       if (lattice == lattice_square) number = 4
    end function coordination
 
-   !> Neighbours of all places, numbered from 1, row by row.
+   !> Neighbours of all sites, numbered from 1, row by row.
    !>
-   !> Where two rows or columns are all there is, a place is the neighbour of another twice.
+   !> With two rows or columns in all, a site is the neighbour of another twice.
    pure subroutine find_neighbours(lattice, columns, rows, neighbour)
       !> One of the lattice_ codes
       integer, intent(in) :: lattice
@@ -38,26 +38,26 @@ contains
       !> Numbers of the neighbours, shape (coordination, columns rows)
       integer, intent(out) :: neighbour(:, :)
 
-      integer :: column, row, place, slant
+      integer :: column, row, site, slant
 
       do row = 0, rows - 1
          do column = 0, columns - 1
-            place = row * columns + column + 1
-            neighbour(:2, place) = [at(column - 1, row), at(column + 1, row)]
+            site = row * columns + column + 1
+            neighbour(:2, site) = [at(column - 1, row), at(column + 1, row)]
             if (lattice == lattice_triangular) then
                slant = modulo(row, 2) - 1
-               neighbour(3:, place) = [at(column + slant, row - 1), &
+               neighbour(3:, site) = [at(column + slant, row - 1), &
                   & at(column + slant + 1, row - 1), at(column + slant, row + 1), &
                   & at(column + slant + 1, row + 1)]
             else
-               neighbour(3:, place) = [at(column, row - 1), at(column, row + 1)]
+               neighbour(3:, site) = [at(column, row - 1), at(column, row + 1)]
             end if
          end do
       end do
 
    contains
 
-      !> Number of a place.
+      !> Number of a site.
       pure integer function at(column, row)
          integer, intent(in) :: column, row
 
@@ -65,4 +65,4 @@ contains
       end function at
    end subroutine find_neighbours
 
-end module mesoslip_contacts_neighbours
+end module mesoslip_contacts_individual_neighbours

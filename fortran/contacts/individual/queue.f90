@@ -4,10 +4,11 @@
 !> slider, whose width is known, so contacts are thrown into a ring of buckets by key and only the
 !> foremost bucket is sorted. The cost of a contact does not grow with the number of contacts, and
 !> records are fetched a bucket at a time, which hides the latency of memory.
-module mesoslip_contacts_queue
+module mesoslip_contacts_individual_queue
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
-   use mesoslip_contacts_record, only: ahead_coordinate
+   use mesoslip_contacts_individual_record, only: ahead_coordinate
+   use mesoslip_contacts_individual_sorting, only: before, push, remove_first, sort
    implicit none
    private
 
@@ -20,16 +21,14 @@ module mesoslip_contacts_queue
    integer, parameter :: chunk_length = 16
    !> Mean number of contacts in a bucket when keys are spread evenly.
    integer, parameter :: bucket_load = 8
-   integer, parameter :: least_buckets = 64
-   !> Beyond this length sorting by insertion gives way to merging.
-   integer, parameter :: short_run = 16
+   integer, parameter :: min_buckets = 64
    !> Bound on bucket numbers, for keys far beyond any motion.
-   real(wp), parameter :: farthest_bucket = 1.0e15_wp
+   real(wp), parameter :: max_bucket = 1.0e15_wp
 
    !> A priority queue of contacts by key, then by number.
    type :: contact_queue_type
       private
-      !> Least key in the queue; no_key when it is empty
+      !> Smallest key in the queue; no_key when it is empty
       real(wp), public :: first_key = no_key
       !> Contacts in the queue
       integer, public :: count = 0
@@ -71,7 +70,7 @@ contains
    subroutine new_contact_queue(self, capacity, span, error)
       !> The queue
       type(contact_queue_type), intent(out) :: self
-      !> Largest number of contacts
+      !> Maximum number of contacts
       integer, intent(in) :: capacity
       !> Distance ahead of the slider within which nearly all keys lie, positive [m]
       real(wp), intent(in) :: span
@@ -80,7 +79,7 @@ contains
 
       integer :: buckets, chunks, stat
 
-      buckets = least_buckets
+      buckets = min_buckets
       do while (buckets < capacity / bucket_load)
          buckets = 2 * buckets
       end do
@@ -164,7 +163,7 @@ contains
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
-      !> Number of the contact with the least key
+      !> Number of the contact with the smallest key
       integer, intent(out) :: contact
 
       logical :: from_late
@@ -190,19 +189,19 @@ contains
       call self%find_first(record)
    end subroutine pop
 
-   !> The first contacts, in their order: so many that no other contact has the key of one of them.
-   subroutine preview(self, record, most, contact, key, number)
+   !> The first contacts, in their order: no other contact has the key of one of them.
+   subroutine preview(self, record, limit, contact, key, number)
       !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
-      !> Greatest number
-      integer, intent(in) :: most
+      !> Maximum number
+      integer, intent(in) :: limit
       !> Numbers of the contacts
       integer, intent(out) :: contact(:)
       !> Coordinates at which they break [m]
       real(wp), intent(out) :: key(:)
-      !> How many they are: none if it takes a look at all to tell
+      !> How many they are; none if that would take a look at all contacts
       integer, intent(out) :: number
 
       number = 0
@@ -210,7 +209,7 @@ contains
       if (self%front_next > self%front_count .and. self%late_count == 0) then
          call self%advance_front(record)
       end if
-      number = min(most, self%front_count - self%front_next + 1)
+      number = min(limit, self%front_count - self%front_next + 1)
       associate (front => self%front_key(self%front_next:self%front_count))
          if (self%late_count > 0) then
             do while (number > 0)
@@ -241,7 +240,7 @@ contains
       call self%find_first(record)
    end subroutine remove_previewed
 
-   !> Find the least key.
+   !> Find the smallest key.
    subroutine find_first(self, record)
       class(contact_queue_type), intent(inout) :: self
       real(wp), intent(in), contiguous :: record(:, :)
@@ -265,7 +264,7 @@ contains
 
       position = (key - self%edge) * self%inverse_width
       ! Keys behind the slider go to the front whatever their number.
-      bucket = int(min(max(position, -1.0_wp), farthest_bucket), i8)
+      bucket = int(min(max(position, -1.0_wp), max_bucket), i8)
       if (position < 0.0_wp) bucket = -1
    end function bucket_of
 
@@ -370,144 +369,4 @@ contains
       self%front_count = 0
    end subroutine take_overflow
 
-   !> Whether one contact comes before another.
-   pure function before(key_a, contact_a, key_b, contact_b)
-      real(wp), intent(in) :: key_a, key_b
-      integer, intent(in) :: contact_a, contact_b
-      logical :: before
-
-      before = key_a < key_b .or. (key_a <= key_b .and. contact_a < contact_b)
-   end function before
-
-   !> Put a contact into a binary heap, the last place of which is free.
-   pure subroutine push(heap_key, heap_contact, count, key, contact)
-      real(wp), intent(inout), contiguous :: heap_key(:)
-      integer, intent(inout), contiguous :: heap_contact(:)
-      integer, intent(in) :: count, contact
-      real(wp), intent(in) :: key
-
-      integer :: child, parent
-
-      child = count
-      do while (child > 1)
-         parent = child / 2
-         if (.not. before(key, contact, heap_key(parent), heap_contact(parent))) exit
-         heap_key(child) = heap_key(parent)
-         heap_contact(child) = heap_contact(parent)
-         child = parent
-      end do
-      heap_key(child) = key
-      heap_contact(child) = contact
-   end subroutine push
-
-   !> Remove the first contact of a binary heap.
-   pure subroutine remove_first(heap_key, heap_contact, count)
-      real(wp), intent(inout), contiguous :: heap_key(:)
-      integer, intent(inout), contiguous :: heap_contact(:)
-      integer, intent(in) :: count
-
-      integer :: parent, child, contact
-      real(wp) :: key
-
-      key = heap_key(count)
-      contact = heap_contact(count)
-      parent = 1
-      do
-         child = 2 * parent
-         if (child >= count) exit
-         if (child + 1 < count) then
-            if (before(heap_key(child + 1), heap_contact(child + 1), &
-               & heap_key(child), heap_contact(child))) child = child + 1
-         end if
-         if (.not. before(heap_key(child), heap_contact(child), key, contact)) exit
-         heap_key(parent) = heap_key(child)
-         heap_contact(parent) = heap_contact(child)
-         parent = child
-      end do
-      heap_key(parent) = key
-      heap_contact(parent) = contact
-   end subroutine remove_first
-
-   !> Sort contacts by key, then by number: short runs by insertion, longer ones by merging.
-   pure subroutine sort(key, contact, count)
-      real(wp), intent(inout), contiguous :: key(:)
-      integer, intent(inout), contiguous :: contact(:)
-      integer, intent(in) :: count
-
-      real(wp), allocatable :: left_key(:)
-      integer, allocatable :: left_contact(:)
-      integer :: first, middle, last, run
-
-      do first = 1, count, short_run
-         call insertion_sort(key, contact, first, min(first + short_run - 1, count))
-      end do
-      if (count <= short_run) return
-
-      allocate (left_key(count), left_contact(count))
-      run = short_run
-      do while (run < count)
-         do first = 1, count - run, 2 * run
-            middle = first + run - 1
-            last = min(middle + run, count)
-            call merge_runs(key, contact, first, middle, last, left_key, left_contact)
-         end do
-         run = 2 * run
-      end do
-   end subroutine sort
-
-   !> Sort one run by insertion.
-   pure subroutine insertion_sort(key, contact, first, last)
-      real(wp), intent(inout), contiguous :: key(:)
-      integer, intent(inout), contiguous :: contact(:)
-      integer, intent(in) :: first, last
-
-      integer :: position, place, moved_contact
-      real(wp) :: moved_key
-
-      do position = first + 1, last
-         moved_key = key(position)
-         moved_contact = contact(position)
-         place = position
-         do while (place > first)
-            if (.not. before(moved_key, moved_contact, key(place - 1), contact(place - 1))) exit
-            key(place) = key(place - 1)
-            contact(place) = contact(place - 1)
-            place = place - 1
-         end do
-         key(place) = moved_key
-         contact(place) = moved_contact
-      end do
-   end subroutine insertion_sort
-
-   !> Merge two neighbouring sorted runs.
-   pure subroutine merge_runs(key, contact, first, middle, last, left_key, left_contact)
-      real(wp), intent(inout), contiguous :: key(:), left_key(:)
-      integer, intent(inout), contiguous :: contact(:), left_contact(:)
-      integer, intent(in) :: first, middle, last
-
-      integer :: left, left_count, right, place
-
-      left_count = middle - first + 1
-      left_key(:left_count) = key(first:middle)
-      left_contact(:left_count) = contact(first:middle)
-      left = 1
-      right = middle + 1
-      place = first
-      do while (left <= left_count)
-         if (right <= last) then
-            if (before(key(right), contact(right), left_key(left), left_contact(left))) then
-               key(place) = key(right)
-               contact(place) = contact(right)
-               right = right + 1
-               place = place + 1
-               cycle
-            end if
-         end if
-         key(place) = left_key(left)
-         contact(place) = left_contact(left)
-         left = left + 1
-         place = place + 1
-      end do
-   end subroutine merge_runs
-
-end module mesoslip_contacts_queue
+end module mesoslip_contacts_individual_queue

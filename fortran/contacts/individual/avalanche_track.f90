@@ -1,6 +1,6 @@
 !> The contacts of an avalanche on a lattice: which they are, in what order they let go, how far
 !> they reach.
-module mesoslip_contacts_avalanche_track
+module mesoslip_contacts_individual_avalanche_track
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    implicit none
@@ -93,10 +93,10 @@ contains
       end associate
    end subroutine extent
 
-   !> Length of the shortest arc of a circle of places that holds all of some.
-   pure function arc(place, length)
+   !> Length of the shortest arc of a circle of sites that holds a set of them.
+   pure function arc(site, length)
       !> Places, from 0
-      integer, intent(in) :: place(:)
+      integer, intent(in) :: site(:)
       !> Places on the circle
       integer, intent(in) :: length
       integer :: arc
@@ -105,23 +105,23 @@ contains
       integer :: sorted(few), number, position, gap, previous, first
 
       gap = 0
-      if (size(place) <= few) then
-         do number = 1, size(place)
+      if (size(site) <= few) then
+         do number = 1, size(site)
             do position = number, 2, -1
-               if (sorted(position - 1) <= place(number)) exit
+               if (sorted(position - 1) <= site(number)) exit
                sorted(position) = sorted(position - 1)
             end do
-            sorted(position) = place(number)
+            sorted(position) = site(number)
          end do
-         previous = sorted(size(place)) - length
-         do number = 1, size(place)
+         previous = sorted(size(site)) - length
+         do number = 1, size(site)
             gap = max(gap, sorted(number) - previous - 1)
             previous = sorted(number)
          end do
       else
          allocate (marked(0:length - 1), source=.false.)
-         do number = 1, size(place)
-            marked(place(number)) = .true.
+         do number = 1, size(site)
+            marked(site(number)) = .true.
          end do
          first = findloc(marked, .true., dim=1) - 1
          previous = first
@@ -140,10 +140,10 @@ contains
       !> The track
       class(avalanche_track_type), intent(inout) :: self
 
-      integer :: place
+      integer :: site
 
-      do place = 1, self%area
-         self%contact(row_generation, self%contact(row_member, place)) = 0
+      do site = 1, self%area
+         self%contact(row_generation, self%contact(row_member, site)) = 0
       end do
       self%area = 0
       self%generation = 0
@@ -161,4 +161,4 @@ contains
       call archive%exchange("track", self%contact)
    end subroutine exchange
 
-end module mesoslip_contacts_avalanche_track
+end module mesoslip_contacts_individual_avalanche_track

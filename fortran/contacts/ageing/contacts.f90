@@ -1,0 +1,320 @@
+!> N contacts that know nothing of each other, whose thresholds change with their age.
+!>
+!> A contact breaks at the first time at which its force is its threshold, while both move. Contacts
+!> are queued by where that happens if the slider keeps to a speed, which is solved once, at birth:
+!>
+!> - under a slider that moves steadily they break there, whether thresholds grow or fall;
+!> - where its velocity changes, that of twice its speed: a slower slider takes longer, and a
+!>   threshold that grows is then higher, so a contact does not break before. The first of the queue
+!>   are solved anew, until it is known which of them break next. These lead: where they do is
+!>   foreseen from the motion of the slider, and held back by what is not known of it. A slider that
+!>   comes to where a leader was to break finds it there, or a little ahead of it and foresees
+!>   again. When the slider becomes faster than the speed of the queue, all are solved anew;
+!> - a threshold that falls is bounded by what it will be at the end of the window, which is where
+!>   and when the contact is foreseen to break, whether the slider moves or not. Few contacts do so
+!>   in most cases; of many, those are near that may break before the next scan.
+!>
+!> A contact that does not age breaks as in the ensemble without ageing, to the bit.
+module mesoslip_contacts_ageing_contacts
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, in_falling, in_leaders, &
+      & in_queue, &
+      & life_birth, life_length, life_limit, life_motion, next_length, next_speed, no_motion
+   use mesoslip_contacts_ageing_falling, only: bound_falling, break_falling, scan, scan_if_needed
+   use mesoslip_contacts_ageing_law, only: take_ageing_law
+   use mesoslip_contacts_ageing_leaders, only: bound_leaders, break_leaders
+   use mesoslip_contacts_ageing_lists, only: append
+   use mesoslip_contacts_ageing_motion, only: bound_speed, follow_motion, min_ratio
+   use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, queue_newborn
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
+   use mesoslip_contacts_individual_base, only: exchange_individual, total_law
+   use mesoslip_contacts_individual_queue, only: new_contact_queue
+   use mesoslip_contacts_individual_record, only: row_limit
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   implicit none
+   private
+
+   public :: contact_ageing_type, make_contact_ageing
+
+   !> A probability too small to meet among the keys of a ring of buckets.
+   real(wp), parameter :: negligible = 1.0e-4_wp
+   !> How much of the acceleration jump of the slider is remembered at its next motion.
+   real(wp), parameter :: memory = 0.99_wp
+   !> How near behind the slider, over the mean breaking stretch, the queue is turned round: a bound
+   !> that recedes is not to be met in ever smaller steps.
+   real(wp), parameter :: near_behind = 1.0e-2_wp
+
+   !> Contacts that age.
+   type, extends(ageing_contacts_type) :: contact_ageing_type
+   contains
+      procedure :: initialize
+      procedure :: offer
+      procedure :: respond
+      procedure :: join
+      procedure :: shift_order
+      procedure :: exchange
+      procedure, private, non_overridable :: break_due, assign, face
+   end type contact_ageing_type
+
+contains
+
+   !> Set up contacts that age from named numbers.
+   subroutine make_contact_ageing(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: the law of ageing, and whether the slider jumps
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_ageing_type), allocatable :: self
+      real(wp) :: longest, rate
+      integer :: stat
+
+      allocate (self)
+      self%parameters = common
+      call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
+      call parameters%take("slider_jumps", self%jumps, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      self%stretch = common%static_force / common%stiffness
+      self%speed = min_ratio * self%stretch / self%ageing%time
+      self%may_outrun = self%ageing%acts() .and. .not. self%jumps
+      if (self%jumps) self%speed = huge(1.0_wp)
+      call self%allocate_records(0, 0, error)
+      if (allocated(error)) return
+      associate (count => common%count)
+         allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
+         if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
+         if (stat == 0) allocate (self%kept(count), source=in_queue, stat=stat)
+         if (stat == 0) allocate (self%leaders%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%falling%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%near%contact(count), source=0, stat=stat)
+      end associate
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the ages of contacts")
+         return
+      end if
+      ! As for contacts that do not age: keys that grow with time are farther along the ring.
+      call self%ageing%evaluate(max(self%parameters%law%quantile(negligible), 1.0_wp), 1.0_wp, &
+         & self%ageing%time, longest, rate)
+      longest = max(longest, self%parameters%law%quantile(negligible), 1.0_wp)
+      call new_contact_queue(self%queue, common%count, &
+         & 1.1_wp * self%stretch * longest * (1.0_wp + common%back_force_ratio), error)
+      call move_alloc(self, contacts)
+   end subroutine make_contact_ageing
+
+   !> Draw all contacts for the start of a run.
+   subroutine initialize(self, state)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      integer :: contact
+
+      call self%draw(state)
+      do contact = 1, self%parameters%count
+         self%life(life_birth, contact) = -self%ageing%initial_age
+         self%life(life_limit, contact) = self%record(row_limit, contact)
+         call self%assign(contact, 0.0_wp, 0.0_wp)
+      end do
+      call self%order_anew(0.0_wp)
+   end subroutine initialize
+
+   !> Contact force as a law, which holds until a contact breaks or attaches.
+   subroutine offer(self, pose, law, window)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds; a contact may break at its lower end if the motion is forward
+      type(window_type), intent(out) :: window
+
+      real(wp) :: upper, lower, end_time
+
+      law = total_law(self)
+      upper = huge(1.0_wp)
+      lower = self%behind
+      end_time = self%detached%next_due
+      call follow_motion(self, pose)
+      if (self%is_steady) then
+         upper = self%queue%first_key
+      else
+         if (self%may_outrun) call bound_speed(self, pose, end_time)
+         call scan_if_needed(self, pose)
+         call bound_leaders(self, pose, upper)
+         call bound_falling(self, pose, upper, lower, end_time)
+      end if
+      window = self%window_between(lower, upper, end_time)
+   end subroutine offer
+
+   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
+   subroutine respond(self, before, after)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: breaks
+
+      self%now = after%time
+      self%duration = after%time - before%time
+      self%acceleration_jump = max(abs(after%acceleration - before%acceleration), &
+         & memory * self%acceleration_jump)
+      breaks = self%breaks
+      self%is_unchanged = self%detached%next_due > after%time
+      if (self%is_steady) then
+         if (abs(after%velocity - before%velocity) + abs(after%acceleration) > 0.0_wp) then
+            call end_steady(self, after)
+         end if
+      end if
+      call self%break_due(after)
+      if (self%breaks > breaks) self%is_unchanged = .false.
+      call self%attach_due(after)
+   end subroutine respond
+
+   !> Break all contacts that are due.
+   subroutine break_due(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: breaks, margin
+      integer :: contact
+
+      if (self%direction * pose%displacement <= self%behind) then
+         ! The bound may be that of a contact which has broken since.
+         self%behind = self%max_behind()
+         margin = 0.0_wp
+         if (self%ageing%acts()) margin = near_behind * self%stretch
+         if (self%direction * pose%displacement <= self%behind + margin) call self%face(pose)
+      end if
+      breaks = self%breaks
+      if (self%is_steady) then
+         call break_steady(self, pose)
+      else
+         call break_falling(self, pose)
+         call break_leaders(self, pose)
+         do while (self%queue%first_key <= self%direction * pose%displacement)
+            call self%queue%pop(self%record, contact)
+            call self%refresh(contact, pose%time)
+            if (self%is_due(contact, pose)) then
+               call self%record_delay(contact, pose)
+               call self%detach(contact, pose%displacement, pose%time)
+            else
+               call append(self%leaders, contact)
+               self%kept(contact) = in_leaders
+            end if
+         end do
+      end if
+      if (self%breaks > breaks) self%track%generation = self%track%generation + 1
+   end subroutine break_due
+
+   !> Find where a contact belongs that has attached.
+   subroutine join(self, contact, pose)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      self%life(life_birth, contact) = pose%time
+      self%life(life_limit, contact) = self%record(row_limit, contact)
+      if (self%is_steady) then
+         call queue_newborn(self, contact)
+      else
+         self%next(next_speed, contact) = 0.0_wp
+         call self%assign(contact, pose%displacement, pose%time)
+      end if
+      if (self%kept(contact) == in_queue) then
+         call self%put(contact)
+         self%behind = max(self%behind, self%behind_at(contact, pose%time))
+      end if
+   end subroutine join
+
+   !> Find the place of a contact that is born or drawn.
+   subroutine assign(self, contact, displacement, time)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> Where the slider is [m], and when that is [s]
+      real(wp), intent(in) :: displacement, time
+
+      self%kept(contact) = in_queue
+      if (self%is_steady) then
+         call self%order(contact, displacement, time)
+      else if (self%ageing%falls(self%life(life_limit, contact), self%stretch) &
+         & .and. .not. self%ageing%is_old(time - self%life(life_birth, contact))) then
+         self%kept(contact) = in_falling
+         call append(self%falling, contact)
+         call append(self%near, contact)
+         call self%refresh(contact, self%scan_time)
+         self%life(life_motion, contact) = no_motion
+      else
+         call self%order(contact, displacement, time)
+      end if
+   end subroutine assign
+
+   !> Turn round: keep the queue for the other direction of motion, with the thresholds of now.
+   subroutine face(self, pose)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      if (self%is_steady) call end_steady(self, pose)
+      self%direction = -self%direction
+      if (self%falling%count > 0) call scan(self, pose)
+      call self%order_all(pose)
+      self%behind = self%max_behind()
+   end subroutine face
+
+   !> Move the coordinates of the last scan.
+   subroutine shift_order(self, shift)
+      !> The contacts, their records moved
+      class(contact_ageing_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      if (self%scan_upper < huge(1.0_wp)) then
+         self%scan_upper = self%scan_upper - self%direction * shift
+         self%scan_lower = self%scan_lower - self%direction * shift
+      end if
+   end subroutine shift_order
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("contacts that age")
+      call exchange_individual(self, archive)
+      call archive%exchange("life", self%life)
+      call archive%exchange("kept", self%kept)
+      call archive%exchange("leaders", self%leaders%contact)
+      call archive%exchange("leaders_count", self%leaders%count)
+      call archive%exchange("falling", self%falling%contact)
+      call archive%exchange("falling_count", self%falling%count)
+      call archive%exchange("near", self%near%contact)
+      call archive%exchange("near_count", self%near%count)
+      call archive%exchange("scan_upper", self%scan_upper)
+      call archive%exchange("scan_lower", self%scan_lower)
+      call archive%exchange("scan_time", self%scan_time)
+      call archive%exchange("now", self%now)
+      call archive%exchange("duration", self%duration)
+      call archive%exchange("acceleration_jump", self%acceleration_jump)
+      call archive%exchange("is_unchanged", self%is_unchanged)
+      call archive%exchange("is_steady", self%is_steady)
+      call archive%exchange("motion", self%motion)
+      call archive%exchange("speed", self%speed)
+      call archive%exchange("solved", self%solved)
+   end subroutine exchange
+
+end module mesoslip_contacts_ageing_contacts

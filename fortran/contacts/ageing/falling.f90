@@ -1,0 +1,182 @@
+!> Contacts that age whose thresholds fall.
+!>
+!> A falling threshold is bounded by what it will be at the end of the window, which is where and
+!> when the contact is foreseen to break, whether the slider moves or not. Few contacts do so in
+!> most cases; of many, those are near that may break before the next scan.
+module mesoslip_contacts_ageing_falling
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, few, life_birth, &
+      & life_limit, life_motion, tiny_gap, in_queue
+   use mesoslip_contacts_ageing_lists, only: append, position_of, remove
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, ahead_coordinate, &
+      & behind_coordinate
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: scan, scan_if_needed, bound_falling, break_falling
+
+   !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
+   integer, parameter :: max_steps = 32
+
+contains
+
+   !> Find the contacts near breaking of those whose thresholds fall, and for how long they are.
+   subroutine scan(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: position, contact
+      real(wp) :: fastest, limit, rate, reach
+
+      do position = self%falling%count, 1, -1
+         call retire(self, self%falling%contact(position), pose%time)
+      end do
+      self%scan_upper = huge(1.0_wp)
+      self%scan_lower = -huge(1.0_wp)
+      self%scan_time = huge(1.0_wp)
+      if (self%falling%count > few) then
+         fastest = 0.0_wp
+         do position = 1, self%falling%count
+            contact = self%falling%contact(position)
+            call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, &
+               & pose%time - self%life(life_birth, contact), limit, rate)
+            fastest = max(fastest, -rate)
+         end do
+         ! About as many scans while the slider moves by a stretch as contacts that are near.
+         reach = 0.5_wp * self%stretch / sqrt(real(self%falling%count, wp))
+         self%scan_upper = self%direction * pose%displacement + reach
+         self%scan_lower = self%direction * pose%displacement - reach
+         if (fastest > 0.0_wp) then
+            self%scan_time = max(pose%time + reach / fastest, nearest(pose%time, 1.0_wp))
+         end if
+      end if
+      self%near%count = 0
+      do position = 1, self%falling%count
+         contact = self%falling%contact(position)
+         call self%refresh(contact, self%scan_time)
+         if (ahead_coordinate(self%record(:, contact), self%direction) < self%scan_upper .or. &
+            & behind_coordinate(self%record(:, contact), self%direction) > self%scan_lower) then
+            call append(self%near, contact)
+         end if
+      end do
+   end subroutine scan
+
+   !> Scan the contacts whose thresholds fall if that is due; those that are old do so no more.
+   subroutine scan_if_needed(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: position
+
+      if (self%falling%count == 0) return
+      do position = self%near%count, 1, -1
+         call retire(self, self%near%contact(position), pose%time)
+      end do
+      if (pose%time >= self%scan_time &
+         & .or. self%direction * pose%displacement >= self%scan_upper &
+         & .or. self%direction * pose%displacement <= self%scan_lower &
+         & .or. self%near%count > max(few, self%falling%count / 2)) call scan(self, pose)
+   end subroutine scan_if_needed
+
+   !> Put a contact whose threshold has fallen into the queue.
+   subroutine retire(self, contact, time)
+      class(ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time
+
+      integer :: position
+
+      if (.not. self%ageing%is_old(time - self%life(life_birth, contact))) return
+      position = position_of(self%near, contact)
+      if (position > 0) call remove(self%near, position)
+      call remove(self%falling, position_of(self%falling, contact))
+      self%record(row_limit, contact) = self%life(life_limit, contact)
+      self%life(life_motion, contact) = any_motion
+      call self%put(contact)
+      self%behind = max(self%behind, self%behind_at(contact, time))
+   end subroutine retire
+
+   !> Find until where and when the slider may go before a contact breaks whose threshold falls.
+   subroutine bound_falling(self, pose, upper, lower, end_time)
+      class(ageing_contacts_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> Coordinates between which [m], and time until which [s], no contact breaks
+      real(wp), intent(inout) :: upper, lower, end_time
+
+      integer :: position
+
+      upper = min(upper, self%scan_upper)
+      lower = max(lower, self%scan_lower)
+      end_time = min(end_time, self%scan_time)
+      do position = 1, self%near%count
+         associate (contact => self%near%contact(position))
+            if (ahead_coordinate(self%record(:, contact), self%direction) < upper &
+               & .or. behind_coordinate(self%record(:, contact), self%direction) > lower) then
+               call foresee_fall(self, contact, pose, upper, lower, end_time)
+            end if
+         end associate
+      end do
+   end subroutine bound_falling
+
+   !> Where and when a contact is foreseen to break whose threshold falls: before that, it cannot.
+   pure subroutine foresee_fall(self, contact, pose, upper, lower, end_time)
+      class(ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(inout) :: upper, lower, end_time
+
+      real(wp) :: age, limit, rate, stretch, speed, step, gap, longest
+      integer :: number
+
+      age = pose%time - self%life(life_birth, contact)
+      stretch = pose%displacement - self%record(row_origin, contact)
+      speed = max(0.0_wp, sign(1.0_wp, stretch) * pose%velocity)
+      stretch = abs(stretch)
+      longest = end_time - pose%time
+      step = 0.0_wp
+      do number = 1, max_steps
+         call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, age + step, &
+            & limit, rate)
+         gap = limit - stretch - speed * step
+         if (gap <= 0.1_wp * tiny_gap * self%stretch) exit
+         if (speed - rate > 0.0_wp) then
+            step = step + gap / (speed - rate)
+         else
+            step = longest
+         end if
+         if (.not. step < longest) exit
+      end do
+      ! A slider that jumps comes closer while time stands still: both have to have room.
+      if (self%jumps .and. .not. speed > 0.0_wp) step = 0.5_wp * step
+      if (step < longest) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))
+      limit = max(stretch, self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+         & end_time - self%life(life_birth, contact)))
+      upper = min(upper, self%direction * self%record(row_origin, contact) + limit)
+      lower = max(lower, self%direction * self%record(row_origin, contact) - limit)
+   end subroutine foresee_fall
+
+   !> Break the contacts that are due of those whose thresholds fall, in either direction.
+   subroutine break_falling(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stretch, limit
+      integer :: position, contact
+
+      do position = self%near%count, 1, -1
+         contact = self%near%contact(position)
+         stretch = abs(pose%displacement - self%record(row_origin, contact)) &
+            & + tiny_gap * self%stretch
+         if (self%record(row_limit, contact) > stretch) cycle
+         limit = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+            & pose%time - self%life(life_birth, contact))
+         if (limit > stretch) cycle
+         call self%detach(contact, pose%displacement, pose%time)
+         call remove(self%near, position)
+         call remove(self%falling, position_of(self%falling, contact))
+         self%kept(contact) = in_queue
+      end do
+   end subroutine break_falling
+
+end module mesoslip_contacts_ageing_falling

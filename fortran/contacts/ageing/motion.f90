@@ -1,0 +1,91 @@
+!> Speed for which contacts that age are queued.
+!>
+!> Where the velocity of the slider changes, they are queued for twice its speed: a slower slider
+!> takes longer, and a threshold that grows is then higher, so that a contact does not break before.
+!> When the slider becomes faster than the speed of the queue, all are solved anew.
+module mesoslip_contacts_ageing_motion
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, safety
+   use mesoslip_contacts_ageing_steady, only: begin_steady, end_steady
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: follow_motion, bound_speed, min_ratio
+
+   !> Speed of the queue over that of the slider: when it is set, and when it is too low or too high
+   real(wp), parameter :: set_ratio = 2.0_wp, min_speed_ratio = 1.3_wp, max_speed_ratio = 8.0_wp
+   !> Speed over that of ageing below which contacts are old where they break
+   real(wp), parameter :: min_ratio = 0.05_wp
+   !> Time within which a slider becomes faster, if it does at all [s]
+   real(wp), parameter :: max_time = 1.0e9_wp
+
+contains
+
+   !> See how the slider moves now, and to it that the queue is ordered for that.
+   subroutine follow_motion(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      logical :: is_steady
+
+      is_steady = self%direction * pose%velocity > 0.0_wp .and. .not. self%jumps &
+         & .and. .not. abs(pose%acceleration) > 0.0_wp
+      if (self%is_steady) then
+         if (is_steady .and. .not. abs(abs(pose%velocity) - self%speed) > 0.0_wp) return
+         call end_steady(self, pose)
+      end if
+      if (is_steady) then
+         call begin_steady(self, pose)
+      else if (self%may_outrun) then
+         call set_speed(self, pose)
+      end if
+   end subroutine follow_motion
+
+   !> See to it that the slider is slower than the speed of the queue, but not by far.
+   subroutine set_speed(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: least
+
+      least = min_ratio * self%stretch / self%ageing%time
+      if (min_speed_ratio * abs(pose%velocity) > self%speed) then
+         self%speed = max(set_ratio * abs(pose%velocity), least)
+         call self%order_all(pose)
+      else if (self%solved > self%parameters%count &
+         & .and. max_speed_ratio * max(abs(pose%velocity), least) < self%speed) then
+         ! What is queued for a higher speed is so for a lower one as well.
+         self%speed = max(set_ratio * abs(pose%velocity), least)
+         self%solved = 0
+      end if
+   end subroutine set_speed
+
+   !> End a window before the slider may become faster than the speed of the queue, by what is known
+   !> of its motion.
+   pure subroutine bound_speed(self, pose, end_time)
+      class(ageing_contacts_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(inout) :: end_time
+
+      real(wp) :: room, pull, acceleration_jump, time
+
+      room = self%speed - abs(pose%velocity)
+      pull = abs(pose%acceleration)
+      acceleration_jump = safety * self%acceleration_jump
+      time = min(end_time - pose%time, max_time)
+      if (2.0_wp * (pull + acceleration_jump) * time <= room) return
+      time = 0.5_wp * room / (pull + acceleration_jump)
+      if (time > self%duration .and. self%duration > 0.0_wp) then
+         ! Over a longer time than the last one, the acceleration may change by more.
+         time = max_time
+         if (2.0_wp * pull * time > 0.5_wp * room) time = 0.25_wp * room / pull
+         if (2.0_wp * acceleration_jump * time**2 > 0.5_wp * room * self%duration) then
+            time = sqrt(0.25_wp * room * self%duration / acceleration_jump)
+         end if
+         time = max(time, self%duration)
+      end if
+      end_time = min(end_time, max(pose%time + time, nearest(pose%time, 1.0_wp)))
+   end subroutine bound_speed
+
+end module mesoslip_contacts_ageing_motion

@@ -1,0 +1,158 @@
+!> Contacts that age under a slider that moves steadily.
+!>
+!> They are queued by where they break if it goes on so, whether their thresholds grow or fall,
+!> which is solved once, at birth, or before that for the next lives of several contacts together.
+module mesoslip_contacts_ageing_steady
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, in_falling, &
+      & in_queue, life_limit, life_motion, next_length, next_limit, next_speed, solved_together
+   use mesoslip_contacts_ageing_falling, only: scan
+   use mesoslip_contacts_ageing_lists, only: append
+   use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
+   use mesoslip_contacts_individual_record, only: row_limit, row_next, row_stiffness, &
+      & ahead_coordinate
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: begin_steady, end_steady, break_steady, queue_newborn
+
+contains
+
+   !> Order all for a steady motion, whether their thresholds grow or fall.
+   subroutine begin_steady(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: position
+      logical :: was_slower
+
+      self%is_steady = .true.
+      self%motion = self%motion + 1.0_wp
+      was_slower = abs(pose%velocity) > self%speed
+      self%speed = abs(pose%velocity)
+      if (was_slower) then
+         call self%order_all(pose)
+      else
+         do position = 1, self%leaders%count
+            call self%order(self%leaders%contact(position), pose%displacement, pose%time)
+            call self%put(self%leaders%contact(position))
+         end do
+         do position = 1, self%falling%count
+            call self%order(self%falling%contact(position), pose%displacement, pose%time)
+            call self%put(self%falling%contact(position))
+         end do
+         self%leaders%count = 0
+      end if
+      if (self%falling%count > 0) self%behind = self%max_behind()
+      self%falling%count = 0
+      self%near%count = 0
+   end subroutine begin_steady
+
+   !> Take those out of the queue that may break earlier when the motion is another.
+   subroutine end_steady(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+
+      self%is_steady = .false.
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         if (self%life(life_motion, contact) >= any_motion) cycle
+         if (.not. self%ageing%falls(self%life(life_limit, contact), self%stretch)) cycle
+         call append(self%falling, contact)
+         self%kept(contact) = in_falling
+      end do
+      if (self%falling%count == 0) return
+      call self%queue%clear(self%direction, self%direction * pose%displacement)
+      call scan(self, pose)
+      call self%rebuild(pose%displacement)
+   end subroutine end_steady
+
+   !> Break the contacts that are due under a steady motion; others were queued for a faster one.
+   subroutine break_steady(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+
+      do while (self%queue%first_key <= self%direction * pose%displacement)
+         call self%queue%pop(self%record, contact)
+         if (self%life(life_motion, contact) < self%motion) then
+            call self%order(contact, pose%displacement, pose%time)
+            if (ahead_coordinate(self%record(:, contact), self%direction) &
+               & > self%direction * pose%displacement) then
+               call self%put(contact)
+               cycle
+            end if
+            call self%record_delay(contact, pose)
+         end if
+         call self%detach(contact, pose%displacement, pose%time)
+      end do
+   end subroutine break_steady
+
+   !> Queue a contact that is born in a steady motion.
+   subroutine queue_newborn(self, contact)
+      class(ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      real(wp) :: stretch, solved(next_length)
+
+      stretch = self%parameters%back_force_ratio * self%stretch
+      solved = self%next(:, contact)
+      self%next(next_speed, contact) = 0.0_wp
+      associate (life => self%life(:, contact))
+         if (self%ageing%is_constant(life(life_limit), self%stretch)) then
+            self%kept(contact) = in_queue
+            life(life_motion) = any_motion
+            return
+         end if
+         self%kept(contact) = in_queue
+         life(life_motion) = self%motion
+         if (abs(solved(next_speed) - self%speed) > 0.0_wp) then
+            self%record(row_limit, contact) = meet(self%ageing, life(life_limit), self%stretch, &
+               & 0.0_wp, stretch, self%speed)
+         else
+            self%record(row_limit, contact) = solved(next_limit)
+         end if
+      end associate
+      self%solved = self%solved + 1
+      self%unsolved_count = self%unsolved_count + 1
+      self%unsolved(self%unsolved_count) = contact
+      if (self%unsolved_count == solved_together) call solve_next_lives(self, stretch)
+   end subroutine queue_newborn
+
+   !> Solve ahead where contacts will break in their next lives, if their thresholds are drawn.
+   subroutine solve_next_lives(self, stretch)
+      class(ageing_contacts_type), intent(inout) :: self
+      !> Stretch at birth [m]
+      real(wp), intent(in) :: stretch
+
+      real(wp), dimension(solved_together) :: configured, limit
+      integer :: contact(solved_together), position, number, left
+
+      number = 0
+      left = 0
+      do position = 1, self%unsolved_count
+         associate (one => self%unsolved(position))
+            if (self%record(row_next, one) > 0.0_wp) then
+               number = number + 1
+               contact(number) = one
+               configured(number) = self%record(row_next, one) * self%parameters%static_force &
+                  & / self%parameters%stiffness
+            else
+               left = left + 1
+               self%unsolved(left) = one
+            end if
+         end associate
+      end do
+      self%unsolved_count = left
+      call meet_newborn(self%ageing, configured(:number), self%stretch, stretch, self%speed, &
+         & limit(:number))
+      do position = 1, number
+         self%next(:, contact(position)) = [limit(position), self%speed]
+      end do
+   end subroutine solve_next_lives
+
+end module mesoslip_contacts_ageing_steady

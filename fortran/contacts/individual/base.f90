@@ -1,0 +1,535 @@
+!> Contacts one by one: their records, how one detaches and attaches, what all kinds of them do.
+!>
+!> The earthquake-like model but for when contacts break. A kind keeps them in an order of breaking
+!> by a key of its own, and answers where the first one breaks (offer), which break (respond), where
+!> a contact that has attached belongs (join), and where it breaks on the way back (behind_of).
+!> Coordinates are along a direction of motion; displacements are relative to an origin that the
+!> caller moves along.
+module mesoslip_contacts_individual_base
+   use mesoslip_contacts_base, only: contacts_type, exchange_contacts, extent_length
+   use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
+      & new_avalanche_track, row_generation
+   use mesoslip_contacts_individual_births, only: bear, births_type, drag_of
+   use mesoslip_contacts_individual_detached, only: detached_contacts_type, new_detached_contacts
+   use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
+      & row_origin, row_renewal, row_stiffness, behind_coordinate
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_schedule, only: max_events, schedule_type
+   implicit none
+   private
+
+   public :: individual_contacts_type, exchange_individual, total_law, snapshot_individual
+
+   !> N contacts one by one.
+   type, abstract, extends(contacts_type) :: individual_contacts_type
+      !> Records of the contacts, shape (record_length, count)
+      real(wp), allocatable :: record(:, :)
+      !> Contacts that are detached
+      type(detached_contacts_type) :: detached
+      !> Births to come
+      type(births_type) :: births
+      !> Totals of stiffness and of stiffness times origin of the pinned, of drag of the detached
+      type(accumulator_type) :: stiffness, offset, drag
+      !> Contacts of the present avalanche
+      type(avalanche_track_type) :: track
+      !> Stiffness of all bonds of a contact to its neighbours; 0 without neighbours [N/m]
+      real(wp) :: bonds = 0.0_wp
+      !> Direction of motion for which the order of breaking is kept, +1 or -1
+      real(wp) :: direction = 1.0_wp
+      !> Bound on the coordinates at which contacts break on the way back [m]
+      real(wp) :: behind = -huge(1.0_wp)
+   contains
+      procedure :: law => total_law
+      procedure :: shift_origin
+      procedure :: elastic_energy
+      procedure :: snapshot => snapshot_individual
+      procedure :: individual_count
+      procedure :: records
+      procedure :: take_extent
+      !> Put a contact that has attached into the order of breaking
+      procedure(join_interface), deferred :: join
+      !> Greatest coordinate at which a pinned contact breaks on the way back
+      procedure :: behind_of
+      !> Force of its neighbours on a contact that attaches
+      procedure :: neighbour_force
+      !> Move what a kind knows of the origin
+      procedure :: shift_order
+      !> Make room for the contacts
+      procedure, non_overridable :: allocate_records
+      !> Draw all contacts for the start of a run
+      procedure, non_overridable :: draw
+      !> A contact breaks
+      procedure, non_overridable :: detach
+      !> Attach all contacts that are due
+      procedure, non_overridable :: attach_due
+      !> Order all contacts anew, from the records
+      procedure, non_overridable :: order_anew
+      !> The greatest of the coordinates at which contacts break on the way back
+      procedure, non_overridable :: max_behind
+      !> Window between two coordinates
+      procedure, non_overridable :: window_between
+      !> The next attachments, for a schedule
+      procedure, non_overridable :: list_attachments
+      !> Keep the books of a schedule, but for the order of breaking
+      procedure, non_overridable :: detach_listed
+      procedure, non_overridable :: attach_listed
+      procedure, non_overridable, private :: attach_next, sum_totals
+   end type individual_contacts_type
+
+   abstract interface
+      !> Put a contact that has attached into the order of breaking.
+      subroutine join_interface(self, contact, pose)
+         import :: individual_contacts_type, pose_type
+         implicit none
+         !> The contacts
+         class(individual_contacts_type), intent(inout) :: self
+         !> Number of the contact
+         integer, intent(in) :: contact
+         !> Where the slider is
+         type(pose_type), intent(in) :: pose
+      end subroutine join_interface
+   end interface
+
+contains
+
+   !> Make room for the contacts, and for their avalanches if they are on a lattice.
+   subroutine allocate_records(self, columns, rows, error)
+      !> The contacts, their parameters set
+      class(individual_contacts_type), intent(inout) :: self
+      !> Columns and rows of the lattice; no columns when contacts are not on one
+      integer, intent(in) :: columns, rows
+      !> Set if there is not enough memory, or the lattice does not hold the contacts
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
+
+      if (columns > 0 .and. columns * rows /= self%parameters%count) then
+         call raise(error, status_invalid, "columns times rows of the lattice must be the number " &
+            & // "of contacts")
+         return
+      end if
+      allocate (self%record(record_length, self%parameters%count), source=0.0_wp, stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the contacts")
+         return
+      end if
+      call new_detached_contacts(self%detached, self%parameters%count, self%parameters%reattach, &
+         & error)
+      if (.not. allocated(error)) call new_avalanche_track(self%track, columns, rows, error)
+   end subroutine allocate_records
+
+   !> Draw all contacts for the start of a run.
+   subroutine draw(self, state)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      call self%births%draw_all(self%parameters, state, self%record)
+      call self%sum_totals()
+   end subroutine draw
+
+   !> Contact force as a law.
+   pure function total_law(self) result(law)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> The law that holds until a contact breaks or attaches
+      type(interface_law_type) :: law
+
+      law%stiffness = self%stiffness%total()
+      law%offset = self%offset%total()
+      law%drag = self%drag%total()
+   end function total_law
+
+   !> Window between two coordinates along the direction of motion.
+   pure function window_between(self, behind, ahead, end_time) result(window)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> Coordinates between which no contact breaks [m], and time at which the law ends [s]
+      real(wp), intent(in) :: behind, ahead, end_time
+      !> The window
+      type(window_type) :: window
+
+      window%end_time = end_time
+      if (self%direction > 0.0_wp) then
+         window%upper = ahead
+         window%lower = behind
+      else
+         window%upper = -behind
+         window%lower = -ahead
+      end if
+   end function window_between
+
+   !> A contact breaks: it leaves its force, and waits to attach again.
+   subroutine detach(self, contact, displacement, time)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Displacement [m] and time [s]
+      real(wp), intent(in) :: displacement, time
+
+      real(wp) :: stiffness, origin, drag
+
+      associate (record => self%record(:, contact))
+         origin = record(row_origin)
+         stiffness = record(row_stiffness)
+         record(row_stiffness) = 0.0_wp
+         record(row_renewal) = record(row_renewal) + 1.0_wp
+      end associate
+
+      drag = drag_of(self%parameters, stiffness)
+      call self%break_loss%add(0.5_wp * stiffness * (displacement - origin)**2)
+      call self%stiffness%add(-stiffness)
+      call self%offset%add(-stiffness * origin)
+      if (drag > 0.0_wp) call self%drag%add(drag)
+      self%breaks = self%breaks + 1.0_wp
+      call self%track%add(contact)
+      call self%detached%push(contact, time + self%parameters%delay, drag)
+      if (self%detached%count == self%parameters%count) then
+         self%stiffness = accumulator_type()
+         self%offset = accumulator_type()
+      end if
+   end subroutine detach
+
+   !> Attach all contacts that are due, in the order in which they broke.
+   subroutine attach_due(self, pose)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+      real(wp) :: back_force, force
+
+      back_force = pose%direction * self%parameters%back_force_ratio * self%parameters%static_force
+      do while (self%detached%next_due <= pose%time)
+         force = back_force
+         if (self%bonds > 0.0_wp) then
+            force = back_force &
+               & + self%neighbour_force(self%detached%next_contact(), pose%displacement)
+         end if
+         call self%attach_next(pose%displacement, force, contact)
+         call self%join(contact, pose)
+      end do
+      self%detached_count = real(self%detached%count, wp)
+   end subroutine attach_due
+
+   !> Force of its neighbours on a contact that attaches: none unless a kind has neighbours.
+   pure function neighbour_force(self, contact, displacement) result(force)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Force of the neighbours where the stretch of the contact is zero [N]
+      real(wp) :: force
+
+      force = 0.0_wp
+   end function neighbour_force
+
+   !> Attach the contact that is the next one to do so.
+   subroutine attach_next(self, displacement, force, contact)
+      class(individual_contacts_type), intent(inout) :: self
+      real(wp), intent(in) :: displacement
+      !> Force that the contact bears when it attaches, with that of its neighbours [N]
+      real(wp), intent(in) :: force
+      !> Number of the contact
+      integer, intent(out) :: contact
+
+      real(wp) :: stiffness, limit, origin, drag
+
+      call self%detached%pop(contact, drag)
+      if (.not. self%record(row_next, contact) > 0.0_wp) then
+         call self%births%draw(self%parameters, self%record)
+      end if
+      call bear(self%parameters, self%record(row_next, contact), stiffness, limit)
+      origin = displacement - force / (stiffness + self%bonds)
+      call self%drag%add(-drag)
+      if (self%detached%count == 0) self%drag = accumulator_type()
+      call self%birth_gain%add(0.5_wp * stiffness * (displacement - origin)**2)
+      call self%stiffness%add(stiffness)
+      call self%offset%add(stiffness * origin)
+      self%record(row_origin, contact) = origin
+      self%record(row_stiffness, contact) = stiffness
+      self%record(row_limit, contact) = limit
+      call self%births%request(contact, self%parameters, self%record)
+   end subroutine attach_next
+
+   !> List the next contacts to attach in a schedule, up to a number.
+   subroutine list_attachments(self, limit, direction, schedule)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Maximum number
+      integer, intent(in) :: limit
+      !> Sign of the velocity at which they attach
+      real(wp), intent(in) :: direction
+      !> The schedule
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: number, event, contact(max_events)
+      real(wp) :: threshold(max_events), back_force
+
+      call self%detached%preview(limit, number, contact, schedule%attach_time, &
+         & schedule%attach_drag)
+      do event = 1, number
+         threshold(event) = self%record(row_next, contact(event))
+      end do
+      if (.not. all(threshold(:number) > 0.0_wp)) then
+         call self%births%draw(self%parameters, self%record)
+         do event = 1, number
+            threshold(event) = self%record(row_next, contact(event))
+         end do
+      end if
+      back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
+      do event = 1, number
+         call bear(self%parameters, threshold(event), schedule%attach_stiffness(event), &
+            & schedule%attach_limit(event))
+         schedule%attach_stretch(event) = back_force / schedule%attach_stiffness(event)
+      end do
+      schedule%attachments = number
+      schedule%attached = 0
+      schedule%delay = self%parameters%delay
+      if (.not. self%parameters%reattach) schedule%delay = huge(1.0_wp)
+      schedule%stiffness = self%stiffness
+      schedule%offset = self%offset
+      schedule%drag = self%drag
+      schedule%detached = self%detached%count
+      schedule%pinned = self%parameters%count - self%detached%count
+   end subroutine list_attachments
+
+   !> Keep the books of the contacts of a schedule that broke.
+   subroutine detach_listed(self, contact, schedule)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Numbers of those that broke, in their order
+      integer, intent(in) :: contact(:)
+      !> The schedule
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event
+
+      do event = 1, schedule%broken
+         self%record(row_stiffness, contact(event)) = 0.0_wp
+         self%record(row_renewal, contact(event)) = self%record(row_renewal, contact(event)) &
+            & + 1.0_wp
+         call self%break_loss%add(0.5_wp * schedule%break_stiffness(event) &
+            * (schedule%break_displacement(event) - schedule%break_origin(event))**2)
+         call self%detached%push(contact(event), &
+            & schedule%break_time(event) + self%parameters%delay, schedule%break_drag(event))
+      end do
+      self%breaks = self%breaks + schedule%broken
+      self%stiffness = schedule%stiffness
+      self%offset = schedule%offset
+      self%drag = schedule%drag
+   end subroutine detach_listed
+
+   !> Keep the books of the contacts of a schedule that attached.
+   subroutine attach_listed(self, schedule, contact)
+      !> The contacts, those that broke being detached
+      class(individual_contacts_type), intent(inout) :: self
+      !> The schedule
+      type(schedule_type), intent(in) :: schedule
+      !> Numbers of those that attached, in their order
+      integer, intent(out) :: contact(:)
+
+      integer :: event
+      real(wp) :: drag
+
+      do event = 1, schedule%attached
+         call self%detached%pop(contact(event), drag)
+         associate (record => self%record(:, contact(event)))
+            record(row_origin) = schedule%attach_displacement(event) &
+               & - schedule%attach_stretch(event)
+            record(row_stiffness) = schedule%attach_stiffness(event)
+            record(row_limit) = schedule%attach_limit(event)
+            call self%birth_gain%add(0.5_wp * record(row_stiffness) &
+               & * (schedule%attach_displacement(event) - record(row_origin))**2)
+         end associate
+         call self%births%request(contact(event), self%parameters, self%record)
+      end do
+   end subroutine attach_listed
+
+   !> Order all contacts anew, from the records.
+   subroutine order_anew(self, displacement)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+
+      call self%rebuild(displacement)
+      self%behind = self%max_behind()
+   end subroutine order_anew
+
+   !> The greatest of the coordinates at which contacts break on the way back.
+   pure function max_behind(self) result(coordinate)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> The coordinate [m]
+      real(wp) :: coordinate
+
+      integer :: contact
+
+      coordinate = -huge(1.0_wp)
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         coordinate = max(coordinate, self%behind_of(contact))
+      end do
+   end function max_behind
+
+   !> Greatest coordinate at which a pinned contact breaks on the way back.
+   pure function behind_of(self, contact) result(coordinate)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> The coordinate [m]
+      real(wp) :: coordinate
+
+      coordinate = behind_coordinate(self%record(:, contact), self%direction)
+   end function behind_of
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift, displacement)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+      !> Displacement of the slider from the new origin [m]
+      real(wp), intent(in) :: displacement
+
+      integer :: contact
+
+      do contact = 1, self%parameters%count
+         self%record(row_origin, contact) = self%record(row_origin, contact) - shift
+      end do
+      call self%sum_totals()
+      call self%shift_order(shift)
+      call self%order_anew(displacement)
+   end subroutine shift_origin
+
+   !> Move what a kind knows of the origin besides the records: nothing unless it says so.
+   subroutine shift_order(self, shift)
+      !> The contacts, their records moved
+      class(individual_contacts_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+   end subroutine shift_order
+
+   !> Contacts and extent of the avalanche that is over, and forget it.
+   subroutine take_extent(self, extent)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Contacts that broke, columns and rows around them, generations; 0 without a lattice
+      integer, intent(out) :: extent(extent_length)
+
+      extent(1) = self%track%area
+      call self%track%extent(extent(2), extent(3))
+      extent(4) = self%track%generation
+      call self%track%clear()
+   end subroutine take_extent
+
+   !> How the contacts are.
+   pure subroutine snapshot_individual(self, displacement, values)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Of each contact its stretch, huge if it is detached [m], force over threshold, and
+      !> generation in the present avalanche, shape (snapshot_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      integer :: contact
+
+      do contact = 1, self%parameters%count
+         values(:, contact) = [huge(1.0_wp), 0.0_wp, 0.0_wp]
+         if (self%track%columns > 0) then
+            values(3, contact) = real(self%track%contact(row_generation, contact), wp)
+         end if
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         values(1, contact) = displacement - self%record(row_origin, contact)
+         values(2, contact) = values(1, contact) / self%record(row_limit, contact)
+      end do
+   end subroutine snapshot_individual
+
+   !> Sum stiffness and offset anew, from the records.
+   subroutine sum_totals(self)
+      class(individual_contacts_type), intent(inout) :: self
+
+      integer :: contact
+
+      self%stiffness = accumulator_type()
+      self%offset = accumulator_type()
+      do contact = 1, self%parameters%count
+         call self%stiffness%add(self%record(row_stiffness, contact))
+         call self%offset%add(self%record(row_stiffness, contact) &
+            & * self%record(row_origin, contact))
+      end do
+   end subroutine sum_totals
+
+   !> Elastic energy of the pinned contacts.
+   pure function elastic_energy(self, displacement) result(energy)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Energy [J]
+      real(wp) :: energy
+
+      integer :: contact
+      type(accumulator_type) :: total
+
+      do contact = 1, self%parameters%count
+         call total%add(0.5_wp * self%record(row_stiffness, contact) &
+            & * (displacement - self%record(row_origin, contact))**2)
+      end do
+      energy = total%total()
+   end function elastic_energy
+
+   !> Number of contacts that are kept one by one.
+   pure function individual_count(self) result(number)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> All of them
+      integer :: number
+
+      number = self%parameters%count
+   end function individual_count
+
+   !> What each contact is.
+   pure subroutine records(self, values)
+      !> The contacts
+      class(individual_contacts_type), intent(in) :: self
+      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch [m], number of
+      !> renewals of each contact, shape (contact_record_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      values = self%record([row_origin, row_stiffness, row_limit, row_renewal], :)
+   end subroutine records
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange_individual(self, archive)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call self%births%draw(self%parameters, self%record)
+      call exchange_contacts(self, archive)
+      call archive%exchange("record", self%record)
+      call self%detached%exchange(archive)
+      call archive%exchange("stiffness", self%stiffness)
+      call archive%exchange("offset", self%offset)
+      call archive%exchange("drag", self%drag)
+      call archive%exchange("direction", self%direction)
+      call archive%exchange("behind", self%behind)
+      call self%track%exchange(archive)
+   end subroutine exchange_individual
+
+end module mesoslip_contacts_individual_base

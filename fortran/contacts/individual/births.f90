@@ -1,0 +1,180 @@
+!> Births of contacts: thresholds are drawn, stiffness, breaking stretch and drag follow from them.
+!>
+!> Thresholds of the next births are drawn some at a time, which takes less time and gives the same
+!> numbers: each draw has a key of its own.
+module mesoslip_contacts_individual_births
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
+   use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_renewal, &
+      & row_stiffness
+   use mesoslip_contacts_mechanics, only: coupling_scaled, initial_steady, initial_uniform
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_random, only: uniform_pairs
+   implicit none
+   private
+
+   public :: births_type, bear, drag_of
+
+   !> Draws that are made together
+   integer, parameter :: draws_together = 32
+
+   !> Births to come.
+   type :: births_type
+      !> Contacts whose next thresholds are still to be drawn: their keys in draws, which count
+      !> contacts from 0, and their renewals then
+      integer, private :: count = 0
+      integer(i8), private :: key(draws_together) = 0_i8, renewal(draws_together) = 0_i8
+   contains
+      !> Draw all contacts for the start of a run
+      procedure, non_overridable :: draw_all
+      !> Have the threshold of a contact at its next birth drawn, with those of others
+      procedure, non_overridable :: request
+      !> Draw the thresholds that are still to be drawn
+      procedure, non_overridable :: draw
+   end type births_type
+
+contains
+
+   !> Draw all contacts for the start of a run.
+   subroutine draw_all(self, parameters, state, record)
+      !> The births
+      class(births_type), intent(inout) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+      !> Records of the contacts, shape (record_length, count)
+      real(wp), intent(inout), contiguous :: record(:, :)
+
+      integer :: drawn, number, draw, contact
+      integer(i8) :: key(draws_together), renewal(draws_together)
+      real(wp) :: first(draws_together), second(draws_together), threshold(draws_together)
+      real(wp) :: stiffness, limit
+      type(carried_law_type) :: carried
+
+      if (state == initial_steady) call new_carried_law(carried, parameters%law, &
+         & parameters%coupling, parameters%back_force_ratio)
+      renewal = 0_i8
+      do drawn = 0, parameters%count - 1, draws_together
+         number = min(draws_together, parameters%count - drawn)
+         do draw = 1, number
+            key(draw) = int(drawn + draw - 1, i8)
+         end do
+         call uniform_pairs(parameters%seed, parameters%realization, key(:number), &
+            & renewal(:number), first(:number), second(:number))
+         if (state == initial_steady) then
+            do draw = 1, number
+               threshold(draw) = carried%quantile(first(draw))
+            end do
+         else
+            call parameters%law%quantiles(first(:number), threshold(:number))
+         end if
+
+         do draw = 1, number
+            contact = drawn + draw
+            call bear(parameters, threshold(draw), stiffness, limit)
+            record(row_origin, contact) = &
+               & -initial_stretch(parameters, state, second(draw), stiffness, limit)
+            record(row_stiffness, contact) = stiffness
+            record(row_limit, contact) = limit
+            record(row_renewal, contact) = 0.0_wp
+            call self%request(contact, parameters, record)
+         end do
+      end do
+   end subroutine draw_all
+
+   !> Stretch of a contact at the start of a run.
+   pure function initial_stretch(parameters, state, deviate, stiffness, limit) result(stretch)
+      type(contact_parameters_type), intent(in) :: parameters
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+      !> A deviate, uniform between 0 and 1; stiffness [N/m] and breaking stretch [m]
+      real(wp), intent(in) :: deviate, stiffness, limit
+      real(wp) :: stretch
+
+      real(wp) :: back
+
+      select case (state)
+      case (initial_steady)
+         back = parameters%back_force_ratio * parameters%static_force / stiffness
+         stretch = back + deviate * (limit - back)
+      case (initial_uniform)
+         stretch = deviate * limit
+      case default
+         stretch = 0.0_wp
+      end select
+   end function initial_stretch
+
+   !> Have the threshold of a contact at its next birth drawn, with those of others.
+   subroutine request(self, contact, parameters, record)
+      !> The births
+      class(births_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Records of the contacts, shape (record_length, count)
+      real(wp), intent(inout), contiguous :: record(:, :)
+
+      ! No threshold is zero: this one is still to be drawn.
+      record(row_next, contact) = 0.0_wp
+      self%count = self%count + 1
+      self%key(self%count) = int(contact - 1, i8)
+      self%renewal(self%count) = int(record(row_renewal, contact) + 1.0_wp, i8)
+      if (self%count == draws_together) call self%draw(parameters, record)
+   end subroutine request
+
+   !> Draw the thresholds that are still to be drawn.
+   subroutine draw(self, parameters, record)
+      !> The births
+      class(births_type), intent(inout) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Records of the contacts, shape (record_length, count)
+      real(wp), intent(inout), contiguous :: record(:, :)
+
+      integer :: event
+      real(wp) :: first(draws_together), second(draws_together), threshold(draws_together)
+
+      if (self%count == 0) return
+      associate (count => self%count)
+         call uniform_pairs(parameters%seed, parameters%realization, self%key(:count), &
+            & self%renewal(:count), first(:count), second(:count))
+         call parameters%law%quantiles(first(:count), threshold(:count))
+         do event = 1, count
+            record(row_next, self%key(event) + 1_i8) = threshold(event)
+         end do
+         count = 0
+      end associate
+   end subroutine draw
+
+   !> Stiffness and breaking stretch of a contact that is born with a relative threshold.
+   pure subroutine bear(parameters, threshold, stiffness, limit)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Relative threshold
+      real(wp), intent(in) :: threshold
+      !> Stiffness [N/m] and breaking stretch [m]
+      real(wp), intent(out) :: stiffness, limit
+
+      stiffness = parameters%stiffness
+      if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
+      limit = threshold * parameters%static_force / stiffness
+   end subroutine bear
+
+   !> Drag of a contact while it is detached.
+   pure function drag_of(parameters, stiffness) result(drag)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Stiffness of the contact [N/m]
+      real(wp), intent(in) :: stiffness
+      !> Drag [N s/m]
+      real(wp) :: drag
+
+      drag = parameters%drag
+      if (drag > 0.0_wp .and. parameters%coupling == coupling_scaled) then
+         drag = drag * (stiffness / parameters%stiffness)**2
+      end if
+   end function drag_of
+
+end module mesoslip_contacts_individual_births

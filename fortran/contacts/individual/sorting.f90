@@ -1,0 +1,155 @@
+!> Contacts in the order of a key, then of their number: sorting, and a binary heap.
+module mesoslip_contacts_individual_sorting
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: before, push, remove_first, sort
+
+   !> Beyond this length sorting by insertion gives way to merging.
+   integer, parameter :: short_run = 16
+
+contains
+
+   !> Whether one contact comes before another.
+   pure function before(key_a, contact_a, key_b, contact_b)
+      real(wp), intent(in) :: key_a, key_b
+      integer, intent(in) :: contact_a, contact_b
+      logical :: before
+
+      before = key_a < key_b .or. (key_a <= key_b .and. contact_a < contact_b)
+   end function before
+
+   !> Put a contact into a binary heap, the last position of which is free.
+   pure subroutine push(heap_key, heap_contact, count, key, contact)
+      real(wp), intent(inout), contiguous :: heap_key(:)
+      integer, intent(inout), contiguous :: heap_contact(:)
+      integer, intent(in) :: count, contact
+      real(wp), intent(in) :: key
+
+      integer :: child, parent
+
+      child = count
+      do while (child > 1)
+         parent = child / 2
+         if (.not. before(key, contact, heap_key(parent), heap_contact(parent))) exit
+         heap_key(child) = heap_key(parent)
+         heap_contact(child) = heap_contact(parent)
+         child = parent
+      end do
+      heap_key(child) = key
+      heap_contact(child) = contact
+   end subroutine push
+
+   !> Remove the first contact of a binary heap.
+   pure subroutine remove_first(heap_key, heap_contact, count)
+      real(wp), intent(inout), contiguous :: heap_key(:)
+      integer, intent(inout), contiguous :: heap_contact(:)
+      integer, intent(in) :: count
+
+      integer :: parent, child, contact
+      real(wp) :: key
+
+      key = heap_key(count)
+      contact = heap_contact(count)
+      parent = 1
+      do
+         child = 2 * parent
+         if (child >= count) exit
+         if (child + 1 < count) then
+            if (before(heap_key(child + 1), heap_contact(child + 1), &
+               & heap_key(child), heap_contact(child))) child = child + 1
+         end if
+         if (.not. before(heap_key(child), heap_contact(child), key, contact)) exit
+         heap_key(parent) = heap_key(child)
+         heap_contact(parent) = heap_contact(child)
+         parent = child
+      end do
+      heap_key(parent) = key
+      heap_contact(parent) = contact
+   end subroutine remove_first
+
+   !> Sort contacts by key, then by number: short runs by insertion, longer ones by merging.
+   pure subroutine sort(key, contact, count)
+      real(wp), intent(inout), contiguous :: key(:)
+      integer, intent(inout), contiguous :: contact(:)
+      integer, intent(in) :: count
+
+      real(wp), allocatable :: left_key(:)
+      integer, allocatable :: left_contact(:)
+      integer :: first, middle, last, run
+
+      do first = 1, count, short_run
+         call insertion_sort(key, contact, first, min(first + short_run - 1, count))
+      end do
+      if (count <= short_run) return
+
+      allocate (left_key(count), left_contact(count))
+      run = short_run
+      do while (run < count)
+         do first = 1, count - run, 2 * run
+            middle = first + run - 1
+            last = min(middle + run, count)
+            call merge_runs(key, contact, first, middle, last, left_key, left_contact)
+         end do
+         run = 2 * run
+      end do
+   end subroutine sort
+
+   !> Sort one run by insertion.
+   pure subroutine insertion_sort(key, contact, first, last)
+      real(wp), intent(inout), contiguous :: key(:)
+      integer, intent(inout), contiguous :: contact(:)
+      integer, intent(in) :: first, last
+
+      integer :: next, position, moved_contact
+      real(wp) :: moved_key
+
+      do next = first + 1, last
+         moved_key = key(next)
+         moved_contact = contact(next)
+         position = next
+         do while (position > first)
+            if (.not. before(moved_key, moved_contact, key(position - 1), &
+               & contact(position - 1))) exit
+            key(position) = key(position - 1)
+            contact(position) = contact(position - 1)
+            position = position - 1
+         end do
+         key(position) = moved_key
+         contact(position) = moved_contact
+      end do
+   end subroutine insertion_sort
+
+   !> Merge two neighbouring sorted runs.
+   pure subroutine merge_runs(key, contact, first, middle, last, left_key, left_contact)
+      real(wp), intent(inout), contiguous :: key(:), left_key(:)
+      integer, intent(inout), contiguous :: contact(:), left_contact(:)
+      integer, intent(in) :: first, middle, last
+
+      integer :: left, left_count, right, position
+
+      left_count = middle - first + 1
+      left_key(:left_count) = key(first:middle)
+      left_contact(:left_count) = contact(first:middle)
+      left = 1
+      right = middle + 1
+      position = first
+      do while (left <= left_count)
+         if (right <= last) then
+            if (before(key(right), contact(right), left_key(left), left_contact(left))) then
+               key(position) = key(right)
+               contact(position) = contact(right)
+               right = right + 1
+               position = position + 1
+               cycle
+            end if
+         end if
+         key(position) = left_key(left)
+         contact(position) = left_contact(left)
+         left = left + 1
+         position = position + 1
+      end do
+   end subroutine merge_runs
+
+end module mesoslip_contacts_individual_sorting

@@ -3,7 +3,7 @@ module mesoslip_boundary_names
    use mesoslip_contacts_ageing_law, only: ageing_names
    use mesoslip_contacts_base, only: contact_columns, snapshot_columns
    use mesoslip_contacts_mechanics, only: coupling_names, initial_names
-   use mesoslip_contacts_neighbours, only: lattice_names
+   use mesoslip_contacts_individual_neighbours, only: lattice_names
    use mesoslip_contacts_threshold_laws, only: law_names
    use mesoslip_loop_endings, only: ending_names
    use mesoslip_loop_state, only: energy_columns

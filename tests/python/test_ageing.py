@@ -426,3 +426,20 @@ def test_a_curve_is_refused_and_info_tells_of_young_and_old(klein):
     assert told["growth_per_decade"].value == pytest.approx(0.05 * math.log(10))
     # Without an end of growing there is no limit of slow sliding.
     assert "F_steady" not in told
+
+
+def test_contacts_of_the_start_could_attach_when_they_were_young(klein):
+    """Their deviates are those of contacts that were born: young thresholds above the back force."""
+    ageing = {"law": "relax", "time": 0.05, "young_force_ratio": 0.4, "young_relative_width": 0.5}
+    config = klein(
+        contacts__count=2000,
+        contacts__coupling="equal",
+        contacts__back_force_ratio=0.3,
+        contacts__threshold__relative_width=0.2,
+        contacts__ageing=ageing,
+    )
+    contacts = config.contacts
+    limit = Realization(config, 0).contacts["break_stretch"] / contacts.break_stretch
+    young = contacts.ageing.threshold(limit, 0.2, 0.0)
+    assert young.min() > 0.3
+    assert young.min() < 0.31

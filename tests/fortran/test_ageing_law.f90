@@ -1,7 +1,6 @@
 !> Laws of ageing: limits, rates by differences, and which contacts break under a force.
 program test_ageing_law
-   use mesoslip_contacts_ageing_law, only: ageing_law_type, ageing_log, ageing_relax, &
-      & take_ageing_law
+   use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_ageing_meeting, only: meet, meet_bound, meet_newborn
    use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
@@ -70,16 +69,16 @@ contains
       call new_threshold_law(thresholds, "gaussian", width, 0.1_wp, error)
       select case (kind)
       case ("relax")
-         call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &
-            & "initial_age", "young_force_ratio", "young_relative_width"], &
-            & [real(ageing_relax, wp), tau, 0.0_wp, values])
+         call new_parameters(parameters, [character(len=name_length) :: "ageing_time", &
+            & "initial_age", "young_force_ratio", "young_relative_width"], [tau, 0.0_wp, values])
       case ("log")
-         call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &
-            & "initial_age", "growth"], [real(ageing_log, wp), tau, 0.0_wp, values])
+         call new_parameters(parameters, [character(len=name_length) :: "ageing_time", &
+            & "initial_age", "growth"], [tau, 0.0_wp, values])
       case default
-         call new_parameters(parameters, [character(len=name_length) :: "ageing", "ageing_time", &
-            & "initial_age"], [99.0_wp, tau, 0.0_wp])
+         call new_parameters(parameters, [character(len=name_length) :: "ageing_time", &
+            & "initial_age"], [tau, 0.0_wp])
       end select
+      call parameters%add_word("ageing", kind)
       call take_ageing_law(law, thresholds, parameters, error)
    end subroutine take
 

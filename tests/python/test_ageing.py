@@ -429,7 +429,7 @@ def test_a_curve_is_refused_and_info_tells_of_young_and_old(klein):
 
 
 def test_contacts_of_the_start_could_attach_when_they_were_young(klein):
-    """Their deviates are those of contacts that were born: young thresholds above the back force."""
+    """They were born as well: their young thresholds are above the back force."""
     ageing = {"law": "relax", "time": 0.05, "young_force_ratio": 0.4, "young_relative_width": 0.5}
     config = klein(
         contacts__count=2000,

@@ -17,8 +17,8 @@ module mesoslip_contacts_detached_packets
    integer, parameter :: packet_length = 4
    integer, parameter :: row_start = 1, row_end = 2, row_number = 3, row_mass = 4
 
-   !> Part of the contacts that is too small to attach again
-   real(wp), parameter :: negligible_part = 1.0e-30_wp
+   !> Part of the contacts that is too small for a packet of its own
+   real(wp), parameter :: negligible_part = 1.0e-10_wp
    !> A step may last so many times as long as expected
    real(wp), parameter :: patience = 1.5_wp
    !> Packets for which there is room at first
@@ -28,8 +28,8 @@ module mesoslip_contacts_detached_packets
    type :: expected_births_type
       !> How many contacts, and their mass
       real(wp) :: number = 0.0_wp, mass = 0.0_wp
-      !> Sums over them of the time from the start of the step [s], and of its square
-      real(wp) :: moment = 0.0_wp, square = 0.0_wp
+      !> How many of those that break in the step itself, and their mass
+      real(wp) :: own = 0.0_wp, own_mass = 0.0_wp
       !> Until when the step may last for it [s]
       real(wp) :: end_time = huge(1.0_wp)
    end type expected_births_type
@@ -42,12 +42,14 @@ module mesoslip_contacts_detached_packets
       !> Time between breaking and attaching [s], and whether contacts attach again
       real(wp), private :: delay = 0.0_wp
       logical, private :: reattach = .true.
-      !> Number of contacts that is too small to attach again
+      !> Number of contacts that is too small for a packet of its own
       real(wp), private :: negligible = 0.0_wp
       !> First and last packet
       integer, private :: first = 1, last = 0
       !> Part of the first one that is attached again
       real(wp), private :: attached_part = 0.0_wp
+      !> Contacts that broke and are too few for a packet of their own: they go with the next
+      real(wp), private :: few(packet_length) = 0.0_wp
       !> The packets, shape (packet_length, places)
       real(wp), allocatable, private :: packet(:, :)
    contains
@@ -90,10 +92,16 @@ contains
 
       call self%number%add(number)
       call self%mass%add(mass)
-      if (.not. (self%reattach .and. number > self%negligible)) return
+      if (.not. (self%reattach .and. number > 0.0_wp)) return
+      if (.not. self%few(row_number) > 0.0_wp) self%few(row_start) = start_time
+      self%few(row_end) = end_time
+      self%few(row_number) = self%few(row_number) + number
+      self%few(row_mass) = self%few(row_mass) + mass
+      if (self%few(row_number) < self%negligible) return
       if (self%last == size(self%packet, 2)) call self%make_room()
       self%last = self%last + 1
-      self%packet(:, self%last) = [start_time, end_time, number, mass]
+      self%packet(:, self%last) = self%few
+      self%few = 0.0_wp
    end subroutine add
 
    !> Whether none waits to attach.
@@ -137,16 +145,15 @@ contains
    end subroutine due_times
 
    !> What will attach in a step, and until when it may last for it.
-   subroutine expect(self, time, duration, breaks, mass, part, most, births)
+   subroutine expect(self, time, duration, most, breaks, births)
       !> The packets
       class(detached_packets_type), intent(in) :: self
       !> When the step starts, and how long it will last if nothing ends it [s]
       real(wp), intent(in) :: time, duration
-      !> Contacts that break on a way of the slider, their mass, and the part of them that does so
-      !> in the step
-      real(wp), intent(in) :: breaks, mass, part
       !> Contacts that may attach in one step
       real(wp), intent(in) :: most
+      !> Whether contacts break in the step
+      logical, intent(in) :: breaks
       !> What is expected
       type(expected_births_type), intent(out) :: births
 
@@ -173,12 +180,8 @@ contains
          end if
          until = late
       end do
-      if (self%reattach .and. self%delay < duration &
-         & .and. part * breaks > 0.0_wp) then
+      if (self%reattach .and. self%delay < duration .and. breaks) then
          ! What breaks in this step starts to attach in it.
-         early = time + self%delay
-         late = early + duration
-         call add_even(part * breaks, mass / breaks)
          births%end_time = min(births%end_time, max(time + patience * duration, &
             & nearest(time, 1.0_wp)))
       else if (births%number > 0.0_wp) then
@@ -192,7 +195,7 @@ contains
          !> How many, and their mean mass
          real(wp), intent(in) :: count, mean_mass
 
-         real(wp) :: more, middle, length
+         real(wp) :: more, length
 
          length = late - early
          more = count
@@ -205,11 +208,8 @@ contains
             more = most - births%number
             births%end_time = max(early + length, nearest(time, 1.0_wp))
          end if
-         middle = max(0.0_wp, early + 0.5_wp * length - time)
          births%number = births%number + more
          births%mass = births%mass + more * mean_mass
-         births%moment = births%moment + more * middle
-         births%square = births%square + more * (middle**2 + length**2 / 12.0_wp)
       end subroutine add_even
 
    end subroutine expect
@@ -281,8 +281,13 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      real(wp), allocatable :: few(:)
+
       call archive%section("detached packets")
       call archive%exchange("packet", self%packet)
+      few = self%few
+      call archive%exchange("few", few)
+      if (size(few) == packet_length) self%few = few
       call archive%exchange("first", self%first)
       call archive%exchange("last", self%last)
       call archive%exchange("attached_part", self%attached_part)

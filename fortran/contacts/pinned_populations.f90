@@ -48,6 +48,11 @@ module mesoslip_contacts_pinned_populations
 
    !> Relative width of the law of thresholds beyond which populations are not farther apart.
    real(wp), parameter :: widest_spread = 0.35_wp
+   !> Length of a step over the resolution times the spread of the breaking stretches
+   real(wp), parameter :: step_part = 0.6_wp
+   !> Part of a population that does not break before others of it, and that does not stay behind
+   !> them: what breaks is a difference of numbers with rounding errors, which are to decide nothing
+   real(wp), parameter :: unresolved_part = 1.0e-12_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: shortest_even = 0.02_wp
    !> Populations for which there is room at first
@@ -69,6 +74,8 @@ module mesoslip_contacts_pinned_populations
       real(wp), allocatable :: force(:), distance(:), broken(:), moments(:, :), lost(:)
       !> Breaks, and their mass; work that need not be done for them [J]
       real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp
+      !> What the contacts would bear at the end [N], and how far it is [m]
+      real(wp) :: drop = 0.0_wp, reach = 0.0_wp
       !> Where the next population breaks [m]
       real(wp) :: next = 0.0_wp
    end type trial_type
@@ -99,6 +106,8 @@ module mesoslip_contacts_pinned_populations
       type(contact_parameters_type), private :: parameters
       !> Distance of a mean threshold f_s/k [m]
       real(wp), private :: stretch = 1.0_wp
+      !> Threshold at which the first contacts of a population break
+      real(wp), private :: first_broken = 0.0_wp
       !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
       type(partial_moments_type), private :: moments(2)
       !> Populations, shape (places, population_length), as many are in use as there are
@@ -147,7 +156,7 @@ contains
 
       self%parameters = parameters
       self%stretch = parameters%static_force / parameters%stiffness
-      self%step = resolution * min(parameters%law%width, widest_spread) * self%stretch
+      self%step = step_part * resolution * min(parameters%law%width, widest_spread) * self%stretch
       if (parameters%coupling == coupling_scaled) self%step = 0.5_wp * self%step
       allocate (self%population(first_places, population_length), source=0.0_wp)
       allocate (self%left(moments_length, first_places), source=0.0_wp)
@@ -160,6 +169,7 @@ contains
       end if
       call new_partial_moments(self%moments(1), parameters%law, exponent)
       call new_partial_moments(self%moments(2), parameters%law, exponent + one_over_stretch)
+      self%first_broken = parameters%law%quantile(1.0_wp - unresolved_part)
       call self%moments(1)%interpolate(0.0_wp, all)
       self%newborn_stiffness = parameters%stiffness * all(stiff)
       self%newborn_energy = 0.5_wp * parameters%back_force_ratio**2 * all(compliant) &
@@ -261,7 +271,7 @@ contains
          population(place, row_force) = force
          population(place, row_weight) = weight
          population(place, row_law) = real(law, wp)
-         population(place, row_broken) = max(broken, self%moments(law)%least)
+         population(place, row_broken) = max(broken, self%first_broken)
          population(place, row_birth) = birth
          self%left(:, place) = weight * moments
          population(place, row_ahead) = max(displacement, self%next_break(place, 1.0_wp, time))
@@ -361,7 +371,7 @@ contains
       real(wp), intent(out) :: late, onset
 
       real(wp) :: moments(moments_length), loss(moments_length), distance, force, broken, next
-      real(wp) :: most, edge, start, breaks, mass, work
+      real(wp) :: most, edge, start, breaks, mass, work, drop
       integer :: place, row, trial, listed
 
       start = before%displacement
@@ -396,6 +406,7 @@ contains
          place = self%trial%population(trial)
          call self%moments(int(self%population(place, row_law)))%interpolate( &
             & self%trial%broken(trial), moments)
+         if (moments(number) < unresolved_part) moments = 0.0_wp
          self%trial%moments(:, trial) = min(self%population(place, row_weight) * moments, &
             & self%left(:, place))
       end do
@@ -403,6 +414,7 @@ contains
       breaks = 0.0_wp
       mass = 0.0_wp
       work = 0.0_wp
+      drop = 0.0_wp
       do trial = 1, listed
          place = self%trial%population(trial)
          force = self%trial%force(trial)
@@ -413,6 +425,7 @@ contains
          self%trial%lost(trial) = loss(lost)
          breaks = breaks + loss(number)
          mass = mass + loss(massive)
+         drop = drop + loss(stiff) * distance + loss(number) * force
          work = work + 0.5_wp * (loss(stiff) * distance**2 &
             & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 - loss(lost))
          if (sense * self%population(place, row) > edge) then
@@ -426,6 +439,8 @@ contains
       self%trial%breaks = breaks
       self%trial%mass = mass
       self%trial%work = work * self%parameters%static_force * self%stretch
+      self%trial%drop = drop * self%parameters%static_force
+      self%trial%reach = abs(displacement - start)
       self%trial%count = listed
       self%trial%next = sense * next
       if (self%trial%count == 0) then

@@ -1,11 +1,12 @@
 !> Infinitely many contacts: the master equation under a slider that moves as it likes.
 !>
-!> Contacts are populations while they are pinned, and packets while they are detached; here is how
-!> long the steps of the slider are, and what law holds in each. A step is so short that its
-!> populations are points of a smooth density of origins. Over a step the contact force is a line
-!> that does the work of the true force, which is known in advance, so the steps are of second
-!> order. Work that a step did not do after all, the next ones make up for. The jump of the force
-!> between two lines is the estimate of the error.
+!> Contacts are populations while they are pinned, and packets while they are detached. This module
+!> chooses the steps of the slider and the force law of each. A step is so short that its
+!> populations are points of a smooth density of origins, and that an inertial slider hardly changes
+!> its acceleration. In a step the contact force changes with the displacement by what breaks, and
+!> with the time by what attaches: a chord of the true force, shifted so that it does the true work.
+!> Chords of successive steps meet, so that the slider is not shaken. The steps are of second order.
+!> The distance of chord and true force at the end of a step is the estimate of the error.
 module mesoslip_contacts_populations
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
@@ -25,11 +26,18 @@ module mesoslip_contacts_populations
    public :: make_ageing_populations
 
    !> Part of the contacts that attach in a step of resolution 1 at most.
-   real(wp), parameter :: most_attached_part = 0.1_wp
+   real(wp), parameter :: max_attached_part = 0.1_wp
    !> Part of a step's length below which a slider creeps
    real(wp), parameter :: creeping_part = 0.01_wp
+   !> Part of a step's length over which breaks are looked for at least
+   real(wp), parameter :: min_part = 1.0e-3_wp
+   !> A step may last so many times as long as expected
+   real(wp), parameter :: patience = 1.5_wp
    !> Times beyond which nothing is expected [s]
-   real(wp), parameter :: longest_time = 1.0e30_wp
+   real(wp), parameter :: max_time = 1.0e30_wp
+   !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates, per
+   !> radian
+   real(wp), parameter :: rate_part = 1.0_wp
    !> Populations whose work is that of one contact that breaks
    real(wp), parameter :: populations_per_cost = 16.0_wp
 
@@ -38,19 +46,17 @@ module mesoslip_contacts_populations
       type(pinned_populations_type), private :: pinned
       type(detached_packets_type), private :: detached
 
-      !> Work that steps should have done and did not [J]: the next ones make up for it
-      real(wp), private :: debt = 0.0_wp
       !> The law that was offered for the step, if one was
       type(interface_law_type), private :: offered
       logical, private :: offers = .false.
 
       !> Contacts that attach in one step at most, when the slider moves and when it rests
-      real(wp), private :: most_attached = 0.0_wp, most_attached_at_rest = 0.0_wp
+      real(wp), private :: max_attached = 0.0_wp, max_attached_at_rest = 0.0_wp
       !> Breaks in one step of populations that start to break in it, at most
-      real(wp), private :: most_late = 0.0_wp
+      real(wp), private :: max_late = 0.0_wp
       !> Part of the time of ageing that a step may last while thresholds fall, and how long this
       !> step may last for that [s]
-      real(wp), private :: resolution = 1.0_wp, longest_fall = huge(1.0_wp)
+      real(wp), private :: resolution = 1.0_wp, max_fall_time = huge(1.0_wp)
    contains
       procedure :: initialize
       procedure :: law
@@ -62,7 +68,8 @@ module mesoslip_contacts_populations
       procedure :: rebuild
       !> Number of contacts that are pinned
       procedure :: pinned_count
-      procedure, non_overridable, private :: try, attach_due
+      procedure, non_overridable, private :: try, attach_due, max_duration, add_changes, &
+         & look_ahead
    end type contact_populations_type
 
 contains
@@ -84,9 +91,9 @@ contains
       end if
       self%parameters = parameters
       self%resolution = resolution
-      self%most_attached = parameters%count * resolution * most_attached_part
-      self%most_attached_at_rest = self%most_attached * min(resolution, most_attached_part)
-      self%most_late = self%most_attached * resolution
+      self%max_attached = parameters%count * resolution * max_attached_part
+      self%max_attached_at_rest = self%max_attached * min(resolution, max_attached_part)
+      self%max_late = self%max_attached * resolution
       call new_pinned_populations(self%pinned, parameters, resolution)
       call new_detached_packets(self%detached, parameters)
    end subroutine new_contact_populations
@@ -174,142 +181,201 @@ contains
       !> Where it holds
       type(window_type), intent(out) :: window
 
-      real(wp) :: sense, duration, reach, part, way, slack, ahead, behind
-      logical :: breaks, rests, creeps
+      real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack
+      logical :: breaks, moves
       type(expected_births_type) :: births
 
-      sense = pose%direction
+      direction = pose%direction
       if (.not. abs(pose%velocity) > 0.0_wp .and. abs(pose%acceleration) > 0.0_wp) then
-         sense = sign(1.0_wp, pose%acceleration)
+         direction = sign(1.0_wp, pose%acceleration)
       end if
-      rests = pose%velocity**2 <= creeping_part * sense * pose%acceleration * self%pinned%step
       slack = tiny_gap * self%pinned%step
-      reach = self%pinned%step
-      if (sense > 0.0_wp) then
+      if (direction > 0.0_wp) then
          breaks = self%pinned%ahead - pose%displacement <= slack
       else
          breaks = pose%displacement - self%pinned%behind <= slack
       end if
       call self%pinned%forget_trial()
-      self%longest_fall = huge(1.0_wp)
-      if (self%pinned%some_fall) self%longest_fall = time_to_fall(self, pose, &
-         & time_to_move(pose, sense, reach))
-      if (breaks) call self%try(pose, sense, reach)
-      breaks = self%pinned%trial%count > 0
-      duration = time_to_move(pose, sense, reach)
-      part = way_made(pose, sense, duration) / reach
-      call expect(self%most_attached)
-      creeps = .false.
-      if (births%number > 0.0_wp) then
-         creeps = rests .or. way_made(pose, sense, min(duration, births%end_time - pose%time)) &
-            & < creeping_part * self%pinned%step
-      end if
-      if (creeps) then
-         ! The slider may turn at any time, and with it the force of what attaches, which cannot be
-         ! known: little may attach until it can.
-         if (rests) duration = sqrt(creeping_part) * duration
-         part = way_made(pose, sense, duration) / reach
-         call expect(self%most_attached_at_rest)
-      end if
-      window%end_time = births%end_time
-      if (self%pinned%some_fall) then
-         window%end_time = min(window%end_time, pose%time + self%longest_fall)
-      end if
 
-      ahead = max(self%pinned%ahead, pose%displacement)
-      behind = min(self%pinned%behind, pose%displacement)
-      window%upper = ahead
-      window%lower = behind
-      if (breaks .or. births%number > 0.0_wp) then
-         ! Contacts break one way and attach with a force against it: the step ends where the slider
-         ! turns round.
-         if (sense > 0.0_wp) then
-            window%upper = pose%displacement + reach
-            if (.not. breaks) window%upper = min(window%upper, ahead)
+      span = time_to_move(pose, direction, self%pinned%step)
+      max_span = self%max_duration(pose)
+      max_births = self%max_attached
+      if (max_span >= max_time .and. .not. distance_in(pose, direction, span) > 0.0_wp) then
+         max_births = self%max_attached_at_rest
+      end if
+      self%max_fall_time = huge(1.0_wp)
+      if (self%pinned%some_fall) self%max_fall_time = time_to_fall(self, pose, span)
+      max_span = min(max_span, self%max_fall_time)
+      span = min(span, max_span)
+      call self%detached%expect(pose%time, span, max_births, &
+         & breaks .and. distance_in(pose, direction, span) > 0.0_wp, births)
+      span = min(span, births%end_time - pose%time)
+      distance = distance_in(pose, direction, span)
+      reach = max(distance, min_part * self%pinned%step)
+      limit = self%pinned%step
+      if (breaks) call self%look_ahead(pose, direction, max_births, span, distance, reach, limit, &
+         & births)
+      breaks = self%pinned%trial%count > 0
+
+      moves = breaks .or. births%number > 0.0_wp
+      window%end_time = births%end_time
+      if (moves .and. max_span < max_time) then
+         window%end_time = min(window%end_time, max(pose%time + max_span, &
+            & nearest(pose%time, huge(1.0_wp))))
+      end if
+      window%upper = max(self%pinned%ahead, pose%displacement)
+      window%lower = min(self%pinned%behind, pose%displacement)
+      if (moves) then
+         ! Contacts break in one direction and attach with a force against it: the step ends where
+         ! the slider turns round.
+         reach = min(limit, max(reach, patience * distance))
+         if (.not. distance > 0.0_wp) reach = limit
+         if (direction > 0.0_wp) then
+            reach = pose%displacement + reach
+            if (breaks) window%upper = reach
+            window%upper = min(window%upper, reach)
             window%lower = pose%displacement
             if (.not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
          else
-            window%lower = pose%displacement - reach
-            if (.not. breaks) window%lower = max(window%lower, behind)
+            reach = pose%displacement - reach
+            if (breaks) window%lower = reach
+            window%lower = max(window%lower, reach)
             window%upper = pose%displacement
             if (.not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
          end if
       end if
 
-      ! What an observer sees in the step is its middle; the step may end before all breaks.
-      duration = min(duration, births%end_time - pose%time)
-      way = way_made(pose, sense, duration)
-      part = way / reach
-      self%detached_count = max(0.0_wp, self%detached%number%total() &
-         & + 0.5_wp * (part * self%pinned%trial%breaks - births%number))
       law = self%law()
-      law%drag = max(0.0_wp, law%drag &
-         & + 0.5_wp * self%parameters%drag * (part * self%pinned%trial%mass - births%mass))
-      ! Lines that do the right work in the step, and start from the force there is: it does not
-      ! depend on the direction in which the slider goes on.
-      if (breaks) call add_line(0.0_wp, -2.0_wp * self%pinned%trial%work / reach**2)
-      if (births%number > 0.0_wp) then
-         if (.not. creeps) then
-            call add_births()
-         else if (.not. abs(pose%velocity) + abs(pose%acceleration) > 0.0_wp) then
-            ! While the slider rests the force is what it will be on average.
-            call add_line(sense * 0.5_wp * births%number * self%parameters%static_force &
-               & * self%parameters%back_force_ratio, 0.0_wp)
-         end if
-      end if
-      if ((breaks .or. births%number > 0.0_wp) .and. .not. rests) then
-         call add_line(sense * self%debt / self%pinned%step, 0.0_wp)
-      end if
+      self%detached_count = self%detached%number%total()
+      if (moves) call self%add_changes(pose, direction, span, distance, births, law)
       self%offered = law
       self%offers = .true.
+   end subroutine offer
+
+   !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
+   subroutine look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
+      class(contact_populations_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      !> The direction in which the slider moves, and contacts that may attach in a step
+      real(wp), intent(in) :: direction, max_births
+      !> Duration of the step [s], expected displacement in it, displacement until which breaks are
+      !> found, and largest displacement of the step [m]
+      real(wp), intent(inout) :: span, distance, reach, limit
+      type(expected_births_type), intent(inout) :: births
+
+      real(wp) :: part, wanted
+
+      wanted = reach
+      call self%try(pose, direction, reach)
+      if (reach < wanted) limit = reach
+      associate (trial => self%pinned%trial)
+         if (reach < distance) call shorten(time_to_move(pose, direction, reach))
+         call find_own()
+         if (births%own > 0.0_wp .and. births%number + births%own > max_births) then
+            part = max_births / (births%number + births%own)
+            births%end_time = min(births%end_time, max(pose%time + part * span, &
+               & nearest(pose%time, huge(1.0_wp))))
+            call shorten(part * span)
+            reach = max(distance, min_part * self%pinned%step)
+            wanted = reach
+            call self%try(pose, direction, reach)
+            if (reach < wanted) limit = reach
+            call find_own()
+         end if
+      end associate
 
    contains
 
-      !> Find what will attach in the step, at most so much.
-      subroutine expect(most)
-         real(wp), intent(in) :: most
+      !> Let the step end earlier.
+      subroutine shorten(time)
+         real(wp), intent(in) :: time
 
-         associate (trial => self%pinned%trial)
-            call self%detached%expect(pose%time, duration, trial%breaks, trial%mass, part, most, &
-               & births)
-         end associate
-      end subroutine expect
+         births%number = births%number * time / span
+         births%mass = births%mass * time / span
+         span = time
+         distance = distance_in(pose, direction, span)
+      end subroutine shorten
 
-      !> Add a force and its change with the way that the slider makes in the step.
-      subroutine add_line(force, slope)
-         real(wp), intent(in) :: force, slope
+      !> Find what breaks and attaches in the step.
+      subroutine find_own()
+         births%own = 0.0_wp
+         if (.not. (self%parameters%reattach .and. self%parameters%delay < span)) return
+         if (.not. distance > 0.0_wp) return
+         births%own = self%pinned%trial%breaks * distance / reach &
+            & * (1.0_wp - self%parameters%delay / span)
+         births%own_mass = 0.0_wp
+         if (births%own > 0.0_wp) births%own_mass = births%own * self%pinned%trial%mass &
+            & / self%pinned%trial%breaks
+      end subroutine find_own
 
+   end subroutine look_ahead
+
+   !> Time in which the motion does not change much [s].
+   pure function max_duration(self, pose) result(duration)
+      class(contact_populations_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      real(wp) :: duration
+
+      real(wp) :: rate
+
+      rate = sqrt(pose%own_rate**2 + max(0.0_wp, self%pinned%stiffness%total()) &
+         & * pose%inverse_mass) &
+         & + self%parameters%drag * max(0.0_wp, self%detached%mass%total()) * pose%inverse_mass
+      duration = huge(1.0_wp)
+      if (rate > 1.0_wp / max_time) duration = self%resolution * rate_part / rate
+   end function max_duration
+
+   !> Add to a law how the force changes by what breaks and attaches.
+   pure subroutine add_changes(self, pose, direction, span, distance, births, law)
+      class(contact_populations_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(in) :: direction
+      !> How long the step lasts [s], and how far the slider comes in it [m]
+      real(wp), intent(in) :: span, distance
+      type(expected_births_type), intent(in) :: births
+      type(interface_law_type), intent(inout) :: law
+
+      real(wp) :: slope, rate, middle, mass, number, velocity
+
+      associate (trial => self%pinned%trial, parameters => self%parameters)
+         slope = 0.0_wp
+         rate = 0.0_wp
+         middle = 0.0_wp
+         mass = -births%mass - births%own_mass
+         number = -births%number - births%own
+         if (trial%count > 0) then
+            slope = -trial%drop / trial%reach
+            middle = 0.5_wp * trial%drop - trial%work / trial%reach
+            mass = mass + trial%mass * distance / trial%reach
+            number = number + trial%breaks * distance / trial%reach
+         end if
+         slope = slope + 0.5_wp * self%pinned%newborn_stiffness * (births%number + births%own)
+         middle = middle - self%pinned%newborn_stiffness * (births%number + births%own) * distance &
+            & / 8.0_wp
+         if (births%own > 0.0_wp) slope = slope + births%own * parameters%static_force &
+            & * parameters%back_force_ratio / distance
+         if (span > 0.0_wp .and. span < max_time) then
+            velocity = max(0.0_wp, direction * (pose%velocity + span * pose%acceleration))
+            rate = (births%number * parameters%static_force * parameters%back_force_ratio &
+               & + parameters%drag * mass * velocity) / span
+         end if
          law%stiffness = law%stiffness + slope
-         law%offset = law%offset + slope * pose%displacement - force
-      end subroutine add_line
-
-      !> Add what the contacts that attach in the step will bear.
-      subroutine add_births()
-         real(wp) :: time, square, place, sum, force
-
-         time = births%moment / births%number
-         square = births%square / births%number
-         place = abs(pose%velocity) * time + 0.5_wp * sense * pose%acceleration * square
-         sum = births%number * self%parameters%static_force * self%parameters%back_force_ratio
-         ! The line is that of contacts which attach evenly on the way; what it starts with makes up
-         ! for the work when the velocity changes in the step.
-         force = sum * 0.5_wp * sense * pose%acceleration * (time * duration - square) / way
-         call add_line(sense * force, (2.0_wp * sum * (1.0_wp - time / duration) &
-            & + self%pinned%newborn_stiffness * births%number * (way - place)**2 / way) / way)
-      end subroutine add_births
-
-   end subroutine offer
+         law%offset = law%offset + slope * pose%displacement - direction * middle
+         law%rate = direction * rate
+         self%detached_count = max(0.0_wp, self%detached_count + 0.5_wp * number)
+      end associate
+   end subroutine add_changes
 
    !> Time in which the slider will move by a distance, or turn round; huge if it does not move.
-   pure function time_to_move(pose, sense, distance) result(time)
+   pure function time_to_move(pose, direction, distance) result(time)
       type(pose_type), intent(in) :: pose
-      real(wp), intent(in) :: sense, distance
+      real(wp), intent(in) :: direction, distance
       real(wp) :: time
 
       real(wp) :: speed, square
 
       speed = abs(pose%velocity)
-      square = speed**2 + 2.0_wp * sense * pose%acceleration * distance
+      square = speed**2 + 2.0_wp * direction * pose%acceleration * distance
       time = huge(1.0_wp)
       if (square > 0.0_wp) then
          speed = speed + sqrt(square)
@@ -334,55 +400,55 @@ contains
       age = pose%time - self%pinned%last_birth
       if (self%pinned%ageing%is_old(age)) return
       time = self%resolution * max(self%pinned%ageing%time, age, self%parameters%delay)
-      if (duration < longest_time) time = max(time, creeping_part * duration)
+      if (duration < max_time) time = max(time, creeping_part * duration)
       time = max(time, nearest(pose%time, huge(1.0_wp)) - pose%time)
    end function time_to_fall
 
-   !> Way that the slider will make in a time, in the direction in which it moves.
-   pure function way_made(pose, sense, time) result(way)
+   !> Distance that the slider will move in a time, in its direction.
+   pure function distance_in(pose, direction, time) result(distance)
       type(pose_type), intent(in) :: pose
-      real(wp), intent(in) :: sense, time
-      real(wp) :: way
+      real(wp), intent(in) :: direction, time
+      real(wp) :: distance
 
-      way = 0.0_wp
-      if (time < longest_time) then
-         way = time * (abs(pose%velocity) + 0.5_wp * sense * pose%acceleration * time)
+      distance = 0.0_wp
+      if (time < max_time) then
+         distance = time * (abs(pose%velocity) + 0.5_wp * direction * pose%acceleration * time)
       end if
-   end function way_made
+   end function distance_in
 
-   !> Find what breaks on a way of the slider.
+   !> Find what breaks in a displacement of the slider.
    !>
    !> Where many populations start to break together, as they do where the slider turned before, the
-   !> force has a kink: a way ends there.
-   subroutine try(self, pose, sense, way)
+   !> force has a kink: the displacement ends there.
+   subroutine try(self, pose, direction, distance)
       class(contact_populations_type), intent(inout) :: self
       !> Where the slider is
       type(pose_type), intent(in) :: pose
       !> In which direction it goes
-      real(wp), intent(in) :: sense
-      !> Length of the way [m]
-      real(wp), intent(inout) :: way
+      real(wp), intent(in) :: direction
+      !> Length of the displacement, which may become shorter [m]
+      real(wp), intent(inout) :: distance
 
       real(wp) :: late, onset, displacement
 
-      call self%pinned%try(pose, pose%displacement + sense * way, expected_time(way), sense, late, &
-         & onset)
-      if (late > self%most_late) then
+      call self%pinned%try(pose, pose%displacement + direction * distance, &
+         & expected_time(distance), direction, late, onset)
+      if (late > self%max_late) then
          displacement = onset
-         way = abs(displacement - pose%displacement)
-         call self%pinned%try(pose, displacement, expected_time(way), sense, late, onset)
+         distance = abs(displacement - pose%displacement)
+         call self%pinned%try(pose, displacement, expected_time(distance), direction, late, onset)
       end if
 
    contains
 
-      !> When the slider will be at the end of its way [s].
+      !> When the slider will have come so far [s].
       pure function expected_time(distance) result(time)
          real(wp), intent(in) :: distance
          real(wp) :: time
 
          time = pose%time
          if (self%pinned%ages) time = pose%time &
-            & + min(time_to_move(pose, sense, distance), self%longest_fall, longest_time)
+            & + min(time_to_move(pose, direction, distance), self%max_fall_time, max_time)
       end function expected_time
 
    end subroutine try
@@ -394,49 +460,44 @@ contains
       !> Where the slider was, and where it is
       type(pose_type), intent(in) :: before, after
 
-      real(wp) :: sense, late, onset, way, gain
+      real(wp) :: direction, late, onset, distance
       logical :: reaches
 
-      way = after%displacement - before%displacement
-      sense = sign(1.0_wp, way)
-      if (sense > 0.0_wp) then
+      distance = after%displacement - before%displacement
+      direction = sign(1.0_wp, distance)
+      if (direction > 0.0_wp) then
          reaches = after%displacement > self%pinned%ahead
       else
          reaches = after%displacement < self%pinned%behind
       end if
       if (self%pinned%some_fall .and. .not. reaches) then
          ! Where thresholds fall contacts may break at rest.
-         if (.not. abs(way) > 0.0_wp) sense = after%direction
-         if (sense > 0.0_wp) then
+         if (.not. abs(distance) > 0.0_wp) direction = after%direction
+         if (direction > 0.0_wp) then
             reaches = after%displacement >= self%pinned%ahead
          else
             reaches = after%displacement <= self%pinned%behind
          end if
       end if
-      ! The work that the offered law did, beyond that of the contacts which are pinned by now.
-      gain = way * (0.5_wp * (self%offered%stiffness - self%pinned%stiffness%total()) &
-         & * (after%displacement + before%displacement) &
-         & - (self%offered%offset - self%pinned%offset%total()))
       if (reaches) then
          if (.not. self%pinned%has_tried(after%displacement, after%time)) then
-            call self%pinned%try(before, after%displacement, after%time, sense, late, onset)
+            call self%pinned%try(before, after%displacement, after%time, direction, late, onset)
          end if
          call self%pinned%break_tried(self%break_loss)
          associate (trial => self%pinned%trial)
             self%breaks = self%breaks + trial%breaks
-            if (trial%count > 0) gain = gain + trial%work
             call self%detached%add(before%time, after%time, trial%breaks, trial%mass)
          end associate
       end if
-      if (.not. self%detached%is_empty()) call self%attach_due(before, after, gain)
+      if (.not. self%detached%is_empty()) call self%attach_due(before, after)
       if (self%pinned%ages) call self%pinned%see_ages(after%displacement, after%time)
       self%detached_count = self%detached%number%total()
       self%cost = 1.0_wp + self%pinned%count / populations_per_cost
       if (self%offers) then
-         self%debt = self%debt - gain
          ! The jump of the force from the end of a step to the start of the next: what the lines of
          ! the steps leave open, of the order of the error of the force.
-         self%error_estimate = max(self%error_estimate, abs((self%offered%stiffness &
+         self%error_estimate = max(self%error_estimate, abs(self%offered%rate &
+            & * (after%time - before%time) + (self%offered%stiffness &
             & - self%pinned%stiffness%total()) * after%displacement &
             & - (self%offered%offset - self%pinned%offset%total()) + (self%offered%drag &
             & - self%parameters%drag * self%detached%mass%total()) * after%velocity))
@@ -445,13 +506,11 @@ contains
    end subroutine respond
 
    !> Attach all contacts that are due, as one population where they do on average.
-   subroutine attach_due(self, before, after, gain)
+   subroutine attach_due(self, before, after)
       class(contact_populations_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
-      !> Work [J], less what the new contacts take up until the slider is where it is
-      real(wp), intent(inout) :: gain
 
-      real(wp) :: births, moment, when, origin, force, way
+      real(wp) :: births, moment, when, origin, force
 
       call self%detached%take_due(before, after, births, moment, when)
       if (.not. births > 0.0_wp) return
@@ -459,9 +518,6 @@ contains
       call self%birth_gain%add(births * self%pinned%newborn_energy)
       origin = moment / births
       force = after%direction * self%parameters%back_force_ratio
-      way = after%displacement - origin
-      gain = gain - births * way * (force * self%parameters%static_force &
-         & + 0.5_wp * self%pinned%newborn_stiffness * way)
       call self%pinned%attach(births, moment, force, after%displacement, &
          & min(when / births, after%time), after%time)
    end subroutine attach_due
@@ -511,7 +567,6 @@ contains
       call exchange_contacts(self, archive)
       call self%pinned%exchange(archive)
       call self%detached%exchange(archive)
-      call archive%exchange("debt", self%debt)
    end subroutine exchange
 
    !> Nothing is derived from the state: all of it is in the archive.

@@ -59,6 +59,9 @@ module mesoslip_sliders_base
       type(accumulator_type) :: drag_loss, damping_loss
       !> Whether it is faster than the drive where the drive's spring pulls: the force falls
       logical :: is_faster = .false.
+      !> One over the mass that the contact force moves [1/kg], and the rate of the slider's own
+      !> oscillation [1/s]; 0 if its motion is prescribed
+      real(wp) :: inverse_mass = 0.0_wp, own_rate = 0.0_wp
       !> Cost of an advance over that of a rigid slider
       real(wp) :: cost = 1.0_wp
       !> Steps, evaluations and failed steps of its integrator, if it has one
@@ -154,7 +157,7 @@ contains
       type(pose_type) :: pose
 
       pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, &
-         & self%direction)
+         & self%direction, self%inverse_mass, self%own_rate)
    end function pose
 
    !> Take note that the drive has changed: most sliders need nothing more.
@@ -342,6 +345,7 @@ contains
       call archive%exchange("law stiffness", law%stiffness)
       call archive%exchange("law offset", law%offset)
       call archive%exchange("law drag", law%drag)
+      call archive%exchange("law rate", law%rate)
    end subroutine exchange_law
 
 end module mesoslip_sliders_base

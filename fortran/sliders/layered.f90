@@ -122,6 +122,11 @@ contains
       end do
       allocate (self%system)
       self%system = new_system(parameters)
+      self%inverse_mass = 1.0_wp / self%system%layer_mass
+      if (parameters%base_mass > 0.0_wp) then
+         self%inverse_mass = self%inverse_mass + 1.0_wp / parameters%base_mass
+      end if
+      self%own_rate = sqrt(parameters%stiffness / parameters%mass)
    end subroutine new_slider_layered
 
    !> Put the slider at rest in balance with the contacts.
@@ -238,7 +243,8 @@ contains
       if (self%parameters%solver /= solver_series .and. .not. self%integrator%is_stale) then
          self%integrator%is_stale = abs(law%stiffness - self%system%law%stiffness) > 0.0_wp &
             & .or. abs(law%offset - self%system%law%offset) > 0.0_wp &
-            & .or. abs(law%drag - self%system%law%drag) > 0.0_wp
+            & .or. abs(law%drag - self%system%law%drag) > 0.0_wp &
+            & .or. abs(law%rate) > 0.0_wp .or. abs(self%system%law%rate) > 0.0_wp
       end if
       self%system%law = law
    end subroutine take_law
@@ -452,7 +458,7 @@ contains
       motion%elastic_force = self%parameters%stiffness * (drive - first)
       motion%base_displacement = base
       motion%contact_force = self%system%law%stiffness * (first - base) - self%system%law%offset &
-         & + self%system%law%drag * motion%velocity
+         & + self%system%law%drag * motion%velocity + self%system%law%rate * step
    end function observe
 
    !> Displacements of the layers at a time of the last advance.

@@ -150,10 +150,11 @@ contains
       if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
 
       step = self%displacement - start
-      middle = law%stiffness * (start + 0.5_wp * step) - law%offset + law%drag * self%velocity
+      middle = law%stiffness * (start + 0.5_wp * step) - law%offset + law%drag * self%velocity &
+         & + 0.5_wp * law%rate * (self%time - self%step_time)
       call self%drive%impulse%add((self%time - self%step_time) * middle)
       call self%drag_loss%add(step * law%drag * self%velocity)
-      half = abs(0.5_wp * law%stiffness * step)
+      half = abs(0.5_wp * (law%stiffness * step + law%rate * (self%time - self%step_time)))
       if (middle + half > self%drive%extremes%max_force &
          & .or. middle - half < self%drive%extremes%min_force) then
          call note(self, self%step_time, start, self%velocity)
@@ -203,15 +204,18 @@ contains
       distance = self%displacement - start
       step = self%time - self%step_time
       call self%drive%earlier_work%add(distance * (law%stiffness * (start + 0.5_wp * distance) &
-         & - law%offset) + law%drag * square())
+         & - law%offset) + law%drag * square() &
+         & + law%rate * step**2 * (0.5_wp * early + self%drive%acceleration * step / 3.0_wp))
       call self%drag_loss%add(law%drag * square())
       call self%drive%earlier_impulse%add(step * (law%stiffness * (start + step * (0.5_wp * early &
-         & + self%drive%acceleration * step / 6.0_wp)) - law%offset) + law%drag * distance)
+         & + self%drive%acceleration * step / 6.0_wp)) - law%offset + 0.5_wp * law%rate * step) &
+         & + law%drag * distance)
       call note(self, self%step_time, start, early)
       call note(self, self%time, self%displacement, late)
       if (law%stiffness > 0.0_wp) then
          ! Where contacts pull more by as much as drag pulls less.
-         time = -law%drag / law%stiffness - early / self%drive%acceleration
+         time = -(law%drag + law%rate / self%drive%acceleration) / law%stiffness &
+            & - early / self%drive%acceleration
          if (time > 0.0_wp .and. time < step) call note(self, self%step_time + time, start + time &
             & * (early + 0.5_wp * self%drive%acceleration * time), &
             & early + self%drive%acceleration * time)
@@ -233,7 +237,8 @@ contains
       real(wp), intent(in) :: time, displacement, velocity
 
       call self%drive%extremes%note(self%law%stiffness * displacement - self%law%offset &
-         & + self%law%drag * velocity, time, self%origin + displacement)
+         & + self%law%drag * velocity + self%law%rate * (time - self%step_time), time, &
+         & self%origin + displacement)
    end subroutine note
 
    !> The motion at a time of the last advance.
@@ -254,7 +259,7 @@ contains
       motion%velocity = self%drive%rate_at(time)
       motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
-         & + self%law%drag * motion%velocity
+         & + self%law%drag * motion%velocity + self%law%rate * (time - self%step_time)
       motion%spring_force = motion%contact_force
    end function observe
 

@@ -53,6 +53,8 @@ contains
       call parameters%take("damping", self%damping, error)
       call parameters%finish(error)
       if (allocated(error)) return
+      self%inverse_mass = 1.0_wp / self%mass
+      self%own_rate = sqrt(self%stiffness * self%inverse_mass)
       call move_alloc(self, slider)
    end subroutine make_slider_rigid
 
@@ -125,11 +127,13 @@ contains
       is_done = .false.
       if (abs(self%drive%acceleration) > 0.0_wp) then
          system%drive_velocity = self%drive%rate_at(self%time)
-         system%driving = system%spring * system%drive_velocity
+         system%driving = system%spring * system%drive_velocity &
+            & - self%law%rate * system%inverse_mass
          system%driving_rate = system%spring * self%drive%acceleration
          system%drive_gap = self%drive%at(self%time) - self%displacement
          early = rates(self, system, system%drive_gap)
       else
+         system%driving = constant%driving - self%law%rate * system%inverse_mass
          system%drive_gap = uniform_gap(self)
          early = rates(self, system, system%drive_gap)
          call try_short_step(self, system, window, early, is_done)
@@ -169,7 +173,7 @@ contains
       motion%elastic_force = motion%spring_force
       motion%pulled_velocity = motion%velocity
       motion%contact_force = self%law%stiffness * displacement - self%law%offset &
-         & + self%law%drag * motion%velocity
+         & + self%law%drag * motion%velocity + self%law%rate * step
    end function observe
 
    !> Displacement and velocity from the series of the velocity.

@@ -1,6 +1,6 @@
 !> Lives of contacts under a slider that moves forward: how they break, and what the rest bears.
 !>
-!> Dimensionless as in mesoslip_contact_mechanics, for one contact. A newborn contact is followed
+!> Dimensionless as in mesoslip_contacts_mechanics, for one contact. A newborn contact is followed
 !> from its attaching, a contact of the first generation from the start of the motion.
 module mesoslip_theory_lives
    use mesoslip_numerics_kinds, only: wp

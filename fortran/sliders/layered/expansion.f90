@@ -1,7 +1,7 @@
 !> The motion of a chain of layers as Taylor series.
 module mesoslip_sliders_layered_expansion
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_sliders_layered_system, only: accelerate, push, system_type
+   use mesoslip_sliders_layered_system, only: accelerate, push, push_at_a_rate, system_type
    use mesoslip_sliders_motion_series, only: inverse
    implicit none
    private
@@ -34,6 +34,7 @@ contains
          call accelerate(system, inverse(term + 1), pull, series(:, 1, term), &
             & series(:, 2, term), series(:, 2, term + 1))
          if (term == 0) call push(system, 0.0_wp, series(:, 2, 1))
+         if (term == 1) call push_at_a_rate(system, series(:, 2, 2))
          series(:, 1, term + 1) = series(:, 2, term) * inverse(term + 1)
       end do
    end subroutine expand

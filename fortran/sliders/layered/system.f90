@@ -7,7 +7,7 @@ module mesoslip_sliders_layered_system
    private
 
    public :: layered_parameters_type, system_type
-   public :: accelerate, fastest_rate, new_system, push
+   public :: accelerate, fastest_rate, new_system, push, push_at_a_rate
    public :: solver_series, solver_adams, solver_bdf, solver_names, solver_codes
 
    !> Taylor series, and CVODE with either family of formulas
@@ -130,16 +130,29 @@ contains
       real(wp), intent(in) :: time
       real(wp), intent(inout) :: acceleration(0:)
 
+      real(wp) :: pull
       integer :: last
 
       last = system%parameters%layers
       acceleration(last) = acceleration(last) + system%spring * (system%drive &
          & + (system%drive_velocity + 0.5_wp * system%drive_acceleration * time) * time) &
          & / system%layer_mass
-      acceleration(1) = acceleration(1) + system%law%offset / system%layer_mass
+      pull = system%law%offset - system%law%rate * time
+      acceleration(1) = acceleration(1) + pull / system%layer_mass
       if (system%parameters%base_mass > 0.0_wp) then
-         acceleration(0) = acceleration(0) - system%law%offset / system%parameters%base_mass
+         acceleration(0) = acceleration(0) - pull / system%parameters%base_mass
       end if
    end subroutine push
+
+   !> Second terms of the velocities by the rate of the contact force.
+   pure subroutine push_at_a_rate(system, term)
+      type(system_type), intent(in) :: system
+      real(wp), intent(inout) :: term(0:)
+
+      term(1) = term(1) - 0.5_wp * system%law%rate / system%layer_mass
+      if (system%parameters%base_mass > 0.0_wp) then
+         term(0) = term(0) + 0.5_wp * system%law%rate / system%parameters%base_mass
+      end if
+   end subroutine push_at_a_rate
 
 end module mesoslip_sliders_layered_system

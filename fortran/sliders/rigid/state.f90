@@ -87,7 +87,8 @@ contains
       motion%velocity = self%velocity
       motion%damper = self%damper
       motion%acceleration = ((system%spring * drive_gap - system%inverse_mass &
-         & * (self%law%stiffness * self%displacement - self%law%offset)) &
+         & * (self%law%stiffness * self%displacement - self%law%offset &
+         & + self%law%rate * (self%time - self%step_time))) &
          & - system%drag * self%velocity) - self%damper
       motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
    end function rates

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.quantities import with_unit
-
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
@@ -96,7 +94,7 @@ def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None
     elif math.isnan(value):
         shown = "not known"
     else:
-        shown = with_unit(value, unit, 6)
+        shown = f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
     typer.echo(f"{name:22} {shown:20} {meaning}")
 
 

@@ -113,7 +113,7 @@ def run(
             raise
         if not quiet:
             _tell_results(results, checked, path)
-        files.remove_partial(_partial(path))
+        _partial(path).unlink(missing_ok=True)
         checkpoint.remove()
 
 

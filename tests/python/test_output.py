@@ -323,18 +323,21 @@ def test_what_a_killed_process_left_behind_is_removed(tmp_path):
 
 
 def test_samples_of_a_slip_come_with_the_slip():
-    """In the midst of a slip its samples are not yet those of one."""
+    """In the midst of a slip its samples are not yet those of one, however they were taken."""
     sliding = {"drive": {"velocity": 1e-5}, "run__duration": 0.1, "output__slip_interval": 1e-4}
-    realization = Realization(configuration("rigid", **sliding), 0)
-    times, counts = [], []
-    while not realization.finished:
-        realization.advance(1)
-        owners = realization.slip_trace[:, -1]
-        assert np.all(owners < len(realization.slips))
-        times.append(realization.time)
-        counts.append(len(owners))
-    assert len(realization.slips) > 1
-    # It was looked at in the midst of each.
-    for start, end in realization.slips[:, 1:3]:
-        assert np.sum((np.array(times) > start) & (np.array(times) < end)) > 2
-    assert counts[-1] == len(realization.slip_trace) > 0
+    config = configuration("rigid", **sliding)
+    whole = Realization(config, 0)
+    counts = []
+    while not whole.finished:
+        whole.advance(1)
+        assert np.all(whole.slip_trace[:, -1] < len(whole.slips))
+        counts.append(len(whole.slips))
+    assert counts[-1] > 1
+    for number in range(counts[-1]):
+        # Just before its end, when it is known to be a slip; in one piece with those before.
+        part = Realization(config, 0)
+        part.advance(counts.index(number + 1))
+        assert len(part.slips) == number
+        assert part.time > whole.slips[number, 2]
+        expected = whole.slip_trace[whole.slip_trace[:, -1] < number]
+        np.testing.assert_array_equal(part.slip_trace, expected)

@@ -37,8 +37,20 @@ def test_a_stiff_spring_slips_once_in_each_life_of_the_contacts(klein, engine):
     slips = catalogue(tree)
     life = 0.9 * STATIC_FORCE / 2000 / 1e-7
     np.testing.assert_allclose(slips["waiting_time"].values[1:], life, rtol=0.05)
+    np.testing.assert_array_equal(slips["waiting_time"][1:], np.diff(slips["start_time"]))
     np.testing.assert_allclose(slips["contacts_broken"], 4080, rtol=0.05)
     assert slips.sizes["slip"] == 11
+
+
+def test_a_realization_waits_for_no_slip_of_another(klein):
+    """The first slip of each has no slip before it."""
+    slips = catalogue(mesoslip.run(klein(run__realizations=3, run__duration=0.5, **STIFF)))
+    owners, starts = slips["realization_index"].values, slips["start_time"].values
+    is_first = np.diff(owners, prepend=-1) != 0
+    assert is_first.sum() == 3
+    assert np.isnan(slips["waiting_time"].values[is_first]).all()
+    expected = np.diff(starts, prepend=np.nan)[~is_first]
+    np.testing.assert_array_equal(slips["waiting_time"].values[~is_first], expected)
 
 
 def test_both_engines_have_one_catalogue(klein):

@@ -12,6 +12,7 @@ from .measured.trace import read_trace
 from .output.inputs import open_output
 from .plots.plot import plot
 from .reports.report import report
+from .simulation.realization import Realization
 from .theory.derived import derived
 from .theory.force_curve import curve
 from .theory.slip_onset import onset
@@ -24,6 +25,7 @@ __all__ = [
     "FileError",
     "MesoslipError",
     "Processes",
+    "Realization",
     "RunError",
     "SteadySliding",
     "Threads",

@@ -77,8 +77,9 @@ class GroupLayout:
         ]
 
 
-def column(number: int) -> Pick:
+def column(table: str, name: str) -> Pick:
     """A column of a table."""
+    number = tables.COLUMNS[table].index(name)
     return lambda rows, _: rows[:, number]
 
 
@@ -113,9 +114,14 @@ def describe(results: RunResults) -> dict[str, GroupLayout]:
     return layout
 
 
+# Traces that only some sliders have.
+SPECIAL_TRACES = ("elastic_force", "base_displacement")
+
+
 def recorded(config: Config) -> tuple[str, ...]:
     """Names of the traces that an output of a configuration has, without the time."""
-    return tables.TRACE_COLUMNS[1:7] + config.slider.extra_traces
+    common = (name for name in tables.TRACE_COLUMNS if name not in ("time", *SPECIAL_TRACES))
+    return (*common, *config.slider.extra_traces)
 
 
 def _count(results: RunResults, table: str) -> int:
@@ -129,11 +135,11 @@ def _root(results: RunResults) -> GroupLayout:
     sizes = {"realization": len(realizations), "time": max(lengths)}
     each, at_times = ("realization",), ("realization", "time")
     writer.add("realization", each, is_coordinate=True, values=[one.number for one in realizations])
-    writer.add("time", ("time",), is_coordinate=True, table="trace", pick=column(0))
+    writer.add("time", ("time",), is_coordinate=True, table="trace", pick=column("trace", "time"))
     can_lack = min(lengths) < max(lengths)
     for name in recorded(config):
-        place = tables.TRACE_COLUMNS.index(name)
-        writer.add(name, at_times, can_lack=can_lack, table="trace", pick=column(place))
+        pick = column("trace", name)
+        writer.add(name, at_times, can_lack=can_lack, table="trace", pick=pick)
     layers = config.slider.layers_recorded(config)
     if layers:
         sizes["layer"] = layers
@@ -174,10 +180,9 @@ DIMENSIONS = {
 
 def _slips(results: RunResults) -> GroupLayout:
     writer = _catalogue(results, variables.SLIPS, "slips")
-    place = {name: number for number, name in enumerate(tables.SLIP_COLUMNS)}
-    before, after = place["force_before"], place["force_after"]
-    picks = {name: column(number) for name, number in place.items()}
-    picks["force_drop"] = lambda rows, _: rows[:, before] - rows[:, after]
+    picks = {name: column("slips", name) for name in tables.SLIP_COLUMNS}
+    before, after = picks["force_before"], picks["force_after"]
+    picks["force_drop"] = lambda rows, owners: before(rows, owners) - after(rows, owners)
     for name in variables.SLIPS:
         if name in picks:
             writer.add(name, ("slip",), table="slips", pick=picks[name])
@@ -186,42 +191,41 @@ def _slips(results: RunResults) -> GroupLayout:
 
 def _stages(results: RunResults) -> GroupLayout:
     writer = _catalogue(results, variables.STAGES, "stages")
-    for place, name in enumerate(tables.STAGE_COLUMNS):
-        writer.add(name, ("stage",), table="stages", pick=column(place))
+    for name in tables.STAGE_COLUMNS:
+        writer.add(name, ("stage",), table="stages", pick=column("stages", name))
     return GroupLayout({"stage": _count(results, "stages")}, writer.entries, {})
 
 
 def _slip_traces(results: RunResults) -> GroupLayout:
     writer = _catalogue(results, variables.SLIP_TRACES, "slip_trace")
     how: dict[str, Any] = {"table": "slip_trace"}
-    writer.add("slip", ("sample",), pick=column(-1), **how)
-    writer.add("sample_time", ("sample",), is_coordinate=True, pick=column(0), **how)
+    writer.add("slip", ("sample",), pick=column("slip_trace", "slip"), **how)
+    writer.add(
+        "sample_time", ("sample",), is_coordinate=True, pick=column("slip_trace", "time"), **how
+    )
     for name in recorded(results.config):
-        place = tables.TRACE_COLUMNS.index(name)
-        writer.add(name, ("sample",), pick=column(place), **how)
+        writer.add(name, ("sample",), pick=column("slip_trace", name), **how)
     return GroupLayout({"sample": _count(results, "slip_trace")}, writer.entries, {})
 
 
 def _avalanches(results: RunResults) -> GroupLayout:
     config = results.config
     writer = _catalogue(results, variables.AVALANCHES, "avalanches")
-    place = {name: number for number, name in enumerate(tables.AVALANCHE_COLUMNS)}
+    picks = {name: column("avalanches", name) for name in tables.AVALANCHE_COLUMNS}
+    picks["start_time"] = picks["time"]
     names = ["start_time", "displacement", "size", "force_before", "force_drop"]
-    place["start_time"] = place["time"]
     if config.slider.jumps:
         names.append("slip")
     if config.interaction is not None:
         names += ["area", "width", "height", "generations"]
     for name in names:
-        writer.add(name, ("avalanche",), table="avalanches", pick=column(place[name]))
+        writer.add(name, ("avalanche",), table="avalanches", pick=picks[name])
     if config.interaction is not None:
-        sides = {
-            place["width"]: config.interaction.columns,
-            place["height"]: config.interaction.rows,
-        }
+        columns, lattice_rows = config.interaction.columns, config.interaction.rows
 
-        def spans(rows: Array, _: Array) -> Array:
-            reached: Array = np.any([rows[:, side] == most for side, most in sides.items()], axis=0)
+        def spans(rows: Array, owners: Array) -> Array:
+            width, height = picks["width"](rows, owners), picks["height"](rows, owners)
+            reached: Array = (width == columns) | (height == lattice_rows)
             return reached
 
         writer.add("spans", ("avalanche",), table="avalanches", pick=spans)
@@ -235,18 +239,27 @@ def _snapshots(results: RunResults) -> GroupLayout:
     assert config.contacts.area is not None
     writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_events")
     how: dict[str, Any] = {"table": "snapshot_events"}
-    writer.add("snapshot_time", ("snapshot",), is_coordinate=True, pick=column(0), **how)
-    writer.add("displacement", ("snapshot",), pick=column(1), **how)
-    writer.add("avalanche_size", ("snapshot",), pick=column(2), **how)
+    writer.add(
+        "snapshot_time",
+        ("snapshot",),
+        is_coordinate=True,
+        pick=column("snapshot_events", "time"),
+        **how,
+    )
+    writer.add("displacement", ("snapshot",), pick=column("snapshot_events", "displacement"), **how)
+    writer.add("avalanche_size", ("snapshot",), pick=column("snapshot_events", "size"), **how)
     spacing = np.sqrt(config.contacts.area / config.contacts.count)
     for name, places in zip("xy", lattice_places(lattice), strict=True):
         writer.add(name, ("row", "column"), is_coordinate=True, values=spacing * places)
     shape = (-1, lattice.rows, lattice.columns)
+    stretch, load, generation = (
+        tables.SNAPSHOT_NUMBERS.index(name) for name in ("stretch", "load", "generation")
+    )
     picks: dict[str, Pick] = {
-        "stretch": lambda rows, _: rows[..., 0],
-        "load": lambda rows, _: np.where(np.isfinite(rows[..., 0]), rows[..., 1], np.nan),
-        "pinned": lambda rows, _: np.isfinite(rows[..., 0]),
-        "generation": lambda rows, _: rows[..., 2],
+        "stretch": lambda rows, _: rows[..., stretch],
+        "load": lambda rows, _: np.where(np.isfinite(rows[..., stretch]), rows[..., load], np.nan),
+        "pinned": lambda rows, _: np.isfinite(rows[..., stretch]),
+        "generation": lambda rows, _: rows[..., generation],
     }
 
     def on_lattice(pick: Pick) -> Pick:

@@ -10,9 +10,10 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
@@ -25,6 +26,7 @@ from mesoslip.simulation.tables import (
     TABLES,
     FirstRows,
     Rows,
+    structured,
 )
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ SEGMENT_SECONDS = 0.25
 SEGMENT_WORK = 100_000.0
 # No bound on the advances or the work of a segment.
 ANY_NUMBER = 2**62
+# Advances at a time on the way to a time.
+MAX_ADVANCES = 100_000
 # What no stretch can be: that of a detached contact.
 DETACHED = 1e300
 
@@ -93,7 +97,36 @@ class Saved:
 
 
 class Realization:
-    """One run of a configuration.
+    """One run of a configuration, which goes on as far as one wants.
+
+    Its numbers do not depend on how far it goes each time. What it records stays in memory. It
+    frees the memory of the kernel at `close`, at the end of a ``with`` block, or with this object.
+    Realizations are independent of each other and release the interpreter's lock while they
+    advance, so that several can run in threads; each is to be used by one thread at a time.
+
+    Parameters
+    ----------
+    config
+        What to run.
+    number
+        Number of the realization, from 0; each has its own random numbers.
+
+    Raises
+    ------
+    RunError
+        By the methods, if the motion makes no progress or a solver fails.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> config = mesoslip.Config.load(path, overrides=["contacts.count=200"])
+    >>> with mesoslip.Realization(config) as one:
+    ...     one.advance_to(1.0)
+    ...     force = one.table("trace")["spring_force"]
+    ...     stretched = one.contacts["break_stretch"]
+    >>> one.time >= 1.0, one.finished, len(stretched)
+    (True, False, 200)
 
     Attributes
     ----------
@@ -117,7 +150,7 @@ class Realization:
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
 
-    def __init__(self, config: Config, number: int) -> None:
+    def __init__(self, config: Config, number: int = 0) -> None:
         check_memory(config)
         self.config = config
         self.number = number
@@ -215,6 +248,31 @@ class Realization:
         if advances is None and work is None:
             self._work *= min(2.0, max(0.1, SEGMENT_SECONDS / max(seconds, 1e-9)))
 
+    def advance_to(self, time: float) -> None:
+        """Go on until a time [s] has come, or the run is over.
+
+        An advance of the slider ends at an event, so the run comes to a halt at the first event at
+        or after the time, and never later than 500 intervals of the trace.
+
+        Raises
+        ------
+        RunError
+            If the kernel cannot go on.
+        """
+        before, advances = self.time, 1
+        while not self.finished and self.time < time:
+            self.advance(advances)
+            pace, before = self.time - before, self.time
+            # Half the way at the present pace, so as not to come past the time.
+            wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
+            advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def _take(self, kernel: Kernel) -> None:
         """Take what was recorded, and how far the kernel has come."""
         progress = kernel.ask()
@@ -307,6 +365,36 @@ class Realization:
         if table == "snapshots":
             return SnapshotRows(rows)
         return rows
+
+    def table(self, name: str) -> NDArray[np.void]:
+        """What was recorded in a table up to now, as a structured array with named columns.
+
+        Parameters
+        ----------
+        name
+            "trace", samples at fixed intervals; "slips" and "slip_trace", the finer samples around
+            slips; "stages" of the drive that are over; "avalanches"; "snapshot_events", when there
+            were snapshots.
+
+        Returns
+        -------
+        Rows, shape (rows), with the columns of `mesoslip.simulation.tables.COLUMNS`, in SI units.
+
+        Raises
+        ------
+        RunError
+            If there is no such table, or its columns have no names.
+        """
+        columns = COLUMNS.get(name)
+        if not columns:
+            known = ", ".join(repr(other) for other, names in COLUMNS.items() if names)
+            raise RunError(f"there is no table {name!r} with named columns, but there are {known}")
+        return structured(self.rows(name).read(), columns)
+
+    @property
+    def energy_terms(self) -> dict[str, float]:
+        """Terms of the energy balance up to now by name [J]; NaN before the first advance."""
+        return dict(zip(ENERGY_COLUMNS, self.energy.tolist(), strict=True))
 
     @property
     def trace(self) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +40,13 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "snapshots": (),
 }
 TABLES = tuple(COLUMNS)
+
+
+def structured(values: Array, columns: Sequence[str]) -> NDArray[np.void]:
+    """Rows, shape (rows, columns), as a structured array, shape (rows), of which each column has a
+    name; nothing is copied where rows lie one after another in memory."""
+    row = np.dtype([(name, np.float64) for name in columns])
+    return np.ascontiguousarray(values).view(row)[:, 0]
 
 
 @dataclass(slots=True)

@@ -218,6 +218,7 @@ def test_a_folder_that_is_no_checkpoint_refuses_the_run(tmp_path, run_file, comm
     for name in ("mine.checkpoint", "mine.checkpoint.old"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "thesis.tex").write_text("years of work")
+    (tmp_path / "mine.partial.nc").write_text("years of work")
     before = contents(tmp_path)
     for more in ([], ["--resume"]):
         status, _, message = command("run", run_file, "-o", tmp_path / "mine.nc", *more)

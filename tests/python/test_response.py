@@ -15,8 +15,8 @@ from conftest import ROOT, klein_tables
 from matplotlib.figure import Figure
 from mesoslip import Config, FileError
 from mesoslip.analysis.response import line, rows_of, scalars_of
+from mesoslip.analysis.spring_slider import Loading, RateAndState, spring_slider
 from mesoslip.analysis.steady_force import steady_mean, transient
-from mesoslip.theory.rate_and_state import Loading, RateAndState, spring_slider
 from response_coverage import autoregression, steady_coverage
 
 # F_s = 18 uN and a mean breaking stretch of 9 nm.

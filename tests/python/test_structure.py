@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import mesoslip
 import pytest
 from conftest import ROOT
 from mesoslip.configuration.sliders import SLIDERS
@@ -247,3 +250,62 @@ def test_threshold_laws_are_the_same_on_both_sides():
     for files in (room.glob("*.f90"), configured.glob("*.py")):
         assert sorted(cases) == sorted({path.stem for path in files} - {"base", "__init__"})
     assert sorted(cases) == sorted(LAWS)
+
+
+# Wrong imports that were made: a file of the room that may not, and what it imports.
+PLANTS = {
+    "explorer": "campaign.plan",
+    "campaign": "reports.page",
+    "theory": "measured.trace",
+    "analysis": "theory.lives",
+    "inference": "measured.trace",
+    "plots": "inference.plan",
+    "reports": "explorer.server",
+    "output": "analysis.slips",
+    "simulation": "output.layout",
+    "configuration": "simulation.kernel",
+}
+
+
+def test_wrong_imports_of_python_are_found(tmp_path):
+    """In a copy of the package with a wrong import in each room."""
+    package = tmp_path / "mesoslip"
+    shutil.copytree(Path(mesoslip.__file__).parent, package)
+    for room, module in PLANTS.items():
+        (package / room / "planted.py").write_text(f"import mesoslip.{module}\n")
+    program = Path(sys.executable).with_name("lint-imports")
+    result = subprocess.run(
+        [program, "--no-cache", "--config", ROOT / "pyproject.toml"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    for room, module in PLANTS.items():
+        assert f"mesoslip.{room}.planted -> mesoslip.{module}" in result.stdout, room
+
+
+def test_every_file_of_the_package_is_listed():
+    text = (ROOT / "python" / "meson.build").read_text()
+    listed = {
+        f"{folder}/{name}".removeprefix("./")
+        for folder, names in re.findall(r"^  '([\w./]+)': \[\n(.*?)^  \]", text, re.M | re.S)
+        for name in re.findall(r"'([\w.]+)'", names)
+    }
+    package = ROOT / "python" / "mesoslip"
+    there = {
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*")
+        if path.suffix in {".py", ".pyi", ".typed", ".html"} and "__pycache__" not in path.parts
+    }
+    assert listed == there | {"py.typed"}
+
+
+def test_every_file_in_fortran_is_listed():
+    for path in sources():
+        folder, name = path.parent, path.name
+        while not (folder / "meson.build").exists():
+            name, folder = f"{folder.name}/{name}", folder.parent
+        assert name in (folder / "meson.build").read_text(), path

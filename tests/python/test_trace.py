@@ -9,8 +9,8 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT, klein_tables
+from mesoslip.analysis.sampled_slips import estimated_period, find_slips, noise_level
 from mesoslip.configuration.columns import cells_of, places_of, values_of
-from mesoslip.measured.slips import estimated_period, find_slips, noise_level
 from mesoslip.measured.table import COLUMNS
 
 HIDDEN = {

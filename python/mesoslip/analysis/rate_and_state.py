@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment, Stage
+from mesoslip.analysis.spring_slider import LAWS, Loading, RateAndState, spring_slider
 from mesoslip.errors import RunError
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.quantities import percent
-from mesoslip.theory.rate_and_state import LAWS, Loading, RateAndState, spring_slider
 
 Array = NDArray[np.float64]
 

@@ -8,16 +8,18 @@ from typing import Annotated
 import typer
 
 from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show, time_of
+from mesoslip.quantities import column, number
 
-# Scale and unit of the statistics of slips: those of the table above them.
-SHOWN = {
-    "force_before": (1e6, "uN"),
-    "force_after": (1e6, "uN"),
-    "force_drop": (1e6, "uN"),
-    "peak_velocity": (1e6, "um/s"),
-    "contacts_broken": (1.0, ""),
-    "duration": (1e3, "ms"),
-    "waiting_time": (1.0, "s"),
+# Columns of the catalogue of slips: header, and unit in SI.
+COLUMNS = {
+    "start_time": ("start", "s"),
+    "duration": ("duration", "s"),
+    "force_before": ("force before", "N"),
+    "force_after": ("force after", "N"),
+    "force_drop": ("force drop", "N"),
+    "peak_velocity": ("peak velocity", "m/s"),
+    "contacts_broken": ("breaks", "1"),
+    "waiting_time": ("waiting time", "s"),
 }
 
 
@@ -28,7 +30,7 @@ def slips(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the catalogue of slips, with statistics."""
+    """Print the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogue
     from mesoslip.output import files, targets
 
@@ -41,29 +43,32 @@ def slips(
     if as_json:
         print_json({"slips": rows, "statistics": statistics})
         return
-    typer.echo(
-        "  realization    start s   duration ms   before uN   after uN   drop uN   peak um/s"
-        "   breaks"
-    )
-    for row in rows:
-        typer.echo(
-            f"{row['realization_index']:13d} {row['start_time']:10.4f} "
-            f"{1e3 * (row['end_time'] - row['start_time']):13.3f} "
-            f"{1e6 * row['force_before']:11.4f} "
-            f"{1e6 * row['force_after']:10.4f} {1e6 * row['force_drop']:9.4f} "
-            f"{_known(row['peak_velocity'], 1e6, '11.4f')} "
-            f"{_known(row['contacts_broken'], 1.0, '8.0f')}"
-        )
+    columns = {
+        name: column([row[name] for row in rows], unit, 5) for name, (_, unit) in COLUMNS.items()
+    }
+    table_rows = [["realization", *(columns[name].head(COLUMNS[name][0]) for name in COLUMNS)]]
+    table_rows += [
+        [str(row["realization_index"]), *(columns[name].text(row[name]) for name in COLUMNS)]
+        for row in rows
+    ]
+    widths = [max(map(len, cells)) for cells in zip(*table_rows, strict=True)]
+    for cells in table_rows:
+        typer.echo("  ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True)))
     typer.echo(f"{len(rows)} slip{'s' if len(rows) != 1 else ''}")
-    for name, (scale, unit) in SHOWN.items():
+    for name, (header, _) in COLUMNS.items():
         if name in statistics:
-            mean, deviation, least, greatest = (
-                scale * statistics[name][what]
+            mean, deviation, low, high = (
+                statistics[name][what]
                 for what in ("mean", "standard_deviation", "minimum", "maximum")
             )
-            spread = f", standard deviation {deviation:.2g}, from {least:.5g} to {greatest:.5g}"
-            told = f"{name:16} mean {mean:.5g}{spread if least < greatest else ''} {unit}"
-            typer.echo(told.rstrip())
+            scale = columns[name].scale
+            low_text, high_text = (number(one / scale.size, 5) for one in (low, high))
+            spread = (
+                f", standard deviation {number(deviation / scale.size, 2)}, "
+                f"range {low_text} to {high_text}"
+            )
+            shown = f"mean {number(mean / scale.size, 5)}{spread if low < high else ''}"
+            typer.echo(f"{scale.label(header):20} {shown}")
 
 
 def avalanches(
@@ -90,7 +95,7 @@ def avalanches(
         ),
     ] = None,
 ) -> None:
-    """Show sizes of avalanches: their distribution, and the law that fits it."""
+    """Print the sizes of avalanches: their distribution, and the fitted power law."""
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
@@ -145,19 +150,12 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         print_json([{**row, "regime": name} for row, name in zip(rows, names, strict=True)])
         return
-    for number, one in zip(data["realization"].values.tolist(), judged, strict=True):
+    for index, one in zip(data["realization"].values.tolist(), judged, strict=True):
         if len(judged) > 1:
-            typer.echo(f"realization {number}")
+            typer.echo(f"realization {index}")
         for name, meaning in REGIME.items():
             if name != "regime":
                 show(name, getattr(one, name), meaning.units, meaning.attributes["long_name"])
         typer.echo(one.told)
     if len(judged) > 1:
         typer.echo(told(judged))
-
-
-def _known(value: float | None, scale: float, form: str) -> str:
-    """A number of a column, or a dash if a measurement does not tell it."""
-    return (
-        format("-", f">{form.partition('.')[0]}") if value is None else format(scale * value, form)
-    )

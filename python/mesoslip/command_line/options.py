@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mesoslip.quantities import with_unit
+
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
@@ -94,7 +96,7 @@ def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None
     elif math.isnan(value):
         shown = "not known"
     else:
-        shown = f"{value:.6g}" + ("" if unit == "1" else f" {unit}")
+        shown = with_unit(value, unit, 6)
     typer.echo(f"{name:22} {shown:20} {meaning}")
 
 

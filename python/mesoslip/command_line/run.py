@@ -113,7 +113,7 @@ def run(
             raise
         if not quiet:
             _tell_results(results, checked, path)
-        _partial(path).unlink(missing_ok=True)
+        files.remove_partial(_partial(path))
         checkpoint.remove()
 
 

@@ -86,12 +86,12 @@ def _write(done: Sweep, path: Path, stop: Stop) -> int:
     """Write the dataset, under another name if points are missing; the exit status."""
     import xarray as xr
 
-    from mesoslip.output import writing
+    from mesoslip.output import files, writing
 
     partial = path.with_name(f"{path.stem}.partial{path.suffix}")
     writing.write(xr.DataTree(done.dataset), path if done.complete else partial)
     if done.complete:
-        partial.unlink(missing_ok=True)
+        files.remove_partial(partial)
         return FAILED if done.failures else 0
     say(
         f"{path}: {done.ending}; {done.missing} of {done.dataset['status'].size} points are "

@@ -351,7 +351,7 @@ class Store(Pieces):
         FileError
             If it cannot be written.
         """
-        self._write(MANIFEST, json.dumps(manifest, indent=1).encode())
+        self._write(MANIFEST, json.dumps(manifest).encode())
 
     def _write(self, name: str, content: bytes) -> None:
         try:

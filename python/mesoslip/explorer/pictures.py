@@ -15,6 +15,7 @@ from mesoslip.analysis.regime import judgements, regimes
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
 from mesoslip.output.access import group_of
+from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.run import (
     NAMES,
@@ -24,7 +25,6 @@ from mesoslip.plots.run import (
     largest_slip,
     line,
     slip_window,
-    times_of,
 )
 from mesoslip.quantities import Scale, scale_for, with_unit
 from mesoslip.simulation.runner import Results

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.even_traces import even_trace, first_velocity
+from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, noise_level
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
@@ -22,8 +24,6 @@ from mesoslip.inference.rounds import Estimate, close_in
 from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
-from mesoslip.measured.slips import FoundSlips, estimated_period, noise_level
-from mesoslip.measured.trace import even_trace, first_velocity
 
 if TYPE_CHECKING:
     import xarray as xr

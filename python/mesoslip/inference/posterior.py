@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.configuration.units import cf_units
 from mesoslip.inference.checks import DETERMINED, UNDETERMINED, shrinkage, warnings
 from mesoslip.inference.fit import Fitted
 from mesoslip.inference.sampler import r_hat
-from mesoslip.measured.slips import FoundSlips
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.measured.slips import FoundSlips, find_slips
+from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
 
 Array = NDArray[np.float64]
 

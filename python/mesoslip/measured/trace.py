@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.even_traces import evenly_sampled, first_velocity
+from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, find_slips, noise_level
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.measured.slips import FoundSlips, estimated_period, find_slips, noise_level
 from mesoslip.measured.table import Measurements, read_table
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike, as_config
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
-
-# Intervals that differ by less, relative to the usual one, count as equal.
-EVEN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def read_trace(
     -------
     xarray.DataTree
         The layout of a run's output; attribute ``origin`` is "measured". Slips are found by the
-        rule of `mesoslip.measured.slips`.
+        rule of `mesoslip.analysis.sampled_slips`.
 
     Raises
     ------
@@ -124,7 +122,7 @@ def read_trace(
             period = 2 * config.slider.quiet_time
     drive, velocity = _drive(measured, drive_velocity, config, stiffness)
     displacement = _displacement(measured, drive, stiffness)
-    time, force = _even(measured.time, measured.force)
+    time, force = evenly_sampled(measured.time, measured.force)
     noise = noise_level(force) if noise is None else noise
     estimated = period is None
     direction = -1.0 if velocity is not None and velocity < 0 else 1.0
@@ -152,27 +150,6 @@ def _doubts(force: Array, noise: float, period: float) -> Iterator[str]:
         )
     if not math.isfinite(period):
         yield "no fall of the force stands out of the noise: there is no slip, and no period"
-
-
-def even_trace(tree: xr.DataTree, realization: int = 0) -> tuple[Array, Array]:
-    """Times [s] and spring force [N] of a trace at equal intervals.
-
-    Times whose intervals differ are replaced by even ones, with forces on straight lines between.
-    """
-    root = tree.to_dataset()
-    time = root["time"].values
-    force = root["spring_force"].values[realization].astype(float)
-    there = np.isfinite(force)
-    return _even(time[there], force[there])
-
-
-def _even(time: Array, force: Array) -> tuple[Array, Array]:
-    steps = np.diff(time)
-    interval = float(np.median(steps))
-    if np.all(np.abs(steps - interval) <= EVEN * interval):
-        return time, force
-    even = time[0] + interval * np.arange(math.floor((time[-1] - time[0]) / interval) + 1)
-    return even, np.interp(even, time, force)
 
 
 def _as_measured(config: Config, measured: Measurements, title: str) -> Config:
@@ -215,14 +192,6 @@ def _drive(
             velocity = float(np.polyfit(time, measured.drive, 1)[0])
         drive = measured.drive
     return drive, velocity
-
-
-def first_velocity(config: Config) -> float:
-    """The first velocity of a drive that is not 0 [m/s], or the rate of its force [N/s]; 0 if there
-    is none."""
-    parts = config.drive_parts
-    velocities = (one for part in parts for one in (part.start_velocity, part.end_velocity))
-    return next((one for one in velocities if one), 0.0)
 
 
 def _way(config: Config, time: Array) -> Array:
@@ -309,6 +278,6 @@ def _velocity(time: Array, displacement: Array, period: float) -> Array:
     interval = float(np.median(np.diff(time)))
     samples = period / 16 / interval if math.isfinite(period) else 1
     width = min(2 * max(1, round(samples / 2)) + 1, len(time) - 1 + len(time) % 2)
-    even, values = _even(time, displacement)
+    even, values = evenly_sampled(time, displacement)
     rate: Array = savgol_filter(values, width, 1, deriv=1, delta=interval, mode="nearest")
     return np.interp(time, even, rate)

@@ -147,6 +147,19 @@ def is_of_another(path: Path, config: Config) -> bool:
         return False
 
 
+def remove_partial(path: Path) -> None:
+    """Remove the output of a run or a sweep that was stopped, if that is what is at a path."""
+    try:
+        check_signature(path)
+        check_links(path)
+        with LOCK, netCDF4.Dataset(path) as file:
+            is_partial = file.getncattr("complete") == "false"
+    except (OSError, AttributeError, UnicodeError, FileError):
+        return
+    if is_partial:
+        path.unlink(missing_ok=True)
+
+
 def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:
     """The configuration of an output, to run it again, with changes laid over it."""
     with opened(path) as tree:

@@ -100,7 +100,12 @@ SLIPS = Group(
     force_after=Meaning("N", "spring force at the end of the slip"),
     force_drop=Meaning("N", "drop of the spring force in the slip"),
     peak_velocity=Meaning("m s-1", "greatest velocity of the slider in the slip"),
-    contacts_broken=Meaning("1", "breaks of contacts in the slip", np.int64, is_fractional=True),
+    contacts_broken=Meaning(
+        "1",
+        "breaks in the slip; a contact that attaches again may break again",
+        np.int64,
+        is_fractional=True,
+    ),
 )
 
 STAGES = Group(

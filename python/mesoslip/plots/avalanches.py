@@ -28,6 +28,7 @@ from mesoslip.analysis.avalanches import failures
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
+from mesoslip.output.samples import times_of
 from mesoslip.output.targets import written_whole
 from mesoslip.plots.run import (
     EVERYTHING,
@@ -37,7 +38,6 @@ from mesoslip.plots.run import (
     abscissa,
     curve,
     draw_curves,
-    times_of,
 )
 from mesoslip.plots.style import (
     COLORS,

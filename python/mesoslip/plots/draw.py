@@ -13,6 +13,7 @@ from mesoslip.analysis.avalanches import NO_AVALANCHES
 from mesoslip.configuration import differences
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.access import config_of, is_measured
+from mesoslip.output.kinds import kind_of, kind_of_all
 from mesoslip.plots import avalanches, posterior, response, run, sweep, theory
 from mesoslip.plots.run import EVERYTHING, Extent
 from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, styled
@@ -20,58 +21,11 @@ from mesoslip.plots.style import Canvas, canvas, legend_above, shared_legend, st
 VIEWS = ("run", "avalanches", "lattice", "layers", "response")
 
 
-class Kind(NamedTuple):
-    """A kind of output: what it is called, and what tells it from others."""
-
-    told: str
-    is_of: Callable[[xr.DataTree], bool]
-
-
-# Outputs of commands, the first that fits.
-KINDS = {
-    "run": Kind("a run", lambda tree: "spring_force" in tree.data_vars),
-    "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
-    "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
-    "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
-    "fit": Kind("a fit", lambda tree: "posterior" in tree.children),
-}
-
-
 class Picture(NamedTuple):
     """A picture of outputs: the whole of it, and the panel that tells most of it."""
 
     whole: Callable[[Canvas | None], Canvas]
     panel: Callable[[Axes], None]
-
-
-def kind_of(tree: xr.DataTree) -> str:
-    """Which kind an output is of, a name of `KINDS`.
-
-    Raises
-    ------
-    FileError
-        If it is of none of them.
-    """
-    for name, kind in KINDS.items():
-        if kind.is_of(tree):
-            return name
-    *others, last = (kind.told for kind in KINDS.values())
-    raise FileError(f"the output is neither {', '.join(others)} nor {last}: it has no picture")
-
-
-def kind_of_all(trees: Sequence[xr.DataTree], names: Sequence[str]) -> str:
-    """Which kind outputs are of that go into one picture, or on one page.
-
-    Raises
-    ------
-    FileError
-        If they are of several kinds.
-    """
-    kinds = {kind_of(tree): name for tree, name in zip(trees, names, strict=True)}
-    if len(kinds) > 1:
-        found = ", ".join(f"{name} is {KINDS[kind].told}" for kind, name in kinds.items())
-        raise FileError(f"outputs of different commands do not go together: {found}")
-    return next(iter(kinds))
 
 
 def picture(

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state import SMALL_MISFIT, Fit, Record, fit, record_of
 from mesoslip.analysis.response import healing_line, response_of, steady_line
+from mesoslip.analysis.spring_slider import LAWS
 from mesoslip.errors import RunError
 from mesoslip.plots.style import Canvas, canvas, styled
 from mesoslip.quantities import percent
-from mesoslip.theory.rate_and_state import LAWS
 
 Array = NDArray[np.float64]
 

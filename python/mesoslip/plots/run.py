@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from mesoslip.analysis.slips import slips
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.output.access import group_of, is_measured
+from mesoslip.output.access import is_measured
+from mesoslip.output.samples import Samples, samples, times_of
 from mesoslip.output.variables import TRACE
 from mesoslip.plots.style import (
     COLORS,
@@ -144,67 +145,6 @@ def is_known(tree: xr.DataTree, name: str) -> bool:
     if not is_measured(tree):
         return True
     return bool(np.isfinite(tree.to_dataset()[name][0, 0].item()))
-
-
-def times_of(tree: xr.DataTree) -> Array:
-    """Times of the trace [s]."""
-    times: Array = tree.to_dataset()["time"].values
-    return times
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Samples of a realization in the order of their times [s], which need not be in memory."""
-
-    data: xr.Dataset
-    dimension: str
-    times: Array
-    start: int = 0
-
-    def inside(self, window: tuple[float, float]) -> tuple[int, int]:
-        """Places of the first sample of a window of time, and of the first one after it."""
-        first = np.searchsorted(self.times, window[0], "left")
-        return int(first), int(np.searchsorted(self.times, window[1], "right"))
-
-    def values(self, name: str, first: int, after: int) -> Array:
-        """Values of a variable, or the times."""
-        if name == "time":
-            return self.times[first:after]
-        places = slice(self.start + first, self.start + after)
-        values: Array = self.data[name].isel({self.dimension: places}).values.astype(float)
-        return values
-
-
-def samples(tree: xr.DataTree, realization: int = 0) -> list[Samples]:
-    """Samples of a realization: those of the whole trace, and the finer ones of its slips."""
-    root = tree.to_dataset().isel(realization=realization)
-    parts = [Samples(root, "time", root["time"].values)]
-    if "slip_traces" in tree.children:
-        fine = group_of(tree, "slip_traces")
-        times, start = fine["sample_time"].values, 0
-        if tree.sizes["realization"] > 1:
-            places = fine["realization_index"].values
-            start, end = np.searchsorted(places, (realization, realization + 1))
-            times = times[start:end]
-        parts.append(Samples(fine, "sample", times, int(start)))
-    return parts
-
-
-def series(
-    tree: xr.DataTree,
-    name: str,
-    realization: int = 0,
-    window: tuple[float, float] = (-np.inf, np.inf),
-) -> tuple[Array, Array]:
-    """Times [s] and values of a variable of a realization, with the finer samples of its slips."""
-    all_times, all_values = [], []
-    for part in samples(tree, realization):
-        first, after = part.inside(window)
-        all_times.append(part.times[first:after])
-        all_values.append(part.values(name, first, after))
-    times, values = np.concatenate(all_times), np.concatenate(all_values)
-    order = np.argsort(times, kind="stable")
-    return times[order], values[order]
 
 
 def extremes(

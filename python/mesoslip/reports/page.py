@@ -7,8 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from mesoslip.errors import FileError
+from mesoslip.output.kinds import kind_of_all
 from mesoslip.output.targets import written_whole
-from mesoslip.plots.draw import kind_of_all
 from mesoslip.reports import content
 from mesoslip.reports.content import Section, Subject
 from mesoslip.reports.sections import SECTIONS

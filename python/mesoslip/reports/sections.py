@@ -1,7 +1,7 @@
 """The sections that the report of each kind of output has.
 
 Adding one is adding a function to a list of `SECTIONS`; another kind of output adds a list, and
-what tells it apart to `mesoslip.plots.draw.KINDS`.
+what tells it apart to `mesoslip.output.kinds.KINDS`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from mesoslip.errors import FileError
 from mesoslip.inference import posterior
 from mesoslip.output import variables
 from mesoslip.output.access import group_of, is_measured
+from mesoslip.output.kinds import kind_of
 from mesoslip.plots import draw, run
 from mesoslip.plots import sweep as sweep_plots
 from mesoslip.plots.run import Extent
@@ -215,7 +216,7 @@ def maps_of_sweep(subjects: Sequence[Subject]) -> Section | None:
 def pictures(subjects: Sequence[Subject]) -> Section | None:
     """What happened."""
     extent = Extent(parts=PARTS)
-    if draw.kind_of(subjects[0].tree) != "run":
+    if kind_of(subjects[0].tree) != "run":
         extent = run.EVERYTHING
     shown: list[Block] = []
     if len(subjects) > 1:

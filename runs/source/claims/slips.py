@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from mesoslip.analysis.slips import slips
-from mesoslip.plots.run import series
+from mesoslip.output.samples import series
 from mesoslip.theory.derived import derived
 from numpy.typing import NDArray
 from outputs import configuration

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from mesoslip.plots import run as plots
+from mesoslip.output.samples import series
 from mesoslip.plots.theory import draw_onset
 from outputs import configuration
 
@@ -50,8 +50,8 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
                 (contacts, {"color": "tab:orange", "label": "N contacts"}),
                 (infinite, {"color": "tab:red", "label": r"$N \to \infty$"}),
             ):
-                times, force = plots.series(tree, "spring_force")
-                _, displacement = plots.series(tree, "displacement")
+                times, force = series(tree, "spring_force")
+                _, displacement = series(tree, "displacement")
                 start = int(np.argmax(displacement >= onset.attrs["X_c"]))
                 tau = onset.attrs["omega_s"] * (times - times[start])
                 axes.plot(tau, (force - force[start]) / static, **style)

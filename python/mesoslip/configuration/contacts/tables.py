@@ -160,7 +160,8 @@ class Contacts(Table):
     stiffness: Annotated[Stiffness, Field(gt=0)]
     """Stiffness of all contacts together, Nk."""
     area: Annotated[Area, Field(gt=0)] | None = None
-    """Area of the interface, A; its N-th part is a contact's."""
+    """Real area of contact, A, which the contacts fill: each has A/N. It enters the mass of a
+    contact, ρ (A/N) h, with that its drag, and the distance between neighbours, (A/N)^(1/2)."""
     film_thickness: Annotated[Length, Field(gt=0)] | None = None
     """Thickness of the film between the surfaces, h; with area and density the mass of the
     contacts."""

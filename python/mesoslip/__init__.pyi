@@ -2,12 +2,14 @@ from .analysis.avalanches import avalanche_summary, avalanches
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
-from .api import fit, run, sweep
+from .api import run
+from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
 from .execution.executors import Dask, Processes, Threads
+from .inference.fit_trace import fit
 from .measured.trace import read_trace
 from .output.inputs import open_output
 from .plots.plot import plot

@@ -15,10 +15,10 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables
 from kinds import configuration
-from mesoslip import api
 from mesoslip.output import files, filling, targets, writing
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.runner import run_realizations
 from mesoslip.simulation.tables import FirstRows
 
 QUICK = {
@@ -74,7 +74,7 @@ def results(request):
     """Results of a run of each kind."""
     changes = dict(KINDS[request.param])
     changes = {name: value for name, value in changes.items() if value is not None}
-    return api.simulate(mesoslip.Config.from_dict(klein_tables(**changes)))
+    return run_realizations(mesoslip.Config.from_dict(klein_tables(**changes)))
 
 
 def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
@@ -161,7 +161,7 @@ def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
 
 def test_interrupted_realizations_of_different_length(klein, tmp_path):
     """What a realization did not come to is missing; the times are those of the longest."""
-    results = api.simulate(klein(**QUICK | {"run__realizations": 3}))
+    results = run_realizations(klein(**QUICK | {"run__realizations": 3}))
 
     class Cut:
         def __init__(self, one, length):

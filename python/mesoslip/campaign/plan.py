@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +26,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.files import Change, Laid, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.messages import problems
+from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.table import Number, Table, Whole, problem
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
@@ -195,7 +195,7 @@ class Plan:
             raise ConfigError([Problem(source, "sweep", message)])
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Plan:
+    def load(cls, path: PathLike, overrides: Iterable[Change] = ()) -> Plan:
         """Read the file of a sweep and what it is based on, lay changes over it, and check it.
 
         Raises
@@ -259,6 +259,23 @@ class Plan:
     def count(self) -> int:
         """Number of points: realizations of all combinations."""
         return math.prod(self.shape) * self.realizations
+
+
+def as_plan(plan: PathLike | Mapping[str, Any] | Plan) -> Plan:
+    """A sweep from its file or from nested tables.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If the sweep is wrong.
+    """
+    if isinstance(plan, Plan):
+        return plan
+    if isinstance(plan, Mapping):
+        return Plan.from_dict(plan)
+    return Plan.load(as_path(plan))
 
 
 def _axes(sweep: SweepTable, source: str, found: list[Problem]) -> Iterator[Axis]:

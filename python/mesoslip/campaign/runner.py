@@ -34,6 +34,8 @@ from mesoslip.execution.store import Pieces, Store
 if TYPE_CHECKING:
     import xarray as xr
 
+# What ends a sweep that somebody has stopped.
+INTERRUPTED = "interrupted"
 # Longest time to wait at the end for a user's measure that ignores the stop [s].
 MAX_WAIT = 5.0
 
@@ -278,6 +280,6 @@ class _Run:
         """The sweep as it is."""
         missing = self._plan.count - self._done
         if missing and not ending:
-            ending = "interrupted"
+            ending = INTERRUPTED
         dataset = self._assembly.dataset(ending, self._failures)
         return Sweep(dataset, self._failures, self._stored, self._computed, missing, ending)

@@ -49,9 +49,9 @@ def fit(
     Simulations are kept beside the posterior, in NAME.simulations, until the fit is done: the
     same command goes on after it was stopped.
     """
-    from mesoslip import api
     from mesoslip.errors import FileError
     from mesoslip.execution.store import Store
+    from mesoslip.inference.fit_trace import fit as fit_trace
     from mesoslip.inference.plan import Plan
     from mesoslip.inference.posterior import table
     from mesoslip.output import files, targets, writing
@@ -66,7 +66,7 @@ def fit(
     with stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
-                tree = api.fit(
+                tree = fit_trace(
                     trace, plan, store=store, executor=workers, progress=progress, stop=stop
                 )
         except StoppedError:

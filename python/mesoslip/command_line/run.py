@@ -65,10 +65,10 @@ def run(
     A checkpoint beside the output, NAME.checkpoint, is kept every minute, and when the run is
     stopped by Ctrl-C, SIGTERM or SIGHUP; the same command with --resume goes on from it.
     """
-    from mesoslip import api
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
     from mesoslip.simulation.memory import check_memory
+    from mesoslip.simulation.runner import run_realizations
 
     checked = load(config, changes)
     interval = quantity(checkpoint_interval, "--checkpoint-interval", "s", "30 s", negative=False)
@@ -93,7 +93,7 @@ def run(
         stopped_by_signals() as stop,
     ):
         with progress_shown(quiet) as progress:
-            results = api.simulate(
+            results = run_realizations(
                 checked,
                 executor=executor_of(workers, scheduler),
                 progress=progress,

@@ -47,11 +47,12 @@ def sweep(
     Each point is kept in a folder beside the output, NAME.points, as soon as it is done. Called
     again, the command does what is missing. The exit status is 1 if points failed.
     """
-    from mesoslip import api
+    from mesoslip.campaign.plan import Plan
+    from mesoslip.campaign.runner import run_sweep
     from mesoslip.execution.store import Store
     from mesoslip.output import targets
 
-    plan = api.as_plan(file, changes or ())
+    plan = Plan.load(file, changes or ())
     path = output or Path("out") / f"{file.stem}.nc"
     folder = path.with_name(f"{path.stem}.points")
     executor = executor_of(workers, scheduler, pool)
@@ -64,7 +65,7 @@ def sweep(
     with Store(folder, "points") as store, stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
-                done = api.run_plan(
+                done = run_sweep(
                     plan,
                     store=store,
                     executor=executor,

@@ -57,6 +57,36 @@ class Config(Table):
     # Keys that were dropped on the way, as another kind of slider does not have them.
     _dropped: tuple[str, ...] = PrivateAttr(default=())
 
+    def __init__(self, **tables: Any) -> None:
+        """Check a configuration given as its tables; see `from_dict`.
+
+        Raises
+        ------
+        ConfigError
+            If anything in it is wrong.
+        """
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            raise ConfigError(problems(error, "configuration", type(self))) from None
+
+    # Validation does not call it, as it does the initializer of any model without this mark.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """Check a configuration given as its tables, as pydantic does; see `from_dict`.
+
+        Raises
+        ------
+        ConfigError
+            If anything in it is wrong.
+        """
+        try:
+            return super().model_validate(obj, **options)
+        except ValidationError as error:
+            raise ConfigError(problems(error, "configuration", cls)) from None
+
     def __eq__(self, other: object) -> bool:
         """Whether another configuration is of the same run, whatever they were laid over."""
         return isinstance(other, Config) and self.__dict__ == other.__dict__
@@ -72,7 +102,7 @@ class Config(Table):
             return None
         try:
             return self.model_validate(self._base)
-        except ValidationError:
+        except ConfigError:
             return None
 
     @property
@@ -262,7 +292,7 @@ class Config(Table):
     @classmethod
     def _checked(cls, laid: Laid, source: str, base: Mapping[str, Any] | None = None) -> Config:
         try:
-            config = cls.model_validate(laid.tables)
+            config = super().model_validate(laid.tables)
         except ValidationError as error:
             raise ConfigError(problems(error, source, cls)) from None
         config._base, config._dropped = base, tuple(laid.dropped)

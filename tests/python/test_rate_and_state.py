@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mesoslip import RunError
 from mesoslip.analysis import rate_and_state as fitting
-from mesoslip.analysis.spring_slider import LAWS, Loading, RateAndState, spring_slider
+from mesoslip.analysis.rate_and_state import LAWS, Loading, RateAndState, spring_slider
 from response_coverage import NOISE, STAGES, STIFFNESS, TRUTH, departure, synthetic_fit
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw

@@ -1,4 +1,4 @@
-"""Steady forces, velocity steps and holds, read off records whose laws are known."""
+"""Steady forces, velocity steps and holds of records whose laws are known."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import xarray as xr
 from conftest import ROOT, klein_tables
 from matplotlib.figure import Figure
 from mesoslip import Config, FileError
-from mesoslip.analysis.response import line, rows_of, scalars_of
-from mesoslip.analysis.spring_slider import Loading, RateAndState, spring_slider
+from mesoslip.analysis.rate_and_state import Loading, RateAndState, spring_slider
+from mesoslip.analysis.response import line, rows_of, scalars_of, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
 from response_coverage import autoregression, steady_coverage
 
@@ -47,8 +47,8 @@ def record(law, stages, stiffness, *, noise=0.0, realizations=1, sign=1.0, exact
     force = clean + noise * generator.standard_normal((realizations, times.size))
     moved = np.tile(motion.displacement, (realizations, 1))
     starts = np.append(0, ends[:-1])
-    way = np.append(0, np.cumsum([one.duration * one.start_velocity for one in stages]))
-    load = np.interp(times, np.append(0, ends), way)
+    path = np.append(0, np.cumsum([one.duration * one.start_velocity for one in stages]))
+    load = np.interp(times, np.append(0, ends), path)
     root = xr.Dataset(
         {
             "spring_force": (("realization", "time"), sign * force),
@@ -131,14 +131,14 @@ def test_a_transient_is_left_out():
     assert (flat.mean, flat.error, flat.is_steady) == (pytest.approx(0.1), 0.0, True)
 
 
-def test_too_short_a_record_is_told():
+def test_a_short_record_is_not_resolved():
     found = [steady_mean(autoregression(1, 200, 0.98, seed)) for seed in range(20)]
     assert sum(one.is_resolved for one in found) <= 2
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("exact", [True, False])
-def test_a_step_of_the_slip_law_is_read_off_exactly(sign, exact):
+def test_a_step_of_the_slip_law_is_measured_exactly(sign, exact):
     """Where the slider follows the drive, that law decays exponentially with D_c."""
     tree = mesoslip.response(record(LAW, STEP, math.inf, sign=sign, exact=exact), fit=False)
     up, down = rows_of(tree, "steps")
@@ -149,15 +149,17 @@ def test_a_step_of_the_slip_law_is_read_off_exactly(sign, exact):
         direct = (LAW.a - LAW.b * (1 - late)) * logarithm * factor
         assert row["net_change"] == pytest.approx(-0.01 * FORCE * logarithm * factor, rel=1e-3)
         assert row["direct_change"] == pytest.approx(direct, rel=2e-3, abs=1e-4 * FORCE)
-        assert row["evolving_change"] == pytest.approx(-LAW.b * late * logarithm * factor, rel=2e-3)
+        assert row["evolution_change"] == pytest.approx(
+            -LAW.b * late * logarithm * factor, rel=2e-3
+        )
         assert row["relaxation_displacement"] == pytest.approx(LAW.slip_distance, rel=5e-3)
         assert row["integral_displacement"] == pytest.approx(LAW.slip_distance, rel=5e-2)
         assert math.isnan(row["overshoot"])
-        assert row["net_rate_ratio"] == pytest.approx(-0.01, rel=1e-3)
+        assert row["rate_dependence_ratio"] == pytest.approx(-0.01, rel=1e-3)
     assert up["velocity_before"] == sign * 1e-7
 
 
-def test_a_step_on_a_spring_with_noise_is_read_off_within_its_errors():
+def test_a_step_on_a_spring_with_noise_is_measured_within_its_errors():
     law, stiffness = RateAndState(**{**LAW.__dict__, "law": "ageing", "a": 0.02 * FORCE}), 3000.0
     tree = mesoslip.response(
         record(law, STEP, stiffness, noise=2e-3 * FORCE, realizations=5), fit=False
@@ -176,7 +178,7 @@ def test_a_step_on_a_spring_with_noise_is_read_off_within_its_errors():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_holds_are_tabled(sign):
+def test_holds_have_drops_peaks_and_healing(sign):
     law, stiffness = RateAndState(**{**LAW.__dict__, "law": "ageing"}), 4000.0
     tree = record(law, HOLDS, stiffness, sign=sign)
     found = mesoslip.response(tree, fit=False)
@@ -223,7 +225,7 @@ def test_the_exact_peak_is_taken_if_it_belongs_to_the_restart():
     assert row["peak_is_exact"] == 0
 
 
-def test_the_law_of_a_record_is_found_and_judged():
+def test_the_law_of_a_record_is_found():
     law = RateAndState(**{**LAW.__dict__, "law": "ageing"})
     tree = record(law, STEP[:2] + HOLDS[:3], 4000.0, noise=1e-3 * FORCE)
     ageing, slip = rows_of(mesoslip.response(tree), "rate_and_state")
@@ -266,7 +268,7 @@ def test_lines_have_errors():
 
 @pytest.fixture(scope="module")
 def sliding():
-    """Contacts that attach at once under a block that goes where the drive goes, 4 realizations."""
+    """Contacts without delay under a prescribed slider, 4 realizations."""
     config = klein_tables(
         slider={"kind": "prescribed"},
         contacts__coupling="equal",
@@ -285,8 +287,8 @@ def test_steady_forces_of_a_run_are_those_of_theory(sliding):
     """F/F_s = (1 + δ²)/2 at any velocity, without delay and back force."""
     found = mesoslip.response(sliding)
     for row in rows_of(found, "steady"):
-        assert abs(row["steady_force_ratio"] - 0.5 * 1.09) < 4 * row["steady_force_error_ratio"]
-        assert row["steady_force_error_ratio"] < 5e-3
+        assert abs(row["steady_force_ratio"] - 0.5 * 1.09) < 4 * row["steady_force_ratio_error"]
+        assert row["steady_force_ratio_error"] < 5e-3
         assert row["is_steady"]
     line = scalars_of(found, "steady")
     assert abs(line["rate_dependence"]) < 4 * line["rate_dependence_error"]
@@ -297,7 +299,29 @@ def test_steady_forces_of_a_run_are_those_of_theory(sliding):
     )
 
 
-def test_stick_slip_is_told_and_not_fitted():
+def test_tables_have_one_unit_a_column_and_the_digits_of_errors(sliding):
+    steady, steps, _ = tables(mesoslip.response(sliding))
+    assert steady.head[1] == "velocity (nm/s)"
+    assert [row[1] for row in steady.rows] == ["100.0", "500.0"]
+    assert steps.head[1:3] == ("from (nm/s)", "to (nm/s)")
+    for row in steady.rows:
+        value, error = row[2].split(" ± ")
+        assert len(value.partition(".")[2]) == len(error.partition(".")[2])
+        assert len(error.removeprefix("0.").lstrip("0")) == 2
+    assert steady.line.startswith("rate dependence a - b")
+    assert "± " in steady.line
+    # Outputs of different static forces have theirs in newtons.
+    other = mesoslip.run(
+        Config.from_toml(sliding.attrs["configuration"]).replace(
+            {"contacts.static_force": 9e-6, "run.realizations": 1}
+        )
+    )
+    steady = tables(mesoslip.response([sliding, other], fit=False))[0]
+    assert steady.head[3] == "steady force (µN)"
+    assert steady.line.endswith("µN") or "µN (" in steady.line or "nN (" in steady.line
+
+
+def test_stick_slip_is_stated_and_not_fitted():
     tree = mesoslip.run(
         klein_tables(
             contacts__count=200,
@@ -314,7 +338,7 @@ def test_stick_slip_is_told_and_not_fitted():
     found = mesoslip.response(tree)
     assert all(row["slip_share"] > 0.5 for row in rows_of(found, "steady"))
     (hold,) = rows_of(found, "holds")
-    assert "sticks and slips" in hold["note"]
+    assert "stick-slip" in hold["note"]
     assert math.isnan(hold["healing"])
     # The peak is that from which the first slip after the hold starts.
     slips = mesoslip.slips(tree)
@@ -360,17 +384,17 @@ def test_the_command(tmp_path, command):
     assert command("plot", path, "--view", "response", "-o", tmp_path / "a.png")[0] == 0
 
 
-def test_mistakes_are_told(tmp_path, command):
+def test_mistakes_are_errors(tmp_path, command):
     missing = tmp_path / "none.nc"
-    status, _, told = command("response", missing)
-    assert (status, told.count("\n")) == (2, 1)
+    status, _, message = command("response", missing)
+    assert (status, message.count("\n")) == (2, 1)
     old = ROOT / "tests" / "reference" / "old.nc"
     for force in ("0 N", "-1 N", "3 m", "nan", "much"):
-        status, _, told = command("response", old, "--normal-force", force)
+        status, _, message = command("response", old, "--normal-force", force)
         assert status == 2
-        assert "--normal-force" in told
-        assert "Traceback" not in told
-    status, _, told = command("response", old, "--csv", old)
+        assert "--normal-force" in message
+        assert "Traceback" not in message
+    status, _, message = command("response", old, "--csv", old)
     assert status == 2
     pulled = mesoslip.run(
         klein_tables(
@@ -388,7 +412,7 @@ def test_an_output_with_one_velocity_has_a_steady_force_and_no_more():
     """Also one of an earlier version, without stages."""
     found = mesoslip.response(ROOT / "tests" / "reference" / "old.nc")
     assert found["steps"].sizes["step"] == found["holds"].sizes["hold"] == 0
-    assert "nothing tells a, b and D_c" in rows_of(found, "rate_and_state")[0]["note"]
+    assert "no data for a, b and D_c" in rows_of(found, "rate_and_state")[0]["note"]
 
 
 def test_pictures(sliding):

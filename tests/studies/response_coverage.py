@@ -11,8 +11,15 @@ import sys
 
 import mesoslip
 import numpy as np
-from mesoslip.analysis.rate_and_state import Fit, Noise, fit, make_record
-from mesoslip.analysis.spring_slider import Loading, RateAndState, spring_slider
+from mesoslip.analysis.rate_and_state import (
+    Fit,
+    Loading,
+    Noise,
+    RateAndState,
+    fit,
+    make_record,
+    spring_slider,
+)
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from numpy.typing import NDArray
 from scipy.signal import lfilter

@@ -19,14 +19,14 @@ from mesoslip.output.access import group_of
 
 Array = NDArray[np.float64]
 
-# Slider displacement after a change of the drive within which a peak belongs to it, in mean
-# breaking stretches: that within which all contacts have broken once or twice.
+# Displacement of the slider after a change of the drive within which a peak is attributed to the
+# change, in mean breaking stretches: all contacts break once or twice in it.
 PEAK_STRETCHES = 3.0
-# Part of the slider's motion that happens in slips, from which on it sticks and slips.
+# Minimum share of the slider's displacement in slips for a stage of stick-slip.
 STICK_SLIP_SHARE = 0.1
-# Times of samples and of stages are sums of numbers, and agree to rounding.
-SAME_TIME = 1e-9
-# What a stage knows of its extremes: the value, and when and where it was.
+# Relative tolerance of times: those of samples and stages are sums, equal up to rounding.
+TIME_TOLERANCE = 1e-9
+# Recorded properties of an extreme of the force: its value, time and displacement.
 EXTREME = ("force", "force_time", "force_displacement")
 
 
@@ -43,9 +43,9 @@ class Stage:
     start_velocity, end_velocity
         Velocities of the drive [m/s].
     is_uniform
-        Whether the velocity is constant or changes linearly; that of a measured history does not.
+        Whether the velocity is constant or changes linearly, as in no measured history.
     exact
-        What the output's group ``stages`` tells of it, from the motion itself, each of shape
+        Values from the motion itself, recorded in the output's group ``stages``, each of shape
         (realizations,); empty if the output has no such group.
     """
 
@@ -64,12 +64,12 @@ class Stage:
 
     @property
     def is_hold(self) -> bool:
-        """Whether the drive stands."""
+        """Whether the drive is at rest."""
         return self.is_uniform and self.start_velocity == 0 and self.end_velocity == 0
 
     @property
     def is_steady(self) -> bool:
-        """Whether the drive moves at one velocity."""
+        """Whether the drive moves at constant velocity."""
         return self.is_uniform and self.start_velocity == self.end_velocity != 0
 
     @property
@@ -85,8 +85,15 @@ class Stage:
 
 @dataclass(frozen=True)
 class Peak:
-    """An extreme of the force, each of shape (realizations,): force [N], time [s], displacement
-    [m]."""
+    """An extreme of the force in each realization, shape (realizations,).
+
+    Attributes
+    ----------
+    force, time, displacement
+        Force [N], time [s] and displacement of the slider [m].
+    is_exact
+        Whether it is that of the motion itself, not of the samples.
+    """
 
     force: Array
     time: Array
@@ -94,33 +101,33 @@ class Peak:
     is_exact: bool
 
 
-def _are_one(parts: Sequence[DrivePart]) -> bool:
-    """Whether parts of a stage go on at one velocity, or are one."""
+def _is_uniform(parts: Sequence[DrivePart]) -> bool:
+    """Whether the parts of a stage have one constant velocity, or there is one part only."""
     return len(parts) < 2 or len({one[1:3] for one in parts} | {parts[0][1:2] * 2}) == 1
 
 
 class Experiment:
-    """An output of a run, read as an experimenter reads a record.
+    """An output of a run, analysed like the record of an experiment.
 
     Attributes
     ----------
     config
         Configuration of the run.
     name
-        What to call it in messages and pictures.
+        Name in messages and pictures.
     time
-        Times of the samples that all realizations have [s], shape (samples,).
+        Times of the samples available in all realizations [s], shape (samples,).
     force, displacement
         Force of the spring [N], and displacement of the slider [m], shape (realizations, samples).
     drive
         Displacement of the load point [m], shape (samples,).
     stages
-        Stages of the drive that all realizations came to.
+        Stages of the drive reached by all realizations.
 
     Raises
     ------
     FileError
-        If the output is of no run, or driven by a force.
+        If it is not the output of a run, or the drive is a force.
     """
 
     def __init__(self, tree: xr.DataTree, name: str = "the output") -> None:
@@ -130,8 +137,8 @@ class Experiment:
             self.config = Config.from_toml(tree.attrs["configuration"])
         except ConfigError:
             raise FileError(
-                f"{name}: has no configuration of a run, so the velocities of its drive, its holds "
-                "and its spring are not known"
+                f"{name}: has no configuration of a run; the velocities and holds of the drive and "
+                "the stiffness of the spring are unknown"
             ) from None
         if self.config.drive.force_rate is not None:
             raise FileError(
@@ -145,7 +152,7 @@ class Experiment:
         whole = np.isfinite(force).all(axis=0)
         count = int(np.argmin(whole)) if not whole.all() else whole.size
         if count == 0:
-            raise FileError(f"{name}: has no sample that all realizations have")
+            raise FileError(f"{name}: has no sample common to all realizations")
         self.time: Array = root["time"].values[:count]
         self.force: Array = force[:, :count]
         self.displacement: Array = root["displacement"].values[:, :count]
@@ -164,7 +171,7 @@ class Experiment:
 
     @property
     def peak_window(self) -> float:
-        """Slider displacement after a change of the drive within which its peak is looked for
+        """Displacement of the slider after a change of the drive in which its peak is searched
         [m]."""
         return PEAK_STRETCHES * self.config.contacts.break_stretch
 
@@ -178,24 +185,24 @@ class Experiment:
         return tuple(one for one in found if one.start < last and one.duration > 0)
 
     def _configured_stages(self, last: float) -> list[Stage]:
-        """Stages as they were asked for, without what is known of them exactly."""
+        """Stages of the configuration, without exact values."""
         found, start = [], 0.0
         for number, parts in self._parts().items():
             end = start + math.fsum(one.duration for one in parts)
             speeds = (parts[0].start_velocity, parts[-1].end_velocity)
-            found.append(Stage(number, start, min(end, last), *speeds, _are_one(parts), {}))
+            found.append(Stage(number, start, min(end, last), *speeds, _is_uniform(parts), {}))
             start = end
         return found
 
     def _parts(self) -> dict[int, list[DrivePart]]:
-        """Parts of the drive by the number of their stage."""
+        """Parts of the drive by stage number."""
         parts: dict[int, list[DrivePart]] = {}
         for one in self.config.drive_parts:
             parts.setdefault(one.stage, []).append(one)
         return parts
 
     def _recorded_stages(self) -> list[Stage]:
-        """Stages as they were run, of those that all realizations came to."""
+        """Recorded stages, of those reached by all realizations."""
         data = group_of(self.tree, "stages")
         rows = {name: data[name].values for name in map(str, data.data_vars)}
         owner, numbers = rows["realization_index"], rows["stage_number"]
@@ -207,36 +214,35 @@ class Experiment:
             mine = mine[np.argsort(owner[mine], kind="stable")]
             if not np.array_equal(owner[mine], np.arange(realizations)):
                 continue
-            # Without slips that end a run they are the same in all realizations.
+            # The same in all realizations, unless slips end the run.
             start = float(rows["stage_start_time"][mine].max())
             end = float(rows["stage_end_time"][mine].min())
             first, last = (
                 float(rows[f"drive_{which}_velocity"][mine[0]]) for which in ("start", "end")
             )
             exact = {name: values[mine] for name, values in rows.items()}
-            is_uniform = _are_one(parts.get(int(number), []))
+            is_uniform = _is_uniform(parts.get(int(number), []))
             found.append(Stage(int(number), start, end, first, last, is_uniform, exact))
         return found
 
     def samples(self, stage: Stage) -> slice:
-        """Samples of a stage: after its start, up to its end."""
-        slack = SAME_TIME * max(abs(stage.end), 1e-300)
+        """Samples of a stage: after its start, up to its end, the start included in the first."""
+        slack = TIME_TOLERANCE * max(abs(stage.end), 1e-300)
         first = int(np.searchsorted(self.time, stage.start + slack, "right"))
         if stage.number == 0:
             first = int(np.searchsorted(self.time, stage.start - slack, "left"))
         return slice(first, int(np.searchsorted(self.time, stage.end + slack, "right")))
 
-    def at_start(self, stage: Stage) -> int:
-        """The sample at or before the start of a stage."""
-        slack = SAME_TIME * max(abs(stage.end), 1e-300)
+    def start_sample(self, stage: Stage) -> int:
+        """The last sample up to the start of a stage."""
+        slack = TIME_TOLERANCE * max(abs(stage.end), 1e-300)
         return max(0, int(np.searchsorted(self.time, stage.start + slack, "right")) - 1)
 
     @cached_property
     def steady_means(self) -> dict[int, SteadyMean | None]:
-        """Steady means of the spring force in the direction of the drive, by the number of the
-        stage.
+        """Steady means of the spring force along the drive, by stage number.
 
-        Of stages at one velocity; None where there are too few samples.
+        Stages at constant velocity only; None for too few samples.
         """
         return {
             one.number: steady_mean(one.direction * self.force[:, self.samples(one)])
@@ -245,14 +251,13 @@ class Experiment:
         }
 
     def mean_of(self, stage: Stage) -> SteadyMean | None:
-        """The steady mean of a stage; None if it has none."""
+        """The steady mean of a stage; None if there is none."""
         return self.steady_means.get(stage.number)
 
     def slip_share(self, stage: Stage) -> float:
-        """Part of the slider's motion in the steady part of a stage that happens in slips.
+        """Share of the slider's displacement in the steady part of a stage that happens in slips.
 
-        In perfect stick-slip the spring force falls in slips by what the drive loads it between
-        them, K v t.
+        The sum of the force drops over the loading by the drive, K v t; 1 for perfect stick-slip.
         """
         stiffness = self.stiffness
         if not stage.is_steady or math.isinf(stiffness) or "slips" not in self.tree.children:
@@ -269,43 +274,49 @@ class Experiment:
         loaded = stiffness * abs(stage.velocity) * (stage.end - start) * self.force.shape[0]
         return drops / loaded if loaded > 0 else 0.0
 
-    def sticks_and_slips(self, stage: Stage) -> bool:
-        """Whether a stage is one of stick-slip."""
+    def is_stick_slip(self, stage: Stage) -> bool:
+        """Whether the motion in a stage is stick-slip."""
         return self.slip_share(stage) > STICK_SLIP_SHARE
 
     def force_at(self, stage: Stage, which: str) -> Array:
         """Spring force at the start or end of a stage [N], shape (realizations,)."""
         if f"{which}_force" in stage.exact:
             return stage.exact[f"{which}_force"]
-        place = self.at_start(stage) if which == "start" else self.samples(stage).stop - 1
-        return self.force[:, place]
+        sample = self.start_sample(stage) if which == "start" else self.samples(stage).stop - 1
+        return self.force[:, sample]
 
     def displacement_at_start(self, stage: Stage) -> Array:
         """Displacement of the slider at the start of a stage [m], shape (realizations,)."""
         if "start_displacement" in stage.exact:
             return stage.exact["start_displacement"]
-        return self.displacement[:, self.at_start(stage)]
+        return self.displacement[:, self.start_sample(stage)]
 
     def peak(self, stage: Stage, upward: bool = True) -> Peak | None:
-        """The greatest force (or the least one) along the direction of a stage, soon after its
-        start.
+        """The maximum force along the drive soon after the start of a stage, or the minimum.
 
-        Where the stage sticks and slips: that from which the first slip starts. Elsewhere: of the
-        time in which the slider moves by three mean breaking stretches; from the motion if the
-        output has it, else from the samples.
+        In stick-slip: the force at the start of the first slip. Otherwise the extreme while the
+        slider moves by three mean breaking stretches: the recorded one, or else that of the
+        samples.
+
+        Parameters
+        ----------
+        stage
+            The stage.
+        upward
+            Whether to return the maximum.
 
         Returns
         -------
         Peak or None
-            With the sign of the direction: greater is more against the drive. None without samples.
+            Forces are positive against the motion of the drive. None without samples.
         """
         sign = stage.direction
-        if upward and self.sticks_and_slips(stage):
+        if upward and self.is_stick_slip(stage):
             found = self._before_first_slip(stage)
             if found is not None:
                 return found
         start = self.displacement_at_start(stage)
-        # Against the axis, the greatest force against the drive is the least one.
+        # The recorded extremes count along the axis, whatever the direction of the drive.
         which = "greatest" if (sign > 0) == upward else "least"
         if all(f"{which}_{name}" in stage.exact for name in EXTREME):
             force, time, displacement = (stage.exact[f"{which}_{name}"] for name in EXTREME)
@@ -317,12 +328,14 @@ class Experiment:
             return None
         is_near = np.abs(displacement - start[:, None]) <= self.peak_window
         side = 1.0 if upward else -1.0
-        place = np.argmax(np.where(is_near, side * force, -np.inf), axis=1)
+        extreme = np.argmax(np.where(is_near, side * force, -np.inf), axis=1)
         rows = np.arange(force.shape[0])
-        return Peak(force[rows, place], self.time[inside][place], displacement[rows, place], False)
+        return Peak(
+            force[rows, extreme], self.time[inside][extreme], displacement[rows, extreme], False
+        )
 
     def _before_first_slip(self, stage: Stage) -> Peak | None:
-        """Where the first slips of a stage start; None if a realization has none."""
+        """The starts of the first slips of a stage; None if a realization has no slip."""
         slips = group_of(self.tree, "slips")
         times, owner = slips["start_time"].values, slips["realization_index"].values
         force, time, displacement = [], [], []

@@ -1,6 +1,6 @@
-"""Means of correlated series, with honest errors, after a transient.
+"""Means of correlated series after a transient, with standard errors.
 
-How well the errors cover was measured: see ``docs/response.md``, and
+The coverage of the errors was measured: see ``docs/response.md``, and
 ``tests/studies/response_coverage.py``.
 """
 
@@ -14,49 +14,48 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Samples of a batch of the marginal standard error rule.
+# Samples of a batch in the marginal standard error rule.
 BATCH = 5
-# Part of a series up to which the end of a transient is looked for.
-MOST_TRANSIENT = 0.5
-# What is left out, over the length of the transient by that rule, and part of a series at most.
+# Maximum length of a transient, over that of the series.
+MAX_TRANSIENT = 0.5
+# Discarded samples over the length of the transient by the rule, and their maximum share.
 MARGIN = 2
-MOST_LEFT_OUT = 0.6
-# Samples that a mean needs, and blocks that its error needs.
-LEAST_SAMPLES = 20
-LEAST_BLOCKS = 6
-# Standard errors by which the halves of what is left may differ before it is said to drift.
-MOST_DRIFT = 3.0
-# Part of the mean that a drift is of at least, as that of a record without noise never ends.
-LEAST_DRIFT = 1e-4
-# Part of the mean that rounding may be of.
+MAX_DISCARDED = 0.6
+# Minimum number of samples of a mean, and of blocks of its error.
+MIN_SAMPLES = 20
+MIN_BLOCKS = 6
+# Maximum difference of the halves of a steady series, in standard errors of the mean.
+MAX_DRIFT = 3.0
+# Minimum drift over the mean: a record without noise relaxes forever.
+MIN_DRIFT = 1e-4
+# Deviations over the mean that are rounding errors.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class SteadyMean:
-    """Mean of what is steady in a series.
+    """Mean of the steady part of a series.
 
     Attributes
     ----------
     mean, error
-        Mean, and its standard error; NaN if there are too few samples for it.
+        Mean, and its standard error; NaN if there are too few samples.
     half_width
-        Half the width of its 95 % interval, by Student's distribution for the blocks that there
-        are.
+        Half the width of the 95 % interval, by Student's distribution for the number of blocks.
     standard_deviation
-        That of the values about their mean.
+        Standard deviation of the values about the mean.
     start
-        Samples that were left out before: twice the transient.
+        Number of samples discarded at the start: twice the transient.
     count
-        Samples of the steady part, all realizations together.
+        Number of samples in the steady part, over all realizations.
     block
-        Samples of the blocks whose means the error is of.
+        Block length in samples, for the standard error.
     effective_count
-        Independent samples that would have this error.
+        Number of independent samples with the same error.
     is_steady
-        Whether the transient is over, and the halves of what is left agree.
+        Whether the transient is over, and the halves of the rest agree.
     is_resolved
-        Whether the series is long enough for the error to be right: some 20 independent samples.
+        Whether the series is long enough for a reliable error: some 20 independent samples.
     """
 
     mean: float
@@ -72,49 +71,49 @@ class SteadyMean:
 
     @property
     def correlation(self) -> float:
-        """Samples to an independent one, at least 1."""
+        """Samples per independent sample, at least 1."""
         return max(1.0, self.count / self.effective_count) if self.effective_count > 0 else 1.0
 
 
 def transient(series: Array) -> int:
-    """Samples of a transient at the start of a series, by the marginal standard error rule MSER-5.
+    """Length in samples of the initial transient of a series, by the marginal standard error rule.
 
-    That many are left out that (variance of the rest)/(number of the rest) of the means of five
-    samples each is least (White, Simulation 69, 323 (1997)); at most half of the series.
+    MSER-5 (White, Simulation 69, 323 (1997)): of the means of five samples each, so many are
+    discarded that (variance of the rest)/(number of the rest) is minimal; at most half of the
+    series.
     """
     batch = BATCH if series.size >= 4 * BATCH * BATCH else 1
     count = series.size // batch
     if count < 4:
         return 0
-    # What does not fill a batch is left out at the start.
-    left = series.size - count * batch
-    means = series[left:].reshape(count, batch).mean(axis=1)
-    # About the last value, or the squares of a large mean would drown the variance.
+    # An incomplete batch is discarded at the start.
+    remainder = series.size - count * batch
+    means = series[remainder:].reshape(count, batch).mean(axis=1)
+    # Relative to the last value: squares of a large mean would hide the variance in rounding.
     means = means - means[-1]
     rest = np.arange(count, 0, -1)
     total = np.cumsum(means[::-1])[::-1]
     squares = np.cumsum(means[::-1] ** 2)[::-1]
     spread = np.maximum(squares - total**2 / rest, 0.0) / rest**2.0
-    most = int(count * MOST_TRANSIENT)
-    start = int(np.argmin(spread[: most + 1]))
-    return left + start * batch if start else 0
+    max_start = int(count * MAX_TRANSIENT)
+    start = int(np.argmin(spread[: max_start + 1]))
+    return remainder + start * batch if start else 0
 
 
 def steady_mean(values: Array) -> SteadyMean | None:
     """Mean of the steady part of a series, with its error.
 
-    The error is that of the means of blocks. Of the blocks of 1, 2, 4, ... samples those are taken
-    whose error lies on the flat part of the curve: the shortest ones with B³ > 2 n (e_B/e_1)⁴, at
-    which what is left of the correlation between blocks is less than the noise of the error itself
-    (Lee et al., Phys. Rev. E 83, 066706 (2011)). As what is left makes it too small, the estimate
-    for blocks three times shorter is used to take away its first order in 1/B: e² = 2 e_B² -
-    e²_(B/3) (Vats and Flegal, Biometrika 109, 735 (2022)), if that is more.
+    The error is that of block means. The block length is the smallest of 1, 2, 4, ... samples on
+    the plateau of the error, B³ > 2 n (e_B/e_1)⁴, where the remaining correlation between blocks is
+    smaller than the statistical error of e_B (Lee et al., Phys. Rev. E 83, 066706 (2011)). That
+    correlation makes e_B too small; blocks of a third of the length correct it to first order in
+    1/B: e² = 2 e_B² - e²_(B/3) (Vats and Flegal, Biometrika 109, 735 (2022)), if that is larger.
 
     Parameters
     ----------
     values
         Shape (realizations, samples) with the same times; realizations are independent. The
-        transient is looked for in their mean.
+        transient is that of their mean.
 
     Returns
     -------
@@ -124,27 +123,28 @@ def steady_mean(values: Array) -> SteadyMean | None:
     from scipy.special import stdtrit
 
     realizations, samples = values.shape
-    if samples < LEAST_SAMPLES:
+    if samples < MIN_SAMPLES:
         return None
     length = transient(values.mean(axis=0))
-    # What the rule leaves of a transient is as large as the error; twice as far on, its square.
-    start = min(MARGIN * length, int(MOST_LEFT_OUT * samples))
+    # The rest of the transient after the rule is as large as the error; after twice the length it
+    # is negligible.
+    start = min(MARGIN * length, int(MAX_DISCARDED * samples))
     steady = values[:, start:]
     count = steady.size
     mean = float(steady.mean())
     deviation = float(steady.std(ddof=1))
-    is_quiet = deviation <= LEAST_DRIFT * abs(mean)
-    is_over = is_quiet or length < 0.95 * MOST_TRANSIENT * samples
+    is_quiet = deviation <= MIN_DRIFT * abs(mean)
+    is_over = is_quiet or length < 0.95 * MAX_TRANSIENT * samples
     if deviation <= ROUNDING * abs(mean):
         exact = (mean, 0.0, 0.0, deviation, start, count, 1, float(count))
         return SteadyMean(*exact, is_steady=is_over, is_resolved=True)
-    block, error, is_flat = _block_error(steady)
+    block, error, on_plateau = _block_error(steady)
     blocks = realizations * (steady.shape[1] // block)
     half_width = float(stdtrit(blocks - 1, 0.975)) * error
     middle = steady.shape[1] // 2
     drift = float(steady[:, :middle].mean() - steady[:, middle:].mean())
-    # Each half has twice the variance of the whole, and they are as good as independent.
-    drifts = not is_quiet and abs(drift) > MOST_DRIFT * 2 * error
+    # Each half has twice the variance of the whole, and the two are almost independent.
+    is_drifting = not is_quiet and abs(drift) > MAX_DRIFT * 2 * error
     return SteadyMean(
         mean,
         error,
@@ -154,36 +154,33 @@ def steady_mean(values: Array) -> SteadyMean | None:
         count,
         block,
         float(deviation**2 / error**2) if error > 0 else math.nan,
-        is_steady=is_over and not drifts,
-        is_resolved=is_flat,
+        is_steady=is_over and not is_drifting,
+        is_resolved=on_plateau,
     )
 
 
 def _block_error(steady: Array) -> tuple[int, float, bool]:
-    """Samples of a block, the standard error by such blocks, and whether the curve is flat there.
-
-    NaN if there are too few blocks.
-    """
+    """Block length, standard error, and whether that is on the plateau; NaN for too few blocks."""
     realizations, samples = steady.shape
     first = _error_of_blocks(steady, 1)
     block = 1
     while True:
         error = _error_of_blocks(steady, block)
-        is_flat = block**3 > 2 * samples * realizations * (error / first) ** 4
-        if is_flat or realizations * (samples // (2 * block)) < LEAST_BLOCKS:
+        on_plateau = block**3 > 2 * samples * realizations * (error / first) ** 4
+        if on_plateau or realizations * (samples // (2 * block)) < MIN_BLOCKS:
             break
         block *= 2
-    if realizations * (samples // block) < LEAST_BLOCKS:
+    if realizations * (samples // block) < MIN_BLOCKS:
         return block, math.nan, False
     if block >= 3:
         shorter = _error_of_blocks(steady, block // 3)
         error = math.sqrt(max(2 * error**2 - shorter**2, error**2))
-    return block, error, is_flat
+    return block, error, on_plateau
 
 
 def _error_of_blocks(steady: Array, block: int) -> float:
-    """Standard error of the mean if the means of blocks are independent."""
+    """Standard error of the mean for independent block means."""
     count = steady.shape[1] // block
-    # What does not fill a block is left out at the start, where a transient may be left.
+    # An incomplete block is discarded at the start, next to the transient.
     means = steady[:, steady.shape[1] - count * block :].reshape(-1, block).mean(axis=1)
     return float(means.std(ddof=1) / math.sqrt(means.size))

@@ -10,7 +10,7 @@ import typer
 from mesoslip.command_line.options import JsonOption, print_json, quantity_or_none
 
 if TYPE_CHECKING:
-    from mesoslip.analysis.response_tables import ResponseTable
+    from mesoslip.analysis.response import ResponseTable
 
 
 def response(
@@ -25,19 +25,18 @@ def response(
     normal_force: Annotated[
         str | None,
         typer.Option(
-            help="Tell friction coefficients, forces over this one, such as '10 mN'",
+            help="Normal force for friction coefficients, such as '10 mN'",
             metavar="FORCE",
         ),
     ] = None,
     fit: Annotated[bool, typer.Option(help="Fit rate-and-state parameters")] = True,
     free_stiffness: Annotated[
-        bool, typer.Option("--free-stiffness", help="Fit the stiffness of the spring as well")
+        bool, typer.Option("--free-stiffness", help="Fit the stiffness of the spring too")
     ] = False,
 ) -> None:
-    """Show steady forces, velocity steps, holds, and rate-and-state parameters."""
+    """Print steady forces, velocity steps, holds, and rate-and-state parameters."""
     from mesoslip.analysis import response as responses
-    from mesoslip.analysis import response_tables
-    from mesoslip.analysis.response import rows_of, scalars_of, write_csv
+    from mesoslip.analysis.response import force_scale, rows_of, scalars_of, tables, write_csv
     from mesoslip.output import targets
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
@@ -52,13 +51,13 @@ def response(
         names = {one: tree.attrs[one] for one in ("outputs", "normal_force") if one in tree.attrs}
         print_json(names | groups | scalars)
         return
-    typer.echo(response_tables.unit_of_forces(tree))
-    for one in response_tables.tables(tree):
+    typer.echo(force_scale(tree))
+    for one in tables(tree):
         _print(one)
 
 
 def _print(table: ResponseTable) -> None:
-    """Print rows under the names of their columns, with their notes below."""
+    """Print a table; the note on a row stands below it."""
     typer.echo(f"\n{table.title}")
     widths = [max(map(len, column)) for column in zip(table.head, *table.rows, strict=True)]
     for row, note in zip((table.head, *table.rows), ("", *table.notes), strict=True):

@@ -10,9 +10,15 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
-from mesoslip.analysis.rate_and_state import SMALL_MISFIT, Fit, Record, fit, record_of
+from mesoslip.analysis.rate_and_state import (
+    LAWS,
+    MAX_MISFIT,
+    Fit,
+    Record,
+    fit,
+    record_of,
+)
 from mesoslip.analysis.response import healing_line, response_of, steady_line
-from mesoslip.analysis.spring_slider import LAWS
 from mesoslip.errors import RunError
 from mesoslip.plots.style import Canvas, canvas, styled
 from mesoslip.quantities import percent
@@ -45,7 +51,7 @@ def _draw_record(axes: Axes, experiment: Experiment) -> None:
     axes.set_xlabel("displacement of the load point (µm)")
     axes.set_ylabel("force / $F_s$")
     for stage in experiment.stages[1 : MOST_MARKS + 1]:
-        at = sign * experiment.drive[experiment.at_start(stage)] * 1e6
+        at = sign * experiment.drive[experiment.start_sample(stage)] * 1e6
         axes.axvline(at, color="tab:blue" if stage.is_hold else "0.8", linewidth=0.5, zorder=0)
     _label_stages(axes, experiment, sign)
 
@@ -71,7 +77,9 @@ def _label_stages(axes: Axes, experiment: Experiment, sign: float) -> None:
         inside = experiment.samples(stage)
         if stage.is_hold or stage.is_steady:
             place = (
-                experiment.at_start(stage) if stage.is_hold else (inside.start + inside.stop) // 2
+                experiment.start_sample(stage)
+                if stage.is_hold
+                else (inside.start + inside.stop) // 2
             )
             place = min(place, experiment.time.size - 1)
             # Those of short stages would lie over each other.
@@ -105,7 +113,7 @@ def _draw_law(axes: Axes, experiment: Experiment, record: Record, found: Fit) ->
     label += f"$D_c$ = {found.law.slip_distance * 1e9:.3g} nm"
     # As the table says of a law that does not describe the record.
     missed = found.relative_misfit(record)
-    label += f" (misses {percent(missed)})" if missed > SMALL_MISFIT else ""
+    label += f" (misses {percent(missed)})" if missed > MAX_MISFIT else ""
     axes.plot(drive * 1e6, force, color="tab:red", label=label)
     axes.legend(loc="lower right")
 

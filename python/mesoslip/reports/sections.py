@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mesoslip.analysis import avalanches as avalanche_catalogue
-from mesoslip.analysis import regime, response_tables
+from mesoslip.analysis import regime
 from mesoslip.analysis import response as responses
 from mesoslip.analysis import slips as slip_catalogue
 from mesoslip.analysis.experiment import Experiment
@@ -383,8 +383,8 @@ def response(subjects: Sequence[Subject]) -> Section | None:
     blocks: list[Block] = []
     for subject, experiment in there:
         tree = responses.response_of([experiment])
-        blocks.append(Text(_named(subjects, subject, response_tables.unit_of_forces(tree))))
-        for one in response_tables.tables(tree):
+        blocks.append(Text(_named(subjects, subject, responses.force_scale(tree))))
+        for one in responses.tables(tree):
             head, rows = one.head, one.rows
             if any(one.notes):
                 head = (*head, "note")

@@ -1,13 +1,13 @@
-"""Rate-and-state friction: a slider on a spring whose friction has a memory.
+"""The motion of a slider on a spring with rate-and-state friction.
 
-The force of friction is F = F_0 + a ln(V/V_0) + b ln(V_0 θ/D_c), with one state variable θ
+The friction force is F = F_0 + a ln(V/V_0) + b ln(V_0 θ/D_c), with one state variable θ
 (Dieterich, J. Geophys. Res. 84, 2161 (1979); Ruina, J. Geophys. Res. 88, 10359 (1983)):
 
 - ageing law: dθ/dt = 1 - V θ/D_c,
 - slip law: dθ/dt = -(V θ/D_c) ln(V θ/D_c).
 
-Forces may be in newtons, or over the normal force, in which case they are friction coefficients, a
-and b are numbers and a stiffness is one over a length.
+Forces are in newtons, or divided by the normal force: then they are friction coefficients, a and b
+are numbers, and a stiffness is an inverse length.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class RateAndState:
     reference_velocity
         V_0 [m/s].
     a, b
-        Strength of the direct and of the evolving effect, in the unit of the force; a > 0.
+        Parameters of the direct effect and of the evolution effect, in the unit of force; a > 0.
     slip_distance
         D_c [m].
     law
@@ -90,7 +90,7 @@ class Loading:
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of the slider, each array with the shape of the requested times.
+    """Motion of the slider, each array with the shape of the wanted times.
 
     Attributes
     ----------
@@ -173,9 +173,9 @@ def spring_slider(
         first = int(np.searchsorted(times, begin, "right")) if number else 0
         after = times.size if last else int(np.searchsorted(times, end, "right"))
         inside = np.clip(times[first:after] - begin, 0.0, None)
-        asked = np.concatenate([[0.0], inside, [stage.duration]] if not last else [[0.0], inside])
+        wanted = np.concatenate([[0.0], inside, [stage.duration]] if not last else [[0.0], inside])
         acceleration = (stage.end_velocity - stage.start_velocity) / stage.duration
-        path = _integrate(system, at, np.maximum.accumulate(asked), stage, acceleration, tolerance)
+        path = _integrate(system, at, np.maximum.accumulate(wanted), stage, acceleration, tolerance)
         here = slice(first, after)
         there = slice(1, 1 + inside.size)
         driven = stage.start_velocity + acceleration * inside
@@ -218,7 +218,7 @@ def _evolution(law: RateAndState) -> Any:
 
 
 def _rigid(law: RateAndState) -> Any:
-    """The state under a prescribed velocity."""
+    """Derivative of ln V_0 θ/D_c at prescribed velocity."""
     evolution, reference = _evolution(law), law.reference_velocity
 
     def derivative(time: float, at: Array, start: float, acceleration: float) -> list[float]:
@@ -230,8 +230,8 @@ def _rigid(law: RateAndState) -> Any:
 
 
 def _on_spring(law: RateAndState, stiffness: float, damping: float, mass: float) -> Any:
-    """ln V/V_0, ln V_0 θ/D_c, the slider's displacement; with a mass the spring force, without one
-    the displacement at runaway velocity."""
+    """Derivatives of ln V/V_0, ln V_0 θ/D_c and the displacement of the slider; fourth, that of the
+    spring force with a mass, of the displacement at runaway velocity without."""
     evolution, reference, a, b = _evolution(law), law.reference_velocity, law.a, law.b
     force_0 = law.reference_force
 

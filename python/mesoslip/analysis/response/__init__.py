@@ -1,0 +1,31 @@
+"""Steady forces, velocity steps, holds and rate-and-state parameters of outputs.
+
+Forces are those of the spring along the drive: positive against its motion, in either direction.
+"""
+
+from mesoslip.analysis.response.dataset import (
+    response,
+    response_of,
+    rows_of,
+    scalars_of,
+    write_csv,
+)
+from mesoslip.analysis.response.holds import healing_line
+from mesoslip.analysis.response.line import Line, line
+from mesoslip.analysis.response.steady import steady_line
+from mesoslip.analysis.response.tables import ResponseTable, force_scale, tables
+
+__all__ = [
+    "Line",
+    "ResponseTable",
+    "force_scale",
+    "healing_line",
+    "line",
+    "response",
+    "response_of",
+    "rows_of",
+    "scalars_of",
+    "steady_line",
+    "tables",
+    "write_csv",
+]

@@ -1,0 +1,125 @@
+"""Columns of the tables of a response: units and meanings."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mesoslip.analysis.experiment import Stage
+from mesoslip.output.variables import Group, Meaning
+
+_OUTPUT = Meaning("1", "number of the output, from 0", np.int64)
+_STAGE = Meaning("1", "number of the stage of the drive, from 0", np.int64)
+_IS_EXACT = Meaning("1", "whether the peak is that of the motion, not of the samples", np.int8)
+_NOTE = Meaning("1", "limitations, missing values and their reasons", np.str_)
+
+STEADY = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    stage_start_time=Meaning("s", "start of the stage"),
+    velocity=Meaning("m s-1", "velocity of the drive"),
+    steady_force=Meaning("N", "mean force after the transient, against the drive"),
+    steady_force_error=Meaning("N", "standard error of the steady force"),
+    steady_force_half_width=Meaning("N", "half the width of the 95 % interval"),
+    standard_deviation=Meaning("N", "standard deviation of the force about the mean"),
+    transient_time=Meaning("s", "duration of the discarded transient"),
+    sample_count=Meaning("1", "samples after the transient, of all realizations", np.int64),
+    effective_sample_count=Meaning("1", "number of independent samples with the same error"),
+    slip_share=Meaning("1", "share of the slider's displacement in slips"),
+    is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
+    is_resolved=Meaning("1", "whether the stage is long enough for a reliable error", np.int8),
+    note=_NOTE,
+)
+
+STEPS = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    step_time=Meaning("s", "time of the step"),
+    velocity_before=Meaning("m s-1", "velocity of the drive before the step"),
+    velocity_after=Meaning("m s-1", "velocity of the drive after the step"),
+    force_before=Meaning("N", "steady force before the step"),
+    force_after=Meaning("N", "steady force after the step"),
+    net_change=Meaning("N", "steady force after minus before, (a - b) ln(V/V0)"),
+    net_change_error=Meaning("N", "standard error of the net change"),
+    peak_force=Meaning("N", "extreme force, from which the evolution starts"),
+    peak_is_exact=_IS_EXACT,
+    direct_change=Meaning("N", "extreme force minus steady force before, a ln(V/V0)"),
+    direct_change_error=Meaning("N", "standard error of the direct change"),
+    evolution_change=Meaning("N", "steady force after minus extreme force, -b ln(V/V0)"),
+    evolution_change_error=Meaning("N", "standard error of the evolution change"),
+    apparent_a=Meaning("N", "direct change over ln(V/V0)"),
+    apparent_b=Meaning("N", "minus evolution change over ln(V/V0)"),
+    rate_dependence=Meaning("N", "net change over ln(V/V0), a - b"),
+    rate_dependence_error=Meaning("N", "standard error of the rate dependence"),
+    relaxation_displacement=Meaning(
+        "m", "length of the exponential decay over the slider's displacement"
+    ),
+    relaxation_displacement_error=Meaning("m", "standard error of the relaxation displacement"),
+    integral_displacement=Meaning(
+        "m", "area between force and steady force, over the evolution change"
+    ),
+    integral_displacement_error=Meaning("m", "standard error of the integral displacement"),
+    overshoot=Meaning("N", "maximum deviation beyond the steady force after the peak"),
+    note=_NOTE,
+)
+
+HOLDS = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    hold_start_time=Meaning("s", "start of the hold"),
+    hold_time=Meaning("s", "duration of the hold"),
+    velocity_before=Meaning("m s-1", "velocity of the drive before the hold"),
+    velocity_after=Meaning("m s-1", "velocity of the drive after the hold"),
+    force_before=Meaning("N", "steady force before the hold"),
+    force_before_error=Meaning("N", "standard error of the steady force before the hold"),
+    start_force=Meaning("N", "force at the start of the hold"),
+    end_force=Meaning("N", "force at the end of the hold"),
+    relaxation=Meaning("N", "decrease of the force during the hold"),
+    relaxation_error=Meaning("N", "standard error of the relaxation"),
+    drop=Meaning("N", "steady force before minus force at the end of the hold"),
+    drop_error=Meaning("N", "standard error of the drop"),
+    peak_force=Meaning("N", "maximum force of the restart"),
+    peak_is_exact=_IS_EXACT,
+    healing=Meaning("N", "peak minus steady force before the hold"),
+    healing_error=Meaning("N", "standard error of the healing"),
+    slip_to_peak=Meaning("m", "displacement of the slider from the end of the hold to the peak"),
+    load_to_peak=Meaning(
+        "m", "displacement of the load point from the end of the hold to the peak"
+    ),
+    note=_NOTE,
+)
+
+# Scalars of a group: those of the line through its rows.
+STEADY_LINE = Group(
+    rate_dependence=Meaning("N", "slope of the steady force over ln V, a - b"),
+    rate_dependence_error=Meaning("N", "standard error of the rate dependence"),
+    rate_dependence_chi_square=Meaning("1", "chi square of the line"),
+    rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
+)
+HEALING_LINE = Group(
+    healing_per_decade=Meaning("N", "increase of the peak per decade of hold time, beta"),
+    healing_per_decade_error=Meaning("N", "standard error of the healing per decade"),
+    healing_per_decade_chi_square=Meaning("1", "chi square of the line"),
+    healing_per_decade_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
+)
+
+
+def empty_row(group: Group, number: int, stage: Stage) -> dict[str, Any]:
+    """A row of a group without values.
+
+    Parameters
+    ----------
+    group
+        The columns.
+    number
+        Number of the output.
+    stage
+        The stage.
+    """
+    row: dict[str, Any] = {
+        name: "" if meaning.dtype is np.str_ else 0 if meaning.dtype is not np.float64 else math.nan
+        for name, meaning in group.items()
+    }
+    return row | {"output_index": number, "stage_number": stage.number}

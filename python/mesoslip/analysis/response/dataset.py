@@ -1,0 +1,225 @@
+"""The response of outputs to their drives, as a tree of datasets."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows
+from mesoslip.analysis.response.columns import HEALING_LINE, HOLDS, STEADY, STEADY_LINE, STEPS
+from mesoslip.analysis.response.holds import healing_line, hold_rows
+from mesoslip.analysis.response.line import Line
+from mesoslip.analysis.response.steady import steady_line, steady_rows
+from mesoslip.analysis.response.steps import step_rows
+from mesoslip.analysis.slips import write_table
+from mesoslip.output.inputs import OutputLike, as_run, several
+from mesoslip.output.variables import Group
+
+
+def response(
+    output: OutputLike | Sequence[OutputLike],
+    *,
+    normal_force: float | None = None,
+    fit: bool = True,
+    free_stiffness: bool = False,
+) -> xr.DataTree:
+    """Steady forces, velocity steps, holds and rate-and-state parameters of one or more outputs.
+    See ``docs/response.md``.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or several of them.
+    normal_force
+        Normal force [N]: forces are also divided by it, as friction coefficients. By default they
+        are divided by the static force.
+    fit
+        Whether rate-and-state parameters are fitted, which takes some seconds.
+    free_stiffness
+        Whether the stiffness of the spring is fitted too, instead of that of the run.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``steady``: the mean force of each stage at constant velocity, with its error;
+        ``steps``: direct change, evolution change and relaxation displacement of each velocity
+        step; ``holds``: relaxation, restart peak and healing of each hold; ``rate_and_state``:
+        a, b, D_c of each law, and whether the law describes the output. Variables have units and
+        long names.
+
+    Raises
+    ------
+    FileError
+        If an output cannot be read, is not of a run, or is driven by a force.
+    """
+    experiments = [
+        Experiment(
+            as_run(one),
+            os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+        )
+        for number, one in enumerate(several(output))
+    ]
+    return response_of(
+        experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
+    )
+
+
+def response_of(
+    experiments: Sequence[Experiment],
+    *,
+    normal_force: float | None = None,
+    with_fit: bool = True,
+    free_stiffness: bool = False,
+) -> xr.DataTree:
+    """Steady forces, velocity steps, holds, and rate-and-state parameters of experiments.
+
+    Parameters
+    ----------
+    experiments
+        The outputs.
+    normal_force
+        Normal force [N] for variables with the suffix ``_coefficient``; by default forces are
+        divided by the static force, with the suffix ``_ratio``.
+    with_fit
+        Whether rate-and-state parameters are fitted.
+    free_stiffness
+        Whether the stiffness is fitted too, instead of that of the run.
+
+    Returns
+    -------
+    xarray.DataTree
+        Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
+        (``hold``), and ``rate_and_state`` (``fit``, one for each output and law).
+    """
+    numbered = list(enumerate(experiments))
+    rows = {
+        "steady": [row for number, one in numbered for row in steady_rows(one, number)],
+        "steps": [row for number, one in numbered for row in step_rows(one, number)],
+        "holds": [row for number, one in numbered for row in hold_rows(one, number)],
+    }
+    fits = [
+        row
+        for number, one in numbered
+        if with_fit
+        for row in fit_rows(one, number, free_stiffness=free_stiffness)
+    ]
+    steady = _dataset(STEADY, "velocity_stage", rows["steady"])
+    holds = _dataset(HOLDS, "hold", rows["holds"])
+    parts = {
+        "steady": (
+            steady.assign(_line_variables(STEADY_LINE, steady_line(steady))),
+            Group(STEADY, **STEADY_LINE),
+        ),
+        "steps": (_dataset(STEPS, "step", rows["steps"]), STEPS),
+        "holds": (
+            holds.assign(_line_variables(HEALING_LINE, healing_line(holds))),
+            Group(HOLDS, **HEALING_LINE),
+        ),
+        "rate_and_state": (_dataset(FIT, "fit", fits), FIT),
+    }
+    static = {one.static_force for one in experiments}
+    groups = {}
+    for name, (data, group) in parts.items():
+        if normal_force is not None:
+            data = _with_ratios(data, group, normal_force, "coefficient", "normal force")
+        elif len(static) == 1:
+            data = _with_ratios(data, group, static.copy().pop(), "ratio", "static force")
+        groups["/" + name] = data
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs["outputs"] = [one.name for one in experiments]
+    if normal_force is not None:
+        tree.attrs["normal_force"] = normal_force
+    elif len(static) == 1:
+        tree.attrs["static_force"] = static.pop()
+    return tree
+
+
+def _line_variables(group: Group, found: Line | None) -> dict[str, xr.Variable]:
+    """The scalars of a line, NaN without a line."""
+    values = (
+        (math.nan, math.nan, math.nan, 0)
+        if found is None
+        else (found.slope, found.slope_error, found.chi_square, found.degrees_of_freedom)
+    )
+    return {
+        name: group.variable(name, (), np.asarray(value, dtype=group[name].dtype))
+        for name, value in zip(group, values, strict=True)
+    }
+
+
+def _dataset(group: Group, dimension: str, rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+    """Rows as a dataset, a variable for each column."""
+    return xr.Dataset(
+        {
+            name: group.variable(
+                name, (dimension,), np.array([row[name] for row in rows], dtype=meaning.dtype)
+            )
+            for name, meaning in group.items()
+        }
+    )
+
+
+def ratio_name(name: str, suffix: str) -> str:
+    """Name of a force divided by another: the suffix stands before ``_error``."""
+    stem = name.removesuffix("_error")
+    return f"{stem}_{suffix}{name[len(stem) :]}"
+
+
+def _with_ratios(data: xr.Dataset, group: Group, scale: float, suffix: str, of: str) -> xr.Dataset:
+    """A dataset with its forces divided by a force as well."""
+    ratios = {
+        ratio_name(name, suffix): xr.Variable(
+            data[name].dims,
+            data[name].values / scale,
+            {"units": "1", "long_name": f"{data[name].attrs['long_name']}, over the {of}"},
+        )
+        for name in map(str, data.data_vars)
+        if group[name].units == "N"
+    }
+    return data.assign(ratios)
+
+
+def rows_of(tree: xr.DataTree, name: str) -> list[dict[str, Any]]:
+    """The rows of a group of a response, a dictionary for each, without its scalars."""
+    data = tree.children[name].to_dataset()
+    columns = {str(one): data[one].values.tolist() for one in data.data_vars if data[one].ndim}
+    return [
+        dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)
+    ]
+
+
+def scalars_of(tree: xr.DataTree, name: str) -> dict[str, Any]:
+    """The scalars of a group of a response."""
+    data = tree.children[name].to_dataset()
+    return {str(one): data[one].item() for one in data.data_vars if not data[one].ndim}
+
+
+def write_csv(tree: xr.DataTree, path: Path) -> None:
+    """Write a response as one table with a row for each stage.
+
+    A stage at constant velocity has the columns of ``steady``, and those of ``steps`` if it starts
+    with a step; a hold has those of ``holds``. The notes on steps have a column of their own.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    units: dict[str, str] = {}
+    table: dict[tuple[int, int], dict[str, Any]] = {}
+    for name in ("steady", "holds", "steps"):
+        data = tree.children[name].to_dataset()
+        for row in rows_of(tree, name):
+            here = table.setdefault((row["output_index"], row["stage_number"]), {})
+            for column, value in row.items():
+                key = f"step_{column}" if name == "steps" and column == "note" else column
+                here[key] = None if value != value else value
+                units[key] = data[column].attrs["units"]
+    write_table([table[key] for key in sorted(table)], units, path)

@@ -1,0 +1,77 @@
+"""Exponential decays of a force over a displacement."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Maximum number of points in a fit, of each of the two spacings.
+MAX_POINTS = 2000
+
+
+def decay(
+    displacement: Array, force: Array, correlation: float, noise: float
+) -> tuple[float, float] | None:
+    """Length of an exponential decay of a force over a displacement, and its standard error.
+
+    Parameters
+    ----------
+    displacement, force
+        Displacement [m], ascending, and force [N], each of shape (samples,).
+    correlation
+        Samples per independent sample.
+    noise
+        Standard deviation of the force about the decay.
+
+    Returns
+    -------
+    tuple or None
+        None if the samples do not determine the length.
+    """
+    from scipy.optimize import OptimizeWarning, curve_fit
+
+    distance = float(displacement[-1] - displacement[0])
+    if distance <= 0:
+        return None
+    chosen = np.unique(np.linspace(0, displacement.size - 1, MAX_POINTS).astype(int))
+    # Evenly spaced points are few at the start, where the decay is fastest.
+    early = np.unique(np.geomspace(1, displacement.size, MAX_POINTS).astype(int) - 1)
+    chosen = np.union1d(chosen, early)
+    x, y = (displacement[chosen] - displacement[0]) / distance, force[chosen]
+    size = max(float(np.ptp(y)), 1e-300)
+    y = (y - y[-1]) / size
+
+    def exponential(x: Array, level: float, amplitude: float, log_length: float) -> Array:
+        decayed: Array = level + amplitude * np.exp(-x / np.exp(log_length))
+        return decayed
+
+    best = None
+    for length in (0.01, 0.05, 0.3):
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", OptimizeWarning)
+            try:
+                found, covariance = curve_fit(
+                    exponential, x, y, (0.0, y[0], math.log(length)), maxfev=500
+                )
+            except RuntimeError:
+                continue
+        squares = float(np.sum((y - exponential(x, *found)) ** 2))
+        if np.all(np.isfinite(covariance)) and (best is None or squares < best[0]):
+            best = (squares, found, covariance)
+    if best is None:
+        return None
+    squares, found, covariance = best
+    # Chosen samples are as correlated as their spacing allows.
+    spacing = displacement.size / chosen.size
+    factor = max(1.0, correlation / spacing)
+    floor = (noise / size) ** 2 * chosen.size / max(squares, 1e-300)
+    error = math.sqrt(covariance[2, 2] * factor * max(1.0, floor))
+    length = math.exp(found[2]) * distance
+    if not math.isfinite(length) or error > 1 or length > distance:
+        return None
+    return length, length * error

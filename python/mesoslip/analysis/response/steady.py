@@ -1,0 +1,76 @@
+"""Steady forces at constant velocity, and their dependence on the velocity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from mesoslip.analysis.experiment import Experiment, Stage
+from mesoslip.analysis.response.columns import STEADY, empty_row
+from mesoslip.analysis.response.line import Line, line
+from mesoslip.analysis.steady_force import SteadyMean
+
+
+def steady_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
+    """The steady force of each stage at constant velocity.
+
+    Parameters
+    ----------
+    experiment
+        The output.
+    number
+        Its number.
+    """
+    rows = []
+    for stage in experiment.stages:
+        if not stage.is_steady:
+            continue
+        row = empty_row(STEADY, number, stage)
+        row |= {"stage_start_time": stage.start, "velocity": stage.velocity}
+        row["slip_share"] = experiment.slip_share(stage)
+        mean = experiment.mean_of(stage)
+        if mean is None:
+            row["note"] = "too few samples in the stage"
+        else:
+            first = experiment.samples(stage).start
+            begin = experiment.time[min(first + mean.start, experiment.time.size - 1)]
+            row |= {
+                "steady_force": mean.mean,
+                "steady_force_error": mean.error,
+                "steady_force_half_width": mean.half_width,
+                "standard_deviation": mean.standard_deviation,
+                "transient_time": max(0.0, float(begin) - stage.start) if mean.start else 0.0,
+                "sample_count": mean.count,
+                "effective_sample_count": mean.effective_count,
+                "is_steady": int(mean.is_steady),
+                "is_resolved": int(mean.is_resolved),
+            }
+            row["note"] = _note(experiment, stage, mean)
+        rows.append(row)
+    return rows
+
+
+def _note(experiment: Experiment, stage: Stage, mean: SteadyMean) -> str:
+    """Limitations of a steady force."""
+    notes = []
+    if experiment.is_stick_slip(stage):
+        notes.append("stick-slip: the mean over its cycles")
+    if not mean.is_steady:
+        notes.append("not steady: the force still drifts")
+    if not mean.is_resolved:
+        notes.append("too short: the error is underestimated")
+    return "; ".join(notes)
+
+
+def steady_line(data: xr.Dataset) -> Line | None:
+    """The line of the steady force over ln V, of steady stages; None for fewer than two
+    velocities."""
+    good = data["is_steady"].values == 1
+    velocity = np.abs(data["velocity"].values[good])
+    return line(
+        np.log(velocity),
+        data["steady_force"].values[good],
+        data["steady_force_error"].values[good],
+    )

@@ -1,0 +1,206 @@
+"""Printed tables of a response: one unit a column, values with the digits of their errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import xarray as xr
+
+from mesoslip.analysis.response.dataset import ratio_name, rows_of, scalars_of
+from mesoslip.quantities import column, with_error, with_unit
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class ResponseTable:
+    """A table of a response.
+
+    Attributes
+    ----------
+    title
+        What a row is.
+    head
+        Headers, with units.
+    rows
+        Cells, as many in each row as there are columns.
+    notes
+        A note on each row; empty if there is none.
+    line
+        Slope of the line through the rows, as a sentence; empty if there is none.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+    line: str = ""
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column of a table.
+
+    Attributes
+    ----------
+    header
+        The header, without unit.
+    name
+        Name of the variable.
+    unit
+        SI unit; without one the values are texts.
+    error
+        Name of the variable with the standard errors.
+    beside
+        Variables of other columns with the same unit and decimals.
+    digits
+        Significant digits of values without error.
+    """
+
+    header: str
+    name: str
+    unit: str = ""
+    error: str = ""
+    beside: tuple[str, ...] = ()
+    digits: int = 4
+
+    def cells(self, rows: Sequence[Row]) -> tuple[str, ...]:
+        """The header and the cells."""
+        values = [row[self.name] for row in rows]
+        if not self.unit:
+            return (self.header, *map(str, values))
+        alike = [row[name] for name in self.beside for row in rows]
+        shown = column([*values, *alike], self.unit, self.digits)
+        errors = [row.get(self.error, math.nan) for row in rows]
+        return (shown.head(self.header), *map(shown.text, values, errors))
+
+
+def force_scale(tree: xr.DataTree) -> str:
+    """A sentence on the scale of the forces in the tables."""
+    if "normal_force" in tree.attrs:
+        return f"Forces are divided by the normal force, {_size(tree.attrs['normal_force'])}."
+    if "static_force" in tree.attrs:
+        return f"Forces are divided by the static force, {_size(tree.attrs['static_force'])}."
+    return "Forces are not divided by the static force, which differs between the outputs."
+
+
+def _size(force: float) -> str:
+    return with_unit(force, "N", 6)
+
+
+def tables(tree: xr.DataTree) -> list[ResponseTable]:
+    """Tables of a response, without the empty ones.
+
+    Parameters
+    ----------
+    tree
+        The result of `mesoslip.response`.
+    """
+    suffix = (
+        "coefficient"
+        if "normal_force" in tree.attrs
+        else "ratio"
+        if "static_force" in tree.attrs
+        else ""
+    )
+    lines = {
+        "steady": ("rate_dependence", "rate dependence a - b (slope over ln V)"),
+        "holds": ("healing_per_decade", "healing per decade of hold time"),
+    }
+    result = []
+    for name, (title, columns) in _columns(suffix, len(tree.attrs["outputs"]) > 1).items():
+        rows = rows_of(tree, name)
+        if not rows:
+            continue
+        head, *cells = zip(*(one.cells(rows) for one in columns), strict=True)
+        line = _line(scalars_of(tree, name), *lines[name], suffix) if name in lines else ""
+        notes = tuple(str(row["note"]) for row in rows)
+        result.append(ResponseTable(title, head, tuple(cells), notes, line))
+    return result
+
+
+def _columns(suffix: str, several: bool) -> dict[str, tuple[str, tuple[_Column, ...]]]:
+    """Title and columns of the table of each group."""
+    outputs = (_Column("output", "output_index"),) if several else ()
+    stages = (*outputs, _Column("stage", "stage_number"))
+
+    def force(header: str, name: str, digits: int = 4) -> _Column:
+        error = f"{name}_error"
+        if not suffix:
+            return _Column(header, name, "N", error, digits=digits)
+        names = (ratio_name(one, suffix) for one in (name, error))
+        return _Column(header, next(names), "1", next(names), digits=digits)
+
+    def length(header: str, name: str, beside: str = "") -> _Column:
+        return _Column(header, name, "m", f"{name}_error", (beside,) if beside else ())
+
+    return {
+        "steady": (
+            "Steady sliding",
+            (
+                *stages,
+                _Column("velocity", "velocity", "m/s"),
+                force("steady force", "steady_force"),
+                force("95 % half-width", "steady_force_half_width", 3),
+                _Column("independent samples", "effective_sample_count", "1"),
+                _Column("transient", "transient_time", "s"),
+                _Column("slip share", "slip_share", "1", digits=2),
+            ),
+        ),
+        "steps": (
+            "Velocity steps",
+            (
+                *stages,
+                _Column("from", "velocity_before", "m/s", beside=("velocity_after",)),
+                _Column("to", "velocity_after", "m/s", beside=("velocity_before",)),
+                force("net change", "net_change"),
+                force("direct change", "direct_change"),
+                force("evolution change", "evolution_change"),
+                length("relaxation", "relaxation_displacement", "integral_displacement"),
+                length("integral", "integral_displacement", "relaxation_displacement"),
+                force("overshoot", "overshoot"),
+            ),
+        ),
+        "holds": (
+            "Holds",
+            (
+                *stages,
+                _Column("hold time", "hold_time", "s"),
+                force("force before", "force_before"),
+                force("drop", "drop"),
+                force("peak", "peak_force"),
+                force("healing", "healing"),
+                length("slip to peak", "slip_to_peak"),
+            ),
+        ),
+        "rate_and_state": (
+            "Rate and state",
+            (
+                *outputs,
+                _Column("law", "law"),
+                force("a", "a"),
+                force("b", "b"),
+                length("D_c", "slip_distance"),
+                _Column("stiffness", "stiffness", "N/m", "stiffness_error"),
+                _Column("misfit", "relative_misfit", "1", digits=2),
+                _Column("p", "fit_p_value", "1", digits=2),
+            ),
+        ),
+    }
+
+
+def _line(scalars: Mapping[str, Any], name: str, meaning: str, suffix: str) -> str:
+    """The slope of a line as a sentence; empty without one."""
+    names = (ratio_name(one, suffix) if suffix else one for one in (name, f"{name}_error"))
+    slope, error = (scalars[one] for one in names)
+    if math.isnan(slope):
+        return ""
+    freedom, square = scalars[f"{name}_freedom"], scalars[f"{name}_chi_square"]
+    text = f"{meaning}: {with_error(slope, error, '1' if suffix else 'N')}"
+    if not math.isnan(square) and freedom:
+        ending = "s" if freedom > 1 else ""
+        text += f" (chi square {square:.3g} with {freedom} degree{ending} of freedom)"
+    return text

@@ -7,13 +7,13 @@ VENV := .venv
 MESOSLIP := $(VENV)/bin/mesoslip
 UV := $(VENV)/bin/uv
 
-# Stamps: the locked Python packages are there, and mesoslip itself, built from these sources.
+# Stamps: the locked Python packages, and mesoslip itself, built from these sources.
 ENVIRONMENT := $(VENV)/.environment
 INSTALLED := $(VENV)/.installed
-# What builds the documentation, which nothing else needs.
+# Packages that only the documentation needs.
 DOCUMENTATION := $(VENV)/.documentation
 
-# .git/logs/HEAD, as outputs tell the commit of the program.
+# .git/logs/HEAD, as outputs have the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard fortran/meson.build fortran/*.f90 fortran/*.in fortran/*/* fortran/*/*/* python/meson.build python/f2cmap) \
   $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
@@ -36,11 +36,11 @@ export UV_COMPILE_BYTECODE := 1
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
 	@printf 'out/NAME.nc\tSimulate runs/NAME.toml\n' | expand -t 16
-	@printf '\nWhat uses what, from left to right (docs/architecture.md tells what to touch to add something):\n'
+	@printf '\nDependencies, from left to right (docs/architecture.md lists the files to change for an addition):\n'
 	@printf 'fortran/\tnumerics, contacts and sliders, recording, loop, boundary; theory\n' | expand -t 16
-	@printf 'python/\tconfiguration, simulation, output, analysis and theory, plots, campaign, reports and explorer, command_line\n' | expand -t 16
+	@printf 'python/\tconfiguration, execution, simulation, output, analysis and theory, measured, inference and plots,\n\tcampaign, reports and explorer, command_line\n' | expand -t 16
 
-setup: $(INSTALLED) ## Install what is missing, and build
+setup: $(INSTALLED) ## Install missing packages, and build
 	@:
 
 demo: out/klein.nc out/klein.png ## Simulate Klein's experiment, and draw it
@@ -55,15 +55,15 @@ test-fortran: build/release/build.ninja
 	@ninja --quiet -C build/release
 	$(VENV)/bin/meson test -C build/release --no-rebuild --print-errorlogs
 
-test-debug: build/debug/build.ninja ## Fortran unit tests with all run-time checks
+test-debug: build/debug/build.ninja ## Run the Fortran unit tests with all run-time checks
 	@ninja --quiet -C build/debug
 	$(VENV)/bin/meson test -C build/debug --no-rebuild --print-errorlogs
 
-test-sanitize: build/sanitize/build.ninja ## Fortran unit tests with the sanitizers
+test-sanitize: build/sanitize/build.ninja ## Run the Fortran unit tests with the sanitizers
 	@ninja --quiet -C build/sanitize
 	$(VENV)/bin/meson test -C build/sanitize --no-rebuild --print-errorlogs
 
-test-browser: $(INSTALLED) ## The explorer's page in a real Chromium, which is installed if it may be
+test-browser: $(INSTALLED) ## Test the explorer in a real Chromium, installed if allowed
 	@PYTHON=$(PYTHON) tools/system-packages chromium chromium-driver
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -q -s tests/browser
 
@@ -72,17 +72,17 @@ bench: $(INSTALLED) ## Measure the cost of a contact event
 
 # Some cases of some attacks: make fuzz FUZZ="signals=20 --seed 7"; one of them: FUZZ="--only signals:7:3".
 FUZZ ?=
-fuzz: $(INSTALLED) ## Attack the program with some thousand cases at random
+fuzz: $(INSTALLED) ## Attack the program with some thousand random cases
 	$(VENV)/bin/python tests/fuzz/fuzz.py $(FUZZ)
 	$(if $(FUZZ),,OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 -q -m long \
 	  --ignore=tests/python/test_documentation.py)
 
 # A part of a file's name or of a mutant's text: make mutants MUTANTS=likelihood.
 MUTANTS ?=
-mutants: $(INSTALLED) ## Break the program in forty places, and see whether the tests notice
+mutants: $(INSTALLED) ## Break the program in forty places, and report which the tests notice
 	$(VENV)/bin/python tests/mutants/mutants.py $(MUTANTS)
 
-reference: $(INSTALLED) ## Write the reference outputs of the tests anew, on purpose only
+reference: $(INSTALLED) ## Rewrite the reference outputs of the tests, on purpose only
 	$(VENV)/bin/python tests/python/make_reference.py
 
 lint: $(INSTALLED) ## Check the style of all sources

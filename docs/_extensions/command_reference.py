@@ -13,10 +13,10 @@ from mesoslip.command_line.main import app
 INTRODUCTION = """\
 # Command line
 
-`mesoslip COMMAND --help` tells the same. Exit status 0 is success; 2 is a bad command line or
-configuration, with one message that names the place, the value and what would be right; 1 is a
-run that failed; 130 is Ctrl-C, after which there is a checkpoint. No output is ever half-written
-under its own name.
+`mesoslip COMMAND --help` prints the same. Exit status 0 is success; 2 is a bad command line or
+configuration, with one message that names the key, the value and what would be right; 1 is a
+failed run; 130 is Ctrl-C, after which there is a checkpoint. No output is ever half-written
+under its final name.
 """
 
 

@@ -23,12 +23,12 @@ from pydantic_core import PydanticKnownError
 INTRODUCTION = """\
 # Configuration
 
-A run is described by a TOML file. Quantities are texts of one number and one unit (`"97 N/m"`,
-`"0.5 ms"`), or plain numbers in the unit of this page; a unit of another dimension is an error,
-and so is a key that there is not. `base = "klein.toml"` at the top of a file lays it over another
-one, beside it. On the command line `--set contacts.delay=1ms` changes one key.
+A run is described by a TOML file. Quantities are strings of a number and a unit (`"97 N/m"`,
+`"0.5 ms"`), or plain numbers in the unit of this page. A unit of another dimension and an unknown
+key are errors. With `base = "klein.toml"` at its top a file changes another one in the same
+folder. On the command line `--set contacts.delay=1ms` changes one key.
 
-This page is made from the tables that check configurations.
+This page is generated from the tables that check configurations.
 """
 
 
@@ -189,7 +189,7 @@ def _takes(field: FieldInfo) -> str:
     if is_list and get_origin(get_args(bare)[0]) is dict:
         return "tables"
     if str in _types(bare):
-        return "texts" if is_list else "a text"
+        return "strings" if is_list else "a string"
     if int in _types(bare):
         text = f"whole, {text}" if text else "whole"
     if is_list:

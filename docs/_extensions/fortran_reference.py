@@ -17,10 +17,10 @@ SOURCES = Path(__file__).parents[2] / "fortran"
 INTRODUCTION = """\
 # Fortran library
 
-The kernel is a Fortran library that Python is one user of. Modules are named after their path:
-`fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. This page has what they make public, from
-the comments of the sources. What can fail has an allocatable `type(error_type)` as its last
-argument; unallocated means success, and the library never stops the program.
+The kernels are a Fortran library, which Python uses. Modules are named after their path:
+`fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. This page has their public entities, from
+the comments of the sources. Procedures that can fail have an allocatable `type(error_type)` as
+their last argument; unallocated means success. The library never stops the program.
 """
 
 MODULE = re.compile(r"module (?!procedure)(\w+)")

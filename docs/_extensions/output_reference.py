@@ -10,21 +10,21 @@ INTRODUCTION = """\
 # Output
 
 Outputs are netCDF-4 files, with CF and ACDD attributes; [xarray](../../how-to/read-an-output.md)
-opens them, as does anything else that reads netCDF. Every variable has units. This page is made
-from the table that `mesoslip` writes outputs by; an output has those that its slider, contacts
-and keys bring about.
+opens them, as does any other netCDF reader. Every variable has units. This page is generated
+from the definitions in the program; which variables an output has depends on its slider, contacts
+and keys.
 
 Catalogues (slips, stages, avalanches, snapshots, finer traces) are CF's *indexed ragged arrays*:
-rows of all realizations one after another, each with its `realization_index`. What has not been
-recorded, as after the end of a realization that was over before the others, is NaN.
+rows of all realizations one after another, each with its `realization_index`. Missing samples,
+such as those after the end of a shorter realization, are NaN.
 
-Attributes of the root tell the whole configuration (`configuration`, TOML with plain SI numbers)
-and what it was laid over (`base_configuration`), `seed`, versions of program, compiler and
+Attributes of the root are the whole configuration (`configuration`, TOML with plain SI numbers)
+and its base (`base_configuration`), `seed`, versions of program, compiler and
 libraries, counts of events, `energy_residual`, `ending`, and the wall time. `mesoslip run OUT.nc`
 repeats the run of an output.
 """
 
-# Groups in the order in which they are told: name, dimensions, what it is.
+# Groups in the order of the page: name, variables, dimensions and meaning.
 GROUPS: tuple[tuple[str, Group, str], ...] = (
     ("Root: traces", variables.TRACE, "Dimensions `realization`, `time`."),
     (
@@ -36,10 +36,10 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "Group slips",
         variables.SLIPS,
-        "Dimension `slip`. A slip is a time in which contacts break and the block travels by more "
-        "than it rings.",
+        "Dimension `slip`. A slip is an interval in which contacts break and the slider moves by "
+        "more than it rings.",
     ),
-    ("Group stages", variables.STAGES, "Dimension `stage`: what each stage of the drive came to."),
+    ("Group stages", variables.STAGES, "Dimension `stage`: forces of each stage of the drive."),
     (
         "Group slip_traces",
         variables.SLIP_TRACES,
@@ -63,7 +63,11 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         variables.CRITICAL,
         "Dimension `point`: where F′ = −K, lowest displacement first.",
     ),
-    ("mesoslip curve: group stretches", variables.STRETCHES, "What `curve.density_at` asks for."),
+    (
+        "mesoslip curve: group stretch_density",
+        variables.STRETCHES,
+        "The densities at the displacements of `curve.density_at`.",
+    ),
     (
         "mesoslip onset: groups sequential and melting",
         variables.ONSET,

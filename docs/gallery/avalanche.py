@@ -2,8 +2,8 @@
 An avalanche on the lattice
 ===========================
 
-Contacts that push each other over: strong interaction makes the first avalanche take nearly all of
-them at one instant. Colours tell in which generation each has let go.
+Interacting contacts on a lattice. With strong interaction the first avalanche breaks nearly all of
+them at one instant. Colours are the generations of the avalanche.
 """
 
 import mesoslip
@@ -21,7 +21,7 @@ tree = mesoslip.run(config)
 mesoslip.plot(tree, view="lattice")
 
 # %%
-# The largest of them.
+# The largest avalanche.
 
 avalanches = mesoslip.avalanches(tree)
 largest = avalanches.isel(avalanche=int(avalanches["size"].argmax("avalanche")))

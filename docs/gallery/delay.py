@@ -1,9 +1,9 @@
 """
-What the delay does
-===================
+The effect of the delay
+=======================
 
-Without a delay before a broken contact attaches again, slips die away and sliding becomes smooth;
-with a long one it sticks and slips. Stiffness and thresholds are the same.
+Without a delay before a broken contact attaches again, slips decay and sliding becomes smooth;
+with a long delay the slider sticks and slips. Stiffness and thresholds are the same.
 """
 
 import matplotlib.pyplot as plt

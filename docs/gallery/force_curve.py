@@ -1,9 +1,9 @@
 """
-The force curve, and where it becomes unstable
-==============================================
+The force curve and its instability
+===================================
 
-For infinitely many contacts the force over the displacement of the slider is the solution of a
-renewal equation. Where it falls faster than the spring lets go, the slider slips.
+For infinitely many contacts the force as a function of the displacement is the solution of a
+renewal equation. Where it falls faster than the spring unloads, the slider is unstable.
 """
 
 import matplotlib.pyplot as plt
@@ -31,6 +31,6 @@ axes.set(xlabel="displacement (nm)", ylabel="force (µN)", ylim=(0, None))
 axes.legend()
 
 # %%
-# A spring stiffer than this would hold the slider at any time.
+# With a stiffer spring there is no instability.
 
 print(f"K* = {curve.K_star[0]:.4g} N/m; the spring has {config.spring_stiffness:g} N/m")

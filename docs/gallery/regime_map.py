@@ -2,8 +2,8 @@
 A map of regimes
 ================
 
-A sweep over two keys, and what each run shows: 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
-More realizations and finer axes are a matter of two numbers; see the page on campaigns.
+A sweep over two keys, with the regime of each run: 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
+More realizations and finer axes take two numbers; see the page on campaigns.
 """
 
 import mesoslip
@@ -31,7 +31,7 @@ data = mesoslip.sweep(
 print(data["regime"].isel(realization=0).to_pandas())
 
 # %%
-# The dataset is xarray's, and so are its pictures.
+# The result is an xarray dataset, with xarray's methods for pictures.
 
 _ = (
     data["mean_force"]

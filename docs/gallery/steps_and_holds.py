@@ -2,8 +2,8 @@
 Velocity steps and holds
 ========================
 
-Contacts that grow stronger with the logarithm of their age behave as rate-and-state friction says:
-less force at a higher velocity, and a peak after a hold. The red line is the law that fits.
+Contacts that strengthen with the logarithm of their age behave as in rate-and-state friction:
+the force is lower at a higher velocity, and peaks after a hold. The red line is the fitted law.
 """
 
 import mesoslip
@@ -34,7 +34,7 @@ tree = mesoslip.run(config)
 mesoslip.plot(tree, view="response")
 
 # %%
-# What the steady stages came to.
+# Steady forces of the stages.
 
 steady = mesoslip.response(tree, fit=False)["steady"].to_dataset()
 columns = ["stage_number", "velocity", "steady_force", "steady_force_error", "is_steady"]

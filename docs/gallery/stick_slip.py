@@ -2,7 +2,7 @@
 Stick-slip
 ==========
 
-Klein's surface force balance: the spring is loaded until all contacts let go, and the slider slips.
+Klein's surface force balance: the spring is loaded until all contacts break, and the slider slips.
 """
 
 import mesoslip
@@ -12,8 +12,8 @@ tree = mesoslip.run(config)
 mesoslip.plot(tree)
 
 # %%
-# The first spike is the largest: all contacts are as old as each other then. What each slip came to
-# is in the catalogue.
+# The first spike is the largest, as all contacts have the same age. The catalogue has the numbers of
+# each slip.
 
 slips = mesoslip.slips(tree)
 columns = ["start_time", "force_before", "force_drop", "contacts_broken"]

@@ -1,9 +1,9 @@
 """
-From some contacts to infinitely many
-=====================================
+From N contacts to infinitely many
+==================================
 
-One key takes the same run to the master equation, N → ∞. N contacts differ from it by about
-0.2 N\\ :sup:`-1/2` of the static force.
+With one key the same run is solved by the master equation, N → ∞. Under a prescribed slider N
+contacts differ from it by about 0.2 N\\ :sup:`-1/2` of the static force.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 A map of regimes
 ================
 
-A sweep over two keys, with the regime of each run: 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
-More realizations and finer axes take two numbers; see the page on campaigns.
+A sweep over two keys, with the regime of each run: 0 smooth, 1 stick-slip, 2 irregular,
+3 transient. More realizations and finer axes take two numbers; see the page on campaigns.
 """
 
 import mesoslip

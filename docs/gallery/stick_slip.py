@@ -12,8 +12,8 @@ tree = mesoslip.run(config)
 mesoslip.plot(tree)
 
 # %%
-# The first spike is the largest, as all contacts have the same age. The catalogue has the numbers of
-# each slip.
+# The first spike is the largest, as all contacts have the same age. The catalogue has the
+# numbers of each slip.
 
 slips = mesoslip.slips(tree)
 columns = ["start_time", "force_before", "force_drop", "contacts_broken"]

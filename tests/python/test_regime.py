@@ -1,4 +1,4 @@
-"""Which motion it is: the rules, and what they say of runs of every kind."""
+"""The regime of motion: its rules, and runs of every kind."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from mesoslip.analysis.regime import (
     SMOOTH,
     STICK_SLIP,
     TRANSIENT,
-    judge,
+    classify,
 )
 
 TIME = np.linspace(0.0, 1.0, 20001)
 
 
 def study():
-    """The study with the independent judge."""
+    """The study with the spectral classification."""
     path = ROOT / "tests" / "studies" / "regimes.py"
     spec = importlib.util.spec_from_file_location("regimes_study", path)
     module = importlib.util.module_from_spec(spec)
@@ -43,9 +43,9 @@ def sawtooth(periods, falls):
     return 1e-5 * force
 
 
-def judged(config, force, velocity=None):
+def result(config, force, velocity=None):
     velocity = np.full(len(TIME), 1e-7) if velocity is None else velocity
-    return judge(config, TIME, force, velocity, np.empty(0), np.empty(0))
+    return classify(config, TIME, force, velocity, np.empty(0), np.empty(0))
 
 
 def test_noise_of_steady_contacts_is_smooth(klein):
@@ -54,15 +54,15 @@ def test_noise_of_steady_contacts_is_smooth(klein):
     config = klein(contacts__count=100)
     noise = np.convolve(rng.normal(size=len(TIME)), np.ones(20) / np.sqrt(20), "same")
     force = 1e-5 + 0.035 * 18e-6 * noise
-    found = judged(config, force)
+    found = result(config, force)
     assert found.regime == SMOOTH
     assert found.relative_amplitude < found.smooth_amplitude
     # The same of ten thousand contacts is more than noise.
-    assert judged(klein(contacts__count=10_000), force).regime != SMOOTH
+    assert result(klein(contacts__count=10_000), force).regime != SMOOTH
 
 
 def test_a_sawtooth_is_stick_slip(klein):
-    found = judged(klein(), sawtooth(np.full(60, 1 / 50), np.full(60, 0.8)))
+    found = result(klein(), sawtooth(np.full(60, 1 / 50), np.full(60, 0.8)))
     assert found.regime == STICK_SLIP
     assert found.period == pytest.approx(1 / 50, rel=1e-3)
     assert found.period_variation < 0.02
@@ -73,7 +73,7 @@ def test_a_sawtooth_is_stick_slip(klein):
 def test_what_alternates_is_regular(klein):
     """Large and small slips in turn: the periods vary, pairs of them do not."""
     periods, falls = np.tile([0.024, 0.012], 40), np.tile([0.8, 0.4], 40)
-    found = judged(klein(), sawtooth(periods, falls))
+    found = result(klein(), sawtooth(periods, falls))
     assert found.regime == STICK_SLIP
     assert found.period_variation > 0.3
     assert found.period_irregularity < 0.02
@@ -82,38 +82,38 @@ def test_what_alternates_is_regular(klein):
 
 def test_random_slips_are_irregular(klein):
     rng = np.random.default_rng(2)
-    random = judged(klein(), sawtooth(rng.exponential(0.015, 400) + 2e-3, np.full(400, 0.8)))
+    random = result(klein(), sawtooth(rng.exponential(0.015, 400) + 2e-3, np.full(400, 0.8)))
     assert random.regime == IRREGULAR
     falls = np.where(rng.random(100) < 0.5, 0.8, 0.42)
-    assert judged(klein(), sawtooth(np.full(100, 0.012), falls)).fall_irregularity > 0.25
+    assert result(klein(), sawtooth(np.full(100, 0.012), falls)).fall_irregularity > 0.25
 
 
 def test_what_dies_away_is_not_settled(klein):
     config = klein(contacts__count=1_000_000)
     for rate, regime in [(0.0, STICK_SLIP), (0.2, STICK_SLIP), (2.0, TRANSIENT), (15.0, TRANSIENT)]:
         force = 1e-5 * (1 + 0.5 * np.exp(-rate * TIME) * np.sin(300 * TIME))
-        assert judged(config, force).regime == regime
-    # Died away, before and within what is judged.
-    assert judged(config, 1e-5 * (1 + np.exp(-60 * TIME - 4))).regime == SMOOTH
+        assert result(config, force).regime == regime
+    # Decayed, before and within the window.
+    assert result(config, 1e-5 * (1 + np.exp(-60 * TIME - 4))).regime == SMOOTH
 
 
 def test_a_run_that_ends_too_soon_is_transient(klein):
-    assert judged(klein(), 1e-5 * TIME).regime == TRANSIENT
-    assert judged(klein(), sawtooth([0.6, 0.6], [0.8, 0.8])).regime == TRANSIENT
+    assert result(klein(), 1e-5 * TIME).regime == TRANSIENT
+    assert result(klein(), sawtooth([0.6, 0.6], [0.8, 0.8])).regime == TRANSIENT
     # The drive has not moved by a breaking stretch.
     slow = klein(drive__velocity=1e-9)
-    assert judged(slow, np.full(len(TIME), 1e-5)).regime == TRANSIENT
-    assert judge(slow, *np.empty((3, 0)), np.empty(0), np.empty(0)).regime == TRANSIENT
+    assert result(slow, np.full(len(TIME), 1e-5)).regime == TRANSIENT
+    assert classify(slow, *np.empty((3, 0)), np.empty(0), np.empty(0)).regime == TRANSIENT
 
 
 def test_the_rebound_of_a_slip_is_no_cycle(klein):
-    """A slip overshoots and swings back at once: how far is not seen by all samples."""
+    """A slip overshoots and swings back at once: samples miss part of the overshoot."""
     rng = np.random.default_rng(3)
     force = sawtooth(np.full(60, 1 / 40), np.full(60, 0.6))
     ends = np.flatnonzero(np.diff(force) < -1e-6)
     for end in ends:
         force[end + 1 : end + 3] -= rng.exponential(3e-5)
-    found = judged(klein(), force)
+    found = result(klein(), force)
     assert found.regime == STICK_SLIP
     assert found.period == pytest.approx(1 / 40, rel=1e-3)
     assert found.fall_irregularity < 0.01
@@ -164,7 +164,7 @@ def test_a_slider_without_inertia(klein):
     assert regime_of(stiff) == [SMOOTH]
 
 
-def test_a_drive_that_turns_back_is_judged_by_its_last_stage(klein):
+def test_the_last_stage_of_a_drive_that_turns_back_is_evaluated(klein):
     forth = {"duration": 4.0, "velocity": 1e-6}
     back = {"duration": 4.0, "velocity": -1e-6}
     rest = {"duration": 1.0, "velocity": 0.0}
@@ -173,8 +173,8 @@ def test_a_drive_that_turns_back_is_judged_by_its_last_stage(klein):
         realization=0
     )
     assert found["regime"] == STICK_SLIP
-    assert found["judged_start"] == pytest.approx(6.0)
-    assert found["judged_end"] == pytest.approx(8.0)
+    assert found["window_start"] == pytest.approx(6.0)
+    assert found["window_end"] == pytest.approx(8.0)
     alone = mesoslip.regime(
         mesoslip.run(klein(**few | {"run__duration": 4.0}, drive={"stage": [back]}))
     ).isel(realization=0)
@@ -211,7 +211,7 @@ def test_command_and_run_say_the_same(klein, tmp_path, command):
     status, _, said = command("run", str(config), "-o", str(output), "--set", "run.realizations=3")
     assert status == 0
     assert (
-        sum(int(part.split()[0]) for part in said.splitlines()[1].split(": ")[1].split(", ")) == 3
+        sum(int(part.split()[0]) for part in said.splitlines()[-1].split(": ")[1].split(", ")) == 3
     )
     curve = tmp_path / "curve.nc"
     assert command("curve", str(config), "-o", str(curve))[0] == 0
@@ -223,7 +223,7 @@ def test_command_and_run_say_the_same(klein, tmp_path, command):
 def test_long_traces_are_thinned_out(klein, monkeypatch):
     tree = mesoslip.run(klein(contacts__count=300, contacts__delay=3e-3, run__duration=20.0))
     whole = mesoslip.regime(tree)
-    monkeypatch.setattr("mesoslip.analysis.regime.MOST_SAMPLES", 1500)
+    monkeypatch.setattr("mesoslip.analysis.regime.MAX_SAMPLES", 1500)
     thin = mesoslip.regime(tree)
     assert whole["regime"].values == thin["regime"].values
     assert float(thin["period"][0]) == pytest.approx(float(whole["period"][0]), rel=0.02)

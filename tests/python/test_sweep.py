@@ -142,7 +142,7 @@ def test_every_measure_of_a_run_with_known_slips():
         "mean_peak_force": 4e-6,
         "mean_force_drop": 1.5e-6,
         "mean_waiting_time": 1.0,
-        "mean_slip_time": 0.1,
+        "mean_slip_duration": 0.1,
         "slip_count": 2,
         "peak_velocity": 2.0,
         "smooth_time_share": 0.5,

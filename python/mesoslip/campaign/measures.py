@@ -52,8 +52,8 @@ class RunView:
         return values[np.isfinite(values)]
 
     @cached_property
-    def judged(self) -> dict[str, float]:
-        """The regime, and the numbers by which it is judged."""
+    def regime(self) -> dict[str, float]:
+        """The regime and the statistics that determine it."""
         data = regimes(self.tree)
         return {name: float(data[name].values[0]) for name in REGIME}
 
@@ -145,7 +145,7 @@ def _mean_waiting_time(run: RunView) -> float:
     return _mean(np.diff(starts))
 
 
-def _mean_slip_time(run: RunView) -> float:
+def _mean_slip_duration(run: RunView) -> float:
     return _mean(run.catalogue("slips", "end_time") - run.catalogue("slips", "start_time"))
 
 
@@ -194,9 +194,9 @@ def _mean_slip(name: str) -> Function:
     return lambda run: _mean(run.catalogue("slips", name))
 
 
-def _judged(name: str) -> Function:
-    """A number by which the regime is judged, in a part of the run of its own choice."""
-    return lambda run: run.judged[name]
+def _regime(name: str) -> Function:
+    """A statistic of the regime, in the evaluated window of the regime."""
+    return lambda run: run.regime[name]
 
 
 def _predicted(function: Callable[[xr.DataTree], float]) -> Function:
@@ -218,7 +218,7 @@ MEASURES: dict[str, Measure] = {
         ),
         Measure("mean_force_drop", _mean_slip("force_drop"), "N", "mean drop of the force"),
         Measure("mean_waiting_time", _mean_waiting_time, "s", "mean time between starts of slips"),
-        Measure("mean_slip_time", _mean_slip_time, "s", "mean duration of slips"),
+        Measure("mean_slip_duration", _mean_slip_duration, "s", "mean duration of slips"),
         Measure("slip_count", _slip_count, "1", "number of slips"),
         Measure("peak_velocity", _peak_velocity, "m s-1", "greatest velocity in slips"),
         Measure(
@@ -264,7 +264,7 @@ MEASURES: dict[str, Measure] = {
         *(
             Measure(
                 name,
-                _judged(name),
+                _regime(name),
                 meaning.units,
                 meaning.long_name,
                 flags=NAMES if name == "regime" else (),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show, time_of
-from mesoslip.quantities import column, number
+from mesoslip.quantities import column, number, with_error
 
 # Columns of the catalogue of slips: header, and unit in SI.
 COLUMNS = {
@@ -138,24 +139,27 @@ def avalanches(
 
 
 def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
-    """Show which motion it is: smooth, stick-slip, irregular, or not settled yet."""
+    """Print the regime of motion: smooth, stick-slip, irregular or transient."""
     from mesoslip.analysis import regime as regimes
-    from mesoslip.analysis.regime import NAMES, REGIME, judgements, told
+    from mesoslip.analysis.regime import NAMES, REGIME, results_of, summary
 
     data = regimes.regime(output)
-    judged = judgements(data)
+    results = results_of(data)
     if as_json:
-        names = [NAMES[one.regime] for one in judged]
+        names = [NAMES[one.regime] for one in results]
         columns = {str(name): data[name].values.tolist() for name in data.variables}
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         print_json([{**row, "regime": name} for row, name in zip(rows, names, strict=True)])
         return
-    for index, one in zip(data["realization"].values.tolist(), judged, strict=True):
-        if len(judged) > 1:
+    for index, one in zip(data["realization"].values.tolist(), results, strict=True):
+        if len(results) > 1:
             typer.echo(f"realization {index}")
         for name, meaning in REGIME.items():
-            if name != "regime":
-                show(name, getattr(one, name), meaning.units, meaning.attributes["long_name"])
-        typer.echo(one.told)
-    if len(judged) > 1:
-        typer.echo(told(judged))
+            if name == "regime" or name.endswith("_error"):
+                continue
+            error = getattr(one, f"{name}_error", math.nan)
+            value = with_error(getattr(one, name), error, meaning.units)
+            typer.echo(f"{name:22} {value:20} {meaning.long_name}")
+        typer.echo(one.summary)
+    if len(results) > 1:
+        typer.echo(summary(results))

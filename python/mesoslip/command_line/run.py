@@ -158,7 +158,7 @@ def _tell_results(results: Results, config: Config, path: Path) -> None:
         f"energy balance to {abs(told['energy_residual']):.0e}, "
         f"{told['wall_seconds']:.2f} s",
     )
-    say(f"{path}: {regime.told(list(regime.regimes_of_results(results)))}")
+    say(f"{path}: {regime.summary(list(regime.regimes_of_results(results)))}")
     if told["break_count"] == 0:
         say(f"{path}: no contact broke: the drive did not come far enough in this time")
     if told["audit"] != "passed":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.regime import judgements, regimes
+from mesoslip.analysis.regime import regimes, results_of
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
 from mesoslip.output.access import group_of
@@ -181,7 +181,7 @@ def motion(results: Results) -> Motion:
         numbers.append(("energy balance", f"to {abs(realization.energy_residual):.0e}"))
     if config.has_avalanches:
         numbers.insert(1, ("avalanches", str(realization.avalanche_count)))
-    told = judgements(regimes(tree))[0].told
+    told = results_of(regimes(tree))[0].summary
     return Motion(
         force,
         velocity,

@@ -143,7 +143,7 @@ def _about_trace(subject: Subject) -> Iterator[Block]:
 def verdict(subjects: Sequence[Subject]) -> Section | None:
     """Which motion each run shows."""
     told = [
-        (one, regime.told(regime.judgements(regime.regimes(one.tree, one.name))))
+        (one, regime.summary(regime.results_of(regime.regimes(one.tree, one.name))))
         for one in subjects
     ]
     blocks = tuple(

@@ -19,7 +19,7 @@ START = 0.03
 
 
 def force_curve(trees: Sequence[xr.DataTree]) -> Finding:
-    """C2: F(X) rises linearly, has a peak near F_s - Delta F_s, and swings less and less."""
+    """C2: F(X) rises linearly, peaks near F_s - Delta F_s, and oscillates with less amplitude."""
     (tree,) = trees
     contacts = configuration(tree).contacts
     data = tree.to_dataset()
@@ -41,7 +41,9 @@ def force_curve(trees: Sequence[xr.DataTree]) -> Finding:
                 "deviation from Nk X below F_s - 3 Delta F_s", bend, "1", "linear in the beginning"
             ),
             measured("peak over F_s", peak, "1", f"about {1 - width:g}"),
-            measured("each swing over that before", swings[1:] / swings[:-1], "1", "below 1"),
+            measured(
+                "each oscillation over the previous one", swings[1:] / swings[:-1], "1", "below 1"
+            ),
         ),
         verdict(
             bend < 0.01
@@ -81,7 +83,7 @@ def onset(trees: Sequence[xr.DataTree]) -> Finding:
             ),
         ),
         verdict(all(abs(exponent - power) < 0.1 for _, power, _, exponent in found), True),
-        "the cubic start is short: after tau = 2/(D1 D2) the term D2 x^2 is greater, and the force "
+        "the cubic start is short: after tau = 2/(D1 D2) the term D2 x^2 is larger, and the force "
         "falls faster than t^3",
     )
 
@@ -89,9 +91,11 @@ def onset(trees: Sequence[xr.DataTree]) -> Finding:
 CLAIMS = (
     Claim(
         "C2",
-        "F(X) rises linearly, peaks near F_s - Delta F_s, and swings less and less (S18)",
+        "F(X) rises linearly, peaks near F_s - Delta F_s, and oscillates with decreasing amplitude "
+        "(S18)",
         "linear within 1 % below F_s - 3 Delta F_s; peak within Delta F_s of that, with a "
-        "qualification if not within a quarter of it; each swing smaller than that before",
+        "qualification if not within a quarter of it; each oscillation smaller than the previous "
+        "one",
         ("S18.curve",),
         force_curve,
     ),

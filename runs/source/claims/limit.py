@@ -42,8 +42,9 @@ def engines(trees: Sequence[xr.DataTree]) -> Finding:
             measured("the same, N to infinity", drops[1], "uN", "the same"),
         ),
         verdict(abs(slope + 0.5) < 0.05 and abs(drops[0].mean() / drops[1].mean() - 1) < 0.01),
-        "under a block that goes forth and back the difference dies like N^(-1/2). After several "
-        "free slips they differ as realizations differ from each other: the motion is chaotic",
+        "under a prescribed slider that moves forth and back the difference decreases like "
+        "N^(-1/2). After several free slips the difference is that between realizations: the "
+        "motion is chaotic",
     )
 
 

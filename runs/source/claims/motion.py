@@ -44,7 +44,7 @@ def delay(trees: Sequence[xr.DataTree]) -> Finding:
     delays = [configuration(tree).contacts.delay * 1e3 for tree in trees]
     return Finding(
         tuple(
-            measured(f"swing over mean, delay {one:g} ms", swing(tree), "1", told)
+            measured(f"oscillation over mean, delay {one:g} ms", swing(tree), "1", told)
             for one, tree, told in zip(
                 delays, trees, ("smooth", "smooth", "stick-slip", "stick-slip"), strict=True
             )
@@ -70,12 +70,12 @@ def interaction(trees: Sequence[xr.DataTree]) -> Finding:
         count = configuration(tree).contacts.count
         parts = [size[owner == one].max() / count for one in range(tree.sizes["realization"])]
         largest.append(min(parts))
-        found.append(measured(f"swing over mean, xi = {strength:g}", swing(tree), "1", ""))
+        found.append(measured(f"oscillation over mean, xi = {strength:g}", swing(tree), "1", ""))
         found.append(measured(f"largest avalanche over N, xi = {strength:g}", parts, "1", ""))
     least = variable(trees[-1], "contact_force").min(axis=1)
     static = configuration(trees[-1]).contacts.static_force
     return Finding(
-        (*found, measured("least F over F_s, xi = 0.3", least / static, "1", "about 0")),
+        (*found, measured("minimum F over F_s, xi = 0.3", least / static, "1", "about 0")),
         verdict(
             all_are(trees[0], SMOOTH)
             and all_are(trees[-1], STICK_SLIP, IRREGULAR)
@@ -111,18 +111,26 @@ def velocity(trees: Sequence[xr.DataTree]) -> Finding:
                 for speed, one in zip(speeds, peaks, strict=False)
             ),
             *(
-                measured(f"way of the drive in a period at {speed:g} um/s", one, "um", "the same")
+                measured(
+                    f"displacement of the drive in a period at {speed:g} um/s",
+                    one,
+                    "um",
+                    "the same",
+                )
                 for speed, one in zip(speeds, ways, strict=False)
             ),
             *(
-                measured(f"swing over mean at {speed:g} um/s", swing(tree), "1", "smooth at high")
+                measured(
+                    f"oscillation over mean at {speed:g} um/s", swing(tree), "1", "smooth at high"
+                )
                 for speed, tree in zip(speeds[4:], fast, strict=True)
             ),
         ),
         verdict(is_universal and all_are(fast[-1], SMOOTH), True),
-        "over a decade of slow drives peaks and periods are the same within their scatter. On the "
-        "way to smooth sliding the swing grows at first: where the force falls with velocity "
-        "through the delay, the slider swings at Omega_S around steady sliding; in the end: "
+        "over a decade of slow drives peaks and periods agree within their scatter. With "
+        "increasing velocity the oscillation grows before sliding becomes smooth: where the force "
+        "falls with velocity through the delay, the slider oscillates at Omega_S around steady "
+        "sliding; in the end: "
         + "; ".join(
             f"{speed:g} um/s: {motion(tree)}" for speed, tree in zip(speeds[4:], fast, strict=True)
         ),
@@ -134,8 +142,8 @@ CLAIMS = (
         "C6",
         "without delay sliding becomes smooth although K << K*; with a long one the slider sticks "
         "and slips (S22)",
-        "after 400 s: swing below a tenth of the mean without delay, smooth at 0.1 ms, stick-slip "
-        "or irregular at 0.5 and 10 ms, in every realization",
+        "after 400 s: oscillation below a tenth of the mean without delay, smooth at 0.1 ms, "
+        "stick-slip or irregular at 0.5 and 10 ms, in every realization",
         tuple(f"claims/delay-{one}" for one in ("0", "0.1", "0.5", "10")),
         delay,
     ),
@@ -151,7 +159,7 @@ CLAIMS = (
     Claim(
         "C12",
         "F_d against v_d t does not depend on v_d in slow drives; at high v_d sliding is smooth",
-        "peaks and periods at 0.02 to 0.2 um/s scatter like realizations do; smooth at 300 um/s",
+        "peaks and periods at 0.02 to 0.2 um/s scatter as realizations do; smooth at 300 um/s",
         (
             *(
                 "claims/velocity-0.02",

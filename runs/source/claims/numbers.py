@@ -44,8 +44,8 @@ def derived_numbers(trees: Sequence[xr.DataTree]) -> Finding:
             all(abs(found[name] / value - 1) < ROUNDING for name, (value, _) in source.items()),
             abs(alpha / 2.21 - 1) > ROUNDING,
         ),
-        "all four agree to the digits given; alpha = (6 F_s Omega_S/(K v_d))^(1/3), given beside "
-        "them, is another number by the source's own formula",
+        "all four agree to the given digits; alpha = (6 F_s Omega_S/(K v_d))^(1/3) differs from "
+        "the source's number by its own formula",
     )
 
 
@@ -87,8 +87,8 @@ def instability(trees: Sequence[xr.DataTree]) -> Finding:
             measured("exponent of K* in Delta f_s", slope, "1", "-1"),
         ),
         verdict(abs(slope + 1) < 0.1 and bool(np.all((ratio > 1 / 3) & (ratio < 3))), True),
-        "K* goes nearly like 1/Delta f_s, but is 0.4 to 0.3 of the estimate, as a Gaussian law's "
-        "greatest density is 0.4/Delta f_s; the source's number is neither",
+        "K* is nearly proportional to 1/Delta f_s, but is 0.4 to 0.3 of the estimate, as the "
+        "maximum density of a Gaussian law is 0.4/Delta f_s; the source's number is neither",
     )
 
 

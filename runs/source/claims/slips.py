@@ -39,7 +39,7 @@ def first_spike(trees: Sequence[xr.DataTree]) -> Finding:
     return Finding(
         (
             measured("first peak", first * 1e6, "uN", "large"),
-            measured("greatest later peak over the first", later / first, "1", "smaller"),
+            measured("maximum later peak over the first", later / first, "1", "smaller"),
             measured("mean later peak over the first", mean / first, "1", "smaller"),
         ),
         verdict(bool(np.all(later < 0.9 * first))),
@@ -59,8 +59,8 @@ def slip_velocity(trees: Sequence[xr.DataTree]) -> Finding:
             measured("mean of later slips", later, "1", "about 1"),
         ),
         verdict(bool(np.all((first > 1 / 3) & (first < 3))), bool(np.any(later < 1 / 3))),
-        "the first slip, from contacts that are all relaxed, is that fast; later ones start from a "
-        "lower force and are several times slower",
+        "the first slip, from relaxed contacts, is that fast; later ones start from a lower force "
+        "and are several times slower",
     )
 
 
@@ -86,7 +86,7 @@ def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
     loading = np.array(period) - contacts.delay
     return Finding(
         (
-            measured("least F over F_s", least, "1", "0"),
+            measured("minimum F over F_s", least, "1", "0"),
             measured("most detached contacts over N", most, "1", "1"),
             measured(
                 "shortest period of F", np.array(period) * 1e3, "ms", f"about {scale * 1e3:.3g}"
@@ -99,8 +99,8 @@ def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
             and bool(np.all((loading > scale / 3) & (loading < 3 * scale))),
             True,
         ),
-        "in each swing contacts wait for the delay and then load for K/(Nk Omega_S): the period is "
-        "the sum of both, here mostly the delay",
+        "in each oscillation contacts wait for the delay and then load for K/(Nk Omega_S): the "
+        "period is the sum of both, here mostly the delay",
     )
 
 
@@ -115,7 +115,7 @@ def ringing(trees: Sequence[xr.DataTree]) -> Finding:
     after = of_each(short, lambda one: one["force_after"].values[0])
     return Finding(
         (
-            measured("least spring force, delay 100 ms", least * 1e6, "uN", "negative"),
+            measured("minimum spring force, delay 100 ms", least * 1e6, "uN", "negative"),
             measured("frequency while detached", slow, "1/s", f"Omega_S, {omega_s:.4g}"),
             measured("spring force after the slip, delay 0.1 ms", after * 1e6, "uN", "above F_b"),
             measured("frequency of the ringing then", fast, "1/s", f"Omega_L, {omega_l:.4g}"),
@@ -184,7 +184,7 @@ def periods(trees: Sequence[xr.DataTree]) -> Finding:
             all(early.min() > late.max() for early, late in pairwise(first)),
             rising[0] < 3 * rising[1],
         ),
-        "the first period, after the slip in which all contacts let go, shrinks with the width in "
+        "the first period, after the slip in which all contacts break, decreases with the width in "
         "every realization; the mean over a minute of stick-slip hardly depends on it",
     )
 
@@ -245,10 +245,10 @@ CLAIMS = (
     ),
     Claim(
         "C5",
-        "in a slip F falls to zero, all N contacts are detached, and F swings with a period of "
+        "in a slip F falls to zero, all N contacts are detached, and F oscillates with a period of "
         "order K/(Nk Omega_S) (S21)",
-        "least F below 1 % of F_s, more than 99 % detached, the period without the delay within a "
-        "factor 3",
+        "minimum F below 1 % of F_s, more than 99 % detached, the period without the delay within "
+        "a factor 3",
         ("claims/slip",),
         inside_a_slip,
     ),
@@ -263,7 +263,8 @@ CLAIMS = (
     Claim(
         "C8",
         "larger dispersion of the thresholds, shorter period (S23)",
-        "the period after the first slip shrinks with the width, ranges of realizations apart",
+        "the period after the first slip decreases with the width, with separate ranges of the "
+        "realizations",
         ("claims/dispersion-0.003", "claims/dispersion-0.01", "claims/dispersion-0.03"),
         periods,
     ),

@@ -77,7 +77,7 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
 
 
 def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
-    """Force of N contacts and of infinitely many under a block that goes forth and back, and the
+    """Force of N contacts and of infinitely many under a slider that moves forth and back, and the
     difference over N."""
     exact, *finite = trees
     figure = Figure(figsize=(6.5, 3))
@@ -125,6 +125,6 @@ FIGURES = {
     "limit": SourceFigure(
         ("limit-me", *(f"limit-{power}" for power in range(2, 7))),
         limit_of_many_contacts,
-        "force under a block that goes forth and back, and its difference to N to infinity",
+        "force under a slider that moves forth and back, and its difference from N to infinity",
     ),
 }

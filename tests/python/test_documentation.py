@@ -210,6 +210,18 @@ def type_page(page, workshop, command):
             raise
 
 
+@pytest.mark.usefixtures("workshop")
+def test_sentences_that_a_page_quotes_are_printed(command):
+    """Quotations of the page on motions are what the commands above them print."""
+    text = (DOCS / "how-to" / "which-motion.md").read_text(encoding="utf-8")
+    quoted = re.findall(r"^> .*(?:\n> .*)*", text, re.MULTILINE)
+    sentences = [" ".join(one.replace("\n>", "").removeprefix("> ").split()) for one in quoted]
+    assert len(sentences) == 2
+    printed = "".join(command(name, "klein.toml")[1] for name in ("info", "curve"))
+    for sentence in sentences:
+        assert sentence in printed
+
+
 def check_targets(targets):
     """Whether make knows what a page tells it to make."""
     known = (ROOT / "Makefile").read_text() + (ROOT / "runs" / "campaign.mk").read_text()

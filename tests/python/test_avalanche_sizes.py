@@ -29,7 +29,7 @@ from mesoslip.analysis.avalanche_sizes import (
 )
 from mesoslip.analysis.avalanche_sizes.tally import tally_of
 from mesoslip.errors import MesoslipError
-from mesoslip.plots import avalanches as avalanche_plots
+from mesoslip.plots.views import avalanches as avalanche_view
 from scipy import optimize, special, stats
 
 # One form only, the plain law with an exponential cutoff.
@@ -733,8 +733,8 @@ def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
         assert math.isfinite(answer[f"{law}_ratio"])
 
     run = mesoslip.open_output(output)
-    title = avalanche_plots.distribution(run).axes[0].get_title("left")
+    title = mesoslip.plot(run, view="avalanches").axes[0].get_title("left")
     assert "rejected" not in title
-    assert f"from $s$ = {tree['min_fitted_size']:g} on" in title
-    monkeypatch.setattr(avalanche_plots, "fit_power_law", lambda sizes: fit_plain(sizes, 1))
-    assert "rejected" in avalanche_plots.distribution(run).axes[0].get_title("left")
+    assert f"fitted to $s$ ≥ {tree['min_fitted_size']:g}, " in title
+    monkeypatch.setattr(avalanche_view, "fit_power_law", lambda sizes: fit_plain(sizes, 1))
+    assert "rejected" in mesoslip.plot(run, view="avalanches").axes[0].get_title("left")

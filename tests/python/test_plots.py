@@ -12,8 +12,11 @@ import xarray as xr
 from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
-from mesoslip.plots import run as run_plots
-from mesoslip.plots.run import Extent
+from mesoslip.output.kinds import KINDS as OUTPUTS
+from mesoslip.plots import lines
+from mesoslip.plots.extent import MAX_PARTS, Extent
+from mesoslip.plots.views import VIEWS, names_of_views
+from mesoslip.plots.views.layers import layer_motion
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +54,27 @@ def test_pictures_of_the_theory(klein):
         assert isinstance(mesoslip.plot(tree), Figure)
 
 
-def test_an_unknown_view_is_told(old):
-    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose of run, avalanches, "):
+def test_an_unknown_view_is_an_error(old):
+    with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose from run, avalanches, "):
         mesoslip.plot(old, view="foo")
+
+
+def test_views_are_complete():
+    """A view that lacks its kind or half of a comparison, and a kind without a default view."""
+    assert set(OUTPUTS) == {view.kind for view in VIEWS}
+    for kind in OUTPUTS:
+        assert names_of_views(kind)[0] == kind
+    options = {"realization", "start, end", "x", "snapshot", "measure"}
+    for view in VIEWS:
+        assert view.options <= options, view.name
+        assert (view.compare is None) == (view.compare_panel is None), view.name
+        assert view.summary, view.name
+
+
+def test_views_of_one_name_are_for_different_outputs(runs):
+    """Every output has exactly one view of a name."""
+    for name, tree in runs.items():
+        assert sum(view.name == "run" and view.applies(tree) for view in VIEWS) == 1, name
 
 
 def many_samples(count, realizations=1):
@@ -76,22 +97,22 @@ def many_samples(count, realizations=1):
 @pytest.mark.parametrize("against", ["time", "displacement"])
 def test_a_line_shows_the_extremes_of_many_samples(monkeypatch, block, against):
     """Far fewer points than samples, all of them samples, none of the spikes lost."""
-    monkeypatch.setattr(run_plots, "BLOCK", block)
+    monkeypatch.setattr(lines, "BLOCK", block)
     tree = many_samples(200_000)
     extent = Extent(against=against)
-    x, y = run_plots.line(tree, (extent.abscissa[0], "spring_force"), extent, (0.0, 10.0))
-    assert len(x) <= 5 * run_plots.MOST_PARTS + 2 * 200_000 / block
-    along, force = tree[extent.abscissa[0]].values.ravel(), tree["spring_force"].values[0]
+    x, y = lines.line(tree, (extent.horizontal[0], "spring_force"), extent, (0.0, 10.0))
+    assert len(x) <= 5 * MAX_PARTS + 2 * 200_000 / block
+    along, force = tree[extent.horizontal[0]].values.ravel(), tree["spring_force"].values[0]
     assert y.max() == force.max()
     assert set(zip(x, y, strict=True)) <= set(zip(along, force, strict=True))
     # Of the samples in each part of the time, which here are as many, the least and the greatest.
-    for part in (0, 17, run_plots.MOST_PARTS // 3, run_plots.MOST_PARTS - 1):
+    for part in (0, 17, MAX_PARTS // 3, MAX_PARTS - 1):
         inside = slice(part * 50, (part + 1) * 50)
         near = (x >= along[inside].min()) & (x <= along[inside].max())
         assert y[near].min() <= force[inside].min()
         assert y[near].max() >= force[inside].max()
     # A window with few samples shows each.
-    _, values = run_plots.line(tree, ("time", "spring_force"), extent, (1.0, 1.1))
+    _, values = lines.line(tree, ("time", "spring_force"), extent, (1.0, 1.1))
     times = tree["time"].values
     np.testing.assert_array_equal(values, force[(times >= 1.0) & (times <= 1.1)])
 
@@ -112,7 +133,7 @@ def test_what_is_not_drawn_is_not_read():
     lazy = xr.core.indexing.LazilyIndexedArray(Watched())
     data["spring_force"] = xr.Variable(("realization", "time"), lazy)
     data["velocity"] = xr.Variable(("realization", "time"), lazy)
-    run_plots.draw_series(Figure().subplots(), xr.DataTree(data), "spring_force", window=(2.0, 2.1))
+    lines.line(xr.DataTree(data), ("time", "spring_force"), Extent(), (2.0, 2.1))
     assert len(read) == 1
     places = np.arange(100_000)[read[0].tuple[-1]]
     assert len(places) < 1100
@@ -284,9 +305,11 @@ def test_several_outputs_say_how_they_differ(runs):
         (["several"], {"realization": 3}, "no realization 3; the last one is 2"),
         (["plain"], {"start": 3.0}, "from 3 s on: the run goes from 0 s to 2.2 s"),
         (["plain"], {"start": 2.0, "end": 1.0}, "2 s is not before 1 s"),
-        (["plain"], {"x": "force"}, "choose of time, displacement, drive"),
+        (["plain"], {"x": "force"}, "choose from time, displacement, drive"),
         (["plain"], {"view": "layers"}, "output.layers = true"),
-        (["plain", "slow"], {"view": "lattice"}, "of one output, not of several"),
+        (["plain", "slow"], {"view": "lattice"}, "'lattice' shows one output at a time"),
+        (["plain"], {"snapshot": 1}, "snapshot: no option of the view 'run'"),
+        (["layered"], {"view": "layers", "x": "drive"}, "x: no option of the view 'layers'"),
         (["plain", "slow"], {"view": "avalanches"}, "has no avalanches"),
         ([], {}, "no output"),
     ],
@@ -309,7 +332,7 @@ def test_what_is_of_no_known_command_is_told(runs):
 
 def test_waves_are_the_velocities_of_the_layers(runs):
     tree = runs["layered"]
-    times, velocity = run_plots.layer_motion(tree, Extent(), (1.9, 2.0))
+    times, velocity = layer_motion(tree, Extent(), (1.9, 2.0))
     data = tree["layer_displacement"].isel(realization=0).sel(time=slice(1.9, 2.0))
     moved = np.sum(velocity * np.diff(times)[:, None], axis=0)
     np.testing.assert_allclose(moved, (data[-1] - data[0]).values, rtol=1e-10)
@@ -343,8 +366,10 @@ def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein):
     none = mesoslip.plot(mesoslip.onset(klein(slider__stiffness=1e6)))
     assert "there is no onset" in none.axes[0].texts[0].get_text()
     # A curve and an onset have neither realizations nor times.
-    with pytest.raises(mesoslip.FileError, match="no realizations"):
+    with pytest.raises(mesoslip.ConfigError, match=r"realization: no option .* onset of slip"):
         mesoslip.plot(tree, realization=1)
+    with pytest.raises(mesoslip.FileError, match="is an onset of slip: it has no view 'lattice'"):
+        mesoslip.plot(tree, view="lattice")
 
 
 @pytest.mark.parametrize("kind", ["rigid, lattice", "quasistatic, lattice"])

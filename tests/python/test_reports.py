@@ -12,7 +12,9 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from kinds import KINDS, configuration
-from mesoslip.quantities import with_unit
+from mesoslip.output.kinds import KINDS as OUTPUTS
+from mesoslip.quantities import column
+from mesoslip.reports.sections import SECTIONS
 
 MOST_BYTES = 3_000_000
 # Elements of HTML that have no end.
@@ -73,17 +75,21 @@ def klein_run():
     return mesoslip.run(config)
 
 
+def test_every_kind_of_output_has_sections():
+    assert set(SECTIONS) == set(OUTPUTS)
+
+
 def test_a_report_of_kleins_run(klein_run, tmp_path):
     text, page = written(klein_run, tmp_path / "klein.html")
     assert page.tags.count("svg") == 2
     count = klein_run["slips"].sizes["slip"]
     assert f"{count} slips" in page.words
-    for row in ("contacts.delay", "1 ms", "500 µs", "Energy", "work done by the drive", "100 %"):
+    for row in ("contacts.delay", "1 ms", "500 µs", "Energy", "work done by the drive", "100"):
         assert row in page.words
     assert klein_run.attrs["commit"] in page.words
     assert any(word.startswith("Stick-slip: force amplitude") for word in page.words)
     drop = np.mean(klein_run["slips/force_drop"].values) * 1e6
-    assert f"{drop:.4g} µN" in page.words
+    assert page.words[page.words.index("force drop (µN)") + 1] == f"{drop:.2f}"
     # The whole configuration, to copy.
     assert klein_run.attrs["configuration"] in html.unescape(text)
     # Made again it is the same.
@@ -163,21 +169,23 @@ def test_a_report_of_a_sweep(tmp_path):
     assert "12 runs: 12 ok." in page.words
     assert page.tags.count("svg") == 2
     assert "50 N/m, 100 N/m, 200 N/m" in page.words
-    mean = float(tree["mean_force"].mean())
-    assert with_unit(mean, "N") in page.words
+    forces = [float(tree["mean_force"].reduce(one)) for one in (np.min, np.mean, np.max)]
+    shown = column(forces, "N")
+    row = page.words.index(shown.head("mean_force"))
+    assert page.words[row + 1 : row + 4] == [shown.text(one) for one in forces]
     # Fewer than there should be stand out.
     tree["status"].values[0, 0, 0] = 2
     text, page = written(tree, tmp_path / "missing.html")
     assert "12 runs: 11 ok, 1 missing." in page.words
     assert text.count('class="warns"') == 1
-    with pytest.raises(mesoslip.FileError, match="one at a time"):
+    with pytest.raises(mesoslip.FileError, match="one output at a time"):
         mesoslip.plot([tree, tree])
 
 
 def test_outputs_side_by_side(klein_run, tmp_path, klein):
     other = mesoslip.run(klein(contacts__delay=2e-3, run__duration=4.0))
     _, page = written([klein_run, other], tmp_path / "both.html")
-    assert "What differs" in page.words
+    assert "Differences" in page.words
     place = page.words.index("contacts.delay")
     assert page.words[place + 1 : place + 3] == ["1 ms", "2 ms"]
     with pytest.raises(mesoslip.FileError, match=r"is a run.* is a force curve"):

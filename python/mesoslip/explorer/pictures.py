@@ -17,15 +17,10 @@ from mesoslip.errors import MesoslipError
 from mesoslip.output.access import group_of
 from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
-from mesoslip.plots.run import (
-    NAMES,
-    UNITS,
-    Extent,
-    force_of,
-    largest_slip,
-    line,
-    slip_window,
-)
+from mesoslip.plots.close_up import largest_slip, slip_window
+from mesoslip.plots.extent import Extent
+from mesoslip.plots.lines import line
+from mesoslip.plots.trace import NAMES, UNITS, force_of
 from mesoslip.quantities import Scale, scale_for, with_unit
 from mesoslip.simulation.runner import Results
 from mesoslip.theory.force_curve import ForceCurve

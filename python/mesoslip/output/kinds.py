@@ -1,4 +1,8 @@
-"""Which command an output is of."""
+"""Kinds of outputs: one for each command.
+
+A new kind is a line here, its default view in `mesoslip.plots.views` (of the same name), and its
+sections in `mesoslip.reports.sections`.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +15,13 @@ from mesoslip.errors import FileError
 
 
 class Kind(NamedTuple):
-    """A kind of output: what it is called, and what tells it from others."""
+    """A kind of output: its name with an article, and whether an output is of it."""
 
-    told: str
+    description: str
     is_of: Callable[[xr.DataTree], bool]
 
 
-# Outputs of commands, the first that fits.
+# The kind of an output is the first that fits.
 KINDS = {
     "run": Kind("a run", lambda tree: "spring_force" in tree.data_vars),
     "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
@@ -28,7 +32,7 @@ KINDS = {
 
 
 def kind_of(tree: xr.DataTree) -> str:
-    """Which kind an output is of, a name of `KINDS`.
+    """The kind of an output, a name in `KINDS`.
 
     Raises
     ------
@@ -38,12 +42,12 @@ def kind_of(tree: xr.DataTree) -> str:
     for name, kind in KINDS.items():
         if kind.is_of(tree):
             return name
-    *others, last = (kind.told for kind in KINDS.values())
+    *others, last = (kind.description for kind in KINDS.values())
     raise FileError(f"the output is neither {', '.join(others)} nor {last}: it has no picture")
 
 
 def kind_of_all(trees: Sequence[xr.DataTree], names: Sequence[str]) -> str:
-    """Which kind outputs are of that go into one picture, or on one page.
+    """The kind of outputs that go into one picture, or on one page.
 
     Raises
     ------
@@ -52,6 +56,6 @@ def kind_of_all(trees: Sequence[xr.DataTree], names: Sequence[str]) -> str:
     """
     kinds = {kind_of(tree): name for tree, name in zip(trees, names, strict=True)}
     if len(kinds) > 1:
-        found = ", ".join(f"{name} is {KINDS[kind].told}" for kind, name in kinds.items())
+        found = ", ".join(f"{name} is {KINDS[kind].description}" for kind, name in kinds.items())
         raise FileError(f"outputs of different commands do not go together: {found}")
     return next(iter(kinds))

@@ -21,7 +21,7 @@ def times_of(tree: xr.DataTree) -> Array:
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of a realization in the order of their times [s], which need not be in memory."""
+    """Samples of a realization in order of time [s]; those in a file are read when needed."""
 
     data: xr.Dataset
     dimension: str
@@ -29,7 +29,7 @@ class Samples:
     start: int = 0
 
     def inside(self, window: tuple[float, float]) -> tuple[int, int]:
-        """Places of the first sample of a window of time, and of the first one after it."""
+        """Indices of the first sample of a window of time, and of the first one after it."""
         first = np.searchsorted(self.times, window[0], "left")
         return int(first), int(np.searchsorted(self.times, window[1], "right"))
 
@@ -37,21 +37,21 @@ class Samples:
         """Values of a variable, or the times."""
         if name == "time":
             return self.times[first:after]
-        places = slice(self.start + first, self.start + after)
-        values: Array = self.data[name].isel({self.dimension: places}).values.astype(float)
+        chosen = slice(self.start + first, self.start + after)
+        values: Array = self.data[name].isel({self.dimension: chosen}).values.astype(float)
         return values
 
 
 def samples(tree: xr.DataTree, realization: int = 0) -> list[Samples]:
-    """Samples of a realization: those of the whole trace, and the finer ones of its slips."""
+    """Samples of a realization: those of the trace, and the finer ones of its slips."""
     root = tree.to_dataset().isel(realization=realization)
     parts = [Samples(root, "time", root["time"].values)]
     if "slip_traces" in tree.children:
         fine = group_of(tree, "slip_traces")
         times, start = fine["sample_time"].values, 0
         if tree.sizes["realization"] > 1:
-            places = fine["realization_index"].values
-            start, end = np.searchsorted(places, (realization, realization + 1))
+            owners = fine["realization_index"].values
+            start, end = np.searchsorted(owners, (realization, realization + 1))
             times = times[start:end]
         parts.append(Samples(fine, "sample", times, int(start)))
     return parts

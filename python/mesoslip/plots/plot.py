@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.inputs import OutputLike, opened, several
-from mesoslip.plots import avalanches
+from mesoslip.plots.animation import animate
 from mesoslip.plots.draw import draw
-from mesoslip.plots.run import Extent
+from mesoslip.plots.extent import Extent
 from mesoslip.plots.style import save
+from mesoslip.plots.views.base import Options
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,8 +38,8 @@ def plot(
 
     Of a run: force, velocity and detached contacts, with the largest slip beside them; of a slider
     without inertia: force and avalanches; of a force curve: the force and its slope; of an onset of
-    slip: the drop of the spring force. The title says what the run changes from its base, the
-    legend of several outputs how they differ.
+    slip: the drop of the spring force. The title has the run's changes from its base, the legend of
+    several outputs their differences.
 
     Parameters
     ----------
@@ -49,8 +50,9 @@ def plot(
         animation of the lattice: of the avalanche that spreads before a snapshot, or of all
         snapshots.
     view
-        Another picture of a run: "avalanches" for their sizes, "lattice" for a snapshot, "layers"
-        for the waves in an elastic slider, "response" for steady forces, velocity steps and holds.
+        View of a run, such as "avalanches" for their sizes, "lattice" for a snapshot, "layers" for
+        the waves in an elastic slider, "response" for steady forces, velocity steps and holds; or
+        measure of a sweep.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
     realization
@@ -76,22 +78,22 @@ def plot(
     FileError
         If an output cannot be read or lacks the data of the view, or the picture cannot be written.
     ConfigError
-        If there is no such view or horizontal axis.
+        If there is no such view or horizontal axis, or the view does not have one of the options.
     """
     outputs = several(output)
     if not outputs:
         raise FileError("there is no output to draw")
-    extent = Extent(realization, start, end, x)
+    options = Options(Extent(realization, start, end, x), snapshot)
     path = None if file is None else as_path(file)
-    is_moving = path is not None and path.suffix == ".gif"
-    if is_moving and (view not in {None, "lattice"} or len(outputs) > 1):
-        what = "of one output" if len(outputs) > 1 else f"not {view!r}"
-        raise FileError(f"{path}: only the lattice can be shown in motion, {what}")
+    is_animation = path is not None and path.suffix == ".gif"
+    if is_animation and (view not in {None, "lattice"} or len(outputs) > 1):
+        reason = "of one output" if len(outputs) > 1 else f"not the view {view!r}"
+        raise FileError(f"{path}: a .gif is an animation of the lattice, {reason}")
     with ExitStack() as stack:
         trees, names = opened(outputs, stack)
-        if path is not None and is_moving:
-            return avalanches.animate(trees[0], path, snapshot)
-        drawn = draw(trees, names, view, snapshot, extent=extent, figure=figure, axes=ax)
+        if path is not None and is_animation:
+            return animate(trees[0], path, snapshot)
+        drawn = draw(trees, names, view, options, figure=figure, axes=ax)
         if path is not None:
             save(drawn, path)
     return drawn

@@ -1,1 +1,1 @@
-"""Reports: a page that tells all that an output holds."""
+"""Reports: pages about outputs."""

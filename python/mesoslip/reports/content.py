@@ -1,4 +1,4 @@
-"""What a report is made of: sections of texts, tables and pictures, however the page looks."""
+"""Contents of a report: sections of texts, tables and pictures, whatever their appearance."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from mesoslip.configuration.config import Config
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import Canvas, styled
 
-# A page shows fewer dots than a picture that is printed.
+# Intervals of a line in each of which the page shows the extremes: fewer than in print.
 PARTS = 1000
-# By how much pictures may be larger than they are printed.
-MAGNIFIED = 1.25
-# Dots of what a picture draws as dots.
+# Maximum width of a picture on the page over that in print.
+MAX_MAGNIFICATION = 1.25
+# Resolution of the rasterized parts of pictures.
 DOTS_PER_INCH = 150
-# Nothing of the machine or the time, so that a report is the same when it is made again.
+# No metadata of the machine or the time, so that the same outputs give the same page.
 NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What a report is about: an output, and the name by which the page calls it."""
+    """An output in a report, with its name on the page."""
 
     name: str
     tree: xr.DataTree
@@ -42,7 +42,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph; one that warns stands out."""
+    """A paragraph; a warning is highlighted."""
 
     text: str
     warns: bool = False
@@ -50,7 +50,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: its head, its rows, all texts, and what is said below it."""
+    """A table of texts: its head, its rows, and a note below it."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -59,7 +59,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as the text of an SVG, and what it shows."""
+    """A picture as an SVG, with its caption."""
 
     svg: str
     caption: str
@@ -67,7 +67,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Source:
-    """A text as it stands in a file, folded away."""
+    """The text of a file, folded."""
 
     title: str
     text: str
@@ -84,23 +84,23 @@ class Section:
     blocks: tuple[Block, ...] = field(default=())
 
 
-# What writes a section about an output, or about several of one kind side by side; None if there
-# is nothing to say.
+# Writes a section about an output, or about several of one kind side by side; None if the section
+# would be empty.
 Writer = Callable[[Sequence[Subject]], Section | None]
 
 
 def drawn(caption: str, draw: Callable[[], Canvas]) -> Picture:
-    """A picture of what is drawn.
+    """A figure as a picture of a page.
 
     Parameters
     ----------
     caption
-        What it shows; also what is read to those who do not see it.
+        Its caption, also its text for screen readers.
     draw
-        What draws it.
+        Draws the figure.
     """
     stream = io.StringIO()
-    # The names of a picture's parts are those of its caption, which no other one of the page has.
+    # Identifiers in the SVG derive from the caption, which is unique on a page.
     with styled(), mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": caption}):
         figure = draw()
         whole = figure if isinstance(figure, Figure) else figure.figure
@@ -109,12 +109,12 @@ def drawn(caption: str, draw: Callable[[], Canvas]) -> Picture:
             one.set_rasterized(True)
         whole.savefig(stream, format="svg", dpi=DOTS_PER_INCH, metadata=NO_METADATA)
     text = stream.getvalue()
-    # Named after their places, which the layout tells to rounding, and not always to the bit.
+    # Matplotlib names them after their positions, which the layout gives to rounding only.
     own = hashlib.sha256(caption.encode("utf-8", "backslashreplace")).hexdigest()[:8]
     for number, name in enumerate(re.findall(r'<clipPath id="(p[0-9a-f]+)"', text)):
         text = text.replace(name, f"clip-{own}-{number}")
-    # As wide as the page where that is not much more than the picture.
-    width = MAGNIFIED * whole.get_figwidth()
+    # As wide as the page, up to a maximum magnification.
+    width = MAX_MAGNIFICATION * whole.get_figwidth()
     size = re.compile(r"<svg [^>]*?(?= xmlns| viewBox)", re.DOTALL)
     text = size.sub(f'<svg style="width: 100%; max-width: {width:g}in"', text, count=1)
     return Picture(text[text.index("<svg") :], caption)

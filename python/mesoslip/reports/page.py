@@ -1,4 +1,4 @@
-"""A report as one page that needs nothing else: no network, no scripts."""
+"""A report as one self-contained page: no network, no scripts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def page(subjects: Sequence[Subject]) -> str:
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    # What a block is made of tells how it looks.
+    # The template asks for the type of a block.
     environment.tests |= {
         kind.__name__.lower(): lambda block, kind=kind: isinstance(block, kind)
         for kind in (content.Text, content.Table, content.Picture, content.Source)
@@ -57,12 +57,12 @@ def page(subjects: Sequence[Subject]) -> str:
 
 
 def write(subjects: Sequence[Subject], path: Path) -> None:
-    """Write the page; its name appears only when it is whole.
+    """Write the page; the file appears only when it is complete.
 
     Raises
     ------
     FileError
-        If the outputs do not go together, or it cannot be written.
+        If the outputs are of different commands, or the page cannot be written.
     """
     text = page(subjects)
     with written_whole(path) as part:

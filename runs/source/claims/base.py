@@ -1,4 +1,4 @@
-"""What a claim of the source is, and what becomes of it: measured quantities and a verdict."""
+"""Claims of the source, and their judgements: measured quantities and a verdict."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mesoslip.quantities import with_error
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Verdict(StrEnum):
-    """What the runs say of a claim."""
+    """The verdict of the runs on a claim."""
 
     HOLDS = "holds"
     QUALIFIED = "holds with a qualification"
@@ -24,14 +25,14 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Measured:
-    """A quantity that was measured, beside what the source says of it."""
+    """A measured quantity in SI, beside the source's statement about it."""
 
     name: str
     values: tuple[float, ...]
-    """One for each realization; a single one of what has none."""
+    """One for each realization; a single one of a quantity without realizations."""
     unit: str
     source: str
-    """What the source says, as it says it."""
+    """The source's statement."""
 
     @property
     def mean(self) -> float:
@@ -43,20 +44,17 @@ class Measured:
         return float(np.std(self.values, ddof=1)) if len(self.values) > 1 else None
 
     def __str__(self) -> str:
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        if self.spread is None:
-            return f"{self.mean:.4g}{unit}"
-        return f"{self.mean:.4g} ± {self.spread:.2g}{unit}"
+        return with_error(self.mean, 0.0 if self.spread is None else self.spread, self.unit)
 
 
 def measured(name: str, values: ArrayLike, unit: str, source: str) -> Measured:
-    """A quantity that was measured, of one value or of one for each realization."""
+    """A measured quantity, with one value or one for each realization, in SI."""
     return Measured(name, tuple(np.atleast_1d(np.asarray(values, dtype=float))), unit, source)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of a claim."""
+    """The measured quantities of a claim, and the verdict."""
 
     measured: tuple[Measured, ...]
     verdict: Verdict
@@ -68,7 +66,7 @@ Judge = Callable[[Sequence["xr.DataTree"]], Finding]
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the source, the runs that can decide it, and how they do."""
+    """A claim of the source, the runs that decide it, and the criterion."""
 
     name: str
     statement: str
@@ -80,14 +78,14 @@ class Claim:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim, and what was found of it."""
+    """A claim and its finding."""
 
     claim: Claim
     finding: Finding
 
 
 def verdict(holds: bool, qualified: bool = False) -> Verdict:
-    """Holds or fails; what holds may do so with a qualification."""
+    """The verdict of a claim that holds or not, perhaps with a qualification."""
     if not holds:
         return Verdict.FAILS
     return Verdict.QUALIFIED if qualified else Verdict.HOLDS

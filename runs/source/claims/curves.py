@@ -23,32 +23,38 @@ def force_curve(trees: Sequence[xr.DataTree]) -> Finding:
     (tree,) = trees
     contacts = configuration(tree).contacts
     data = tree.to_dataset()
-    way = data["displacement"].values / contacts.break_stretch
+    stretch = data["displacement"].values / contacts.break_stretch
     force = data["contact_force"].values / contacts.static_force
     width = contacts.threshold.relative_width
-    early = (way > 0) & (way < 1 - 3 * width)
-    bend = np.max(np.abs(force[early] / way[early] - 1))
+    early = (stretch > 0) & (stretch < 1 - 3 * width)
+    deviation = np.max(np.abs(force[early] / stretch[early] - 1))
     (peaks,) = argrelextrema(force, np.greater)
     (valleys,) = argrelextrema(force, np.less)
     count = min(len(peaks), len(valleys), 4)
     if count == 0:
         return Finding((), verdict(False), "the force has no peak")
-    swings = force[peaks[:count]] - force[valleys[:count]]
+    oscillations = force[peaks[:count]] - force[valleys[:count]]
     peak = force[peaks[0]]
     return Finding(
         (
             measured(
-                "deviation from Nk X below F_s - 3 Delta F_s", bend, "1", "linear in the beginning"
+                "deviation from Nk X below F_s - 3 Delta F_s",
+                deviation,
+                "1",
+                "linear in the beginning",
             ),
             measured("peak over F_s", peak, "1", f"about {1 - width:g}"),
             measured(
-                "each oscillation over the previous one", swings[1:] / swings[:-1], "1", "below 1"
+                "each oscillation over the previous one",
+                oscillations[1:] / oscillations[:-1],
+                "1",
+                "below 1",
             ),
         ),
         verdict(
-            bend < 0.01
+            deviation < 0.01
             and abs(peak - (1 - width)) < width
-            and bool(np.all(swings[1:] < swings[:-1])),
+            and bool(np.all(oscillations[1:] < oscillations[:-1])),
             abs(peak - (1 - width)) > width / 4,
         ),
         f"the peak is at F_s - {(1 - peak) / width:.2f} Delta F_s",
@@ -56,7 +62,7 @@ def force_curve(trees: Sequence[xr.DataTree]) -> Finding:
 
 
 def onset(trees: Sequence[xr.DataTree]) -> Finding:
-    """C14: the force drops like t^3 if contacts break one after another, like t^2 in a melt."""
+    """C14: the force drops like t^3 with sequential breaking, like t^2 with instant melting."""
     found, ends = [], []
     for tree in trees:
         width = configuration(tree).contacts.threshold.relative_width

@@ -28,8 +28,7 @@ def engines(trees: Sequence[xr.DataTree]) -> Finding:
     means = np.array([one.mean() for one in errors])
     slope = np.polyfit(np.log(counts), np.log(means), 1)[0]
     drops = [
-        of_each(tree, lambda one: one["force_drop"].values[0]) * 1e6
-        for tree in (klein, klein_infinite)
+        of_each(tree, lambda one: one["force_drop"].values[0]) for tree in (klein, klein_infinite)
     ]
     return Finding(
         (
@@ -38,8 +37,8 @@ def engines(trees: Sequence[xr.DataTree]) -> Finding:
                 for count, one in zip(counts, errors, strict=True)
             ),
             measured("exponent of the difference in N", slope, "1", "-1/2 expected"),
-            measured("drop in Klein's first slip, N = 4080", drops[0], "uN", "the same"),
-            measured("the same, N to infinity", drops[1], "uN", "the same"),
+            measured("drop in Klein's first slip, N = 4080", drops[0], "N", "the same"),
+            measured("drop in Klein's first slip, N → ∞", drops[1], "N", "the same"),
         ),
         verdict(abs(slope + 0.5) < 0.05 and abs(drops[0].mean() / drops[1].mean() - 1) < 0.01),
         "under a prescribed slider that moves forth and back the difference decreases like "

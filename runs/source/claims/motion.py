@@ -1,4 +1,4 @@
-"""Claims of which motion it is: C6, C10, C12."""
+"""Claims of the regime of the motion: C6, C10, C12."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ SMOOTH, STICK_SLIP, IRREGULAR = 0, 1, 2
 
 
 def motion(tree: xr.DataTree) -> str:
-    """In words, what the realizations of a run do in the end."""
+    """Regimes of the realizations of a run at its end, in words."""
     data = regimes(tree)["regime"]
     meanings = data.attrs["flag_meanings"].split()
     found, counts = np.unique(data.values, return_counts=True)
     return ", ".join(f"{count} {meanings[code]}" for code, count in zip(found, counts, strict=True))
 
 
-def all_are(tree: xr.DataTree, *wanted: int) -> bool:
-    """Whether all realizations move in one of the ways that are wanted."""
-    return bool(np.isin(regimes(tree)["regime"].values, wanted).all())
+def all_are(tree: xr.DataTree, *expected: int) -> bool:
+    """Whether all realizations are in one of some regimes."""
+    return bool(np.isin(regimes(tree)["regime"].values, expected).all())
 
 
-def swing(tree: xr.DataTree) -> list[float]:
-    """Swing of the spring force over its mean in the last fifth of each realization."""
+def peak_to_peak(tree: xr.DataTree) -> list[float]:
+    """Peak-to-peak spring force over its mean in the last fifth of each realization."""
     force = variable(tree, "spring_force")
     end = force[:, -force.shape[1] // 5 :]
     return [float(np.ptp(one) / abs(one.mean())) for one in end]
 
 
 def delay(trees: Sequence[xr.DataTree]) -> Finding:
-    """C6: without delay the slider comes to slide smoothly, with a long one it sticks and slips."""
+    """C6: without delay the slider ends in smooth sliding, with a long one in stick-slip."""
     delays = [configuration(tree).contacts.delay * 1e3 for tree in trees]
     return Finding(
         tuple(
-            measured(f"oscillation over mean, delay {one:g} ms", swing(tree), "1", told)
-            for one, tree, told in zip(
+            measured(f"oscillation over mean, delay {one:g} ms", peak_to_peak(tree), "1", source)
+            for one, tree, source in zip(
                 delays, trees, ("smooth", "smooth", "stick-slip", "stick-slip"), strict=True
             )
         ),
         verdict(
-            max(swing(trees[0])) < 0.1
+            max(peak_to_peak(trees[0])) < 0.1
             and all_are(trees[1], SMOOTH)
             and all(all_are(tree, STICK_SLIP, IRREGULAR) for tree in trees[2:])
         ),
@@ -60,7 +60,7 @@ def delay(trees: Sequence[xr.DataTree]) -> Finding:
 
 
 def interaction(trees: Sequence[xr.DataTree]) -> Finding:
-    """C10: interaction widens stick-slip; at 0.3 one avalanche takes the whole system."""
+    """C10: interaction widens stick-slip; at 0.3 one avalanche spans the whole system."""
     found, largest = [], []
     for tree in trees:
         interaction = configuration(tree).interaction
@@ -70,17 +70,19 @@ def interaction(trees: Sequence[xr.DataTree]) -> Finding:
         count = configuration(tree).contacts.count
         parts = [size[owner == one].max() / count for one in range(tree.sizes["realization"])]
         largest.append(min(parts))
-        found.append(measured(f"oscillation over mean, xi = {strength:g}", swing(tree), "1", ""))
+        found.append(
+            measured(f"oscillation over mean, xi = {strength:g}", peak_to_peak(tree), "1", "")
+        )
         found.append(measured(f"largest avalanche over N, xi = {strength:g}", parts, "1", ""))
-    least = variable(trees[-1], "contact_force").min(axis=1)
+    minimum = variable(trees[-1], "contact_force").min(axis=1)
     static = configuration(trees[-1]).contacts.static_force
     return Finding(
-        (*found, measured("minimum F over F_s, xi = 0.3", least / static, "1", "about 0")),
+        (*found, measured("minimum F over F_s, xi = 0.3", minimum / static, "1", "about 0")),
         verdict(
             all_are(trees[0], SMOOTH)
             and all_are(trees[-1], STICK_SLIP, IRREGULAR)
             and largest[-1] > 0.9
-            and bool(np.all(least < 0.05 * static))
+            and bool(np.all(minimum < 0.05 * static))
         ),
         "in the end: " + "; ".join(motion(tree) for tree in trees),
     )
@@ -91,37 +93,40 @@ def velocity(trees: Sequence[xr.DataTree]) -> Finding:
     slow, fast = trees[:4], trees[4:]
     speeds = [configuration(tree).drive_speed * 1e6 for tree in trees]
     peaks = [of_each(tree, lambda one: one["force_before"].values[1:].mean()) for tree in slow]
-    ways = [
-        of_each(tree, lambda one: one["waiting_time"].values[2:].mean()) * speed
+    distances = [
+        of_each(tree, lambda one: one["waiting_time"].values[2:].mean()) * speed * 1e-6
         for tree, speed in zip(slow, speeds, strict=False)
     ]
-    means = [np.array([one.mean() for one in all_values]) for all_values in (peaks, ways)]
+    means = [np.array([one.mean() for one in all_values]) for all_values in (peaks, distances)]
     errors = [
         np.sqrt(np.mean([one.var(ddof=1) / one.size for one in all_values]))
-        for all_values in (peaks, ways)
+        for all_values in (peaks, distances)
     ]
-    # All four are the same if they scatter like means of five realizations do.
+    # All four agree if they scatter like means of five realizations do.
     is_universal = all(
         np.std(mean, ddof=1) < 2 * error for mean, error in zip(means, errors, strict=True)
     )
     return Finding(
         (
             *(
-                measured(f"mean peak at {speed:g} um/s", one * 1e6, "uN", "the same")
+                measured(f"mean peak at {speed:g} µm/s", one, "N", "the same")
                 for speed, one in zip(speeds, peaks, strict=False)
             ),
             *(
                 measured(
-                    f"displacement of the drive in a period at {speed:g} um/s",
+                    f"displacement of the drive in a period at {speed:g} µm/s",
                     one,
-                    "um",
+                    "m",
                     "the same",
                 )
-                for speed, one in zip(speeds, ways, strict=False)
+                for speed, one in zip(speeds, distances, strict=False)
             ),
             *(
                 measured(
-                    f"oscillation over mean at {speed:g} um/s", swing(tree), "1", "smooth at high"
+                    f"oscillation over mean at {speed:g} µm/s",
+                    peak_to_peak(tree),
+                    "1",
+                    "smooth at high",
                 )
                 for speed, tree in zip(speeds[4:], fast, strict=True)
             ),
@@ -132,7 +137,7 @@ def velocity(trees: Sequence[xr.DataTree]) -> Finding:
         "falls with velocity through the delay, the slider oscillates at Omega_S around steady "
         "sliding; in the end: "
         + "; ".join(
-            f"{speed:g} um/s: {motion(tree)}" for speed, tree in zip(speeds[4:], fast, strict=True)
+            f"{speed:g} µm/s: {motion(tree)}" for speed, tree in zip(speeds[4:], fast, strict=True)
         ),
     )
 
@@ -149,7 +154,7 @@ CLAIMS = (
     ),
     Claim(
         "C10",
-        "interaction widens the range of stick-slip; at xi = 0.3 one avalanche takes the whole "
+        "interaction widens the range of stick-slip; at xi = 0.3 one avalanche spans the whole "
         "system and F falls abruptly to about zero (S25 to S27)",
         "smooth at xi = 0, not at 0.3; there an avalanche of more than 90 % of N, and F below 5 % "
         "of F_s, in every realization",
@@ -159,7 +164,7 @@ CLAIMS = (
     Claim(
         "C12",
         "F_d against v_d t does not depend on v_d in slow drives; at high v_d sliding is smooth",
-        "peaks and periods at 0.02 to 0.2 um/s scatter as realizations do; smooth at 300 um/s",
+        "peaks and periods at 0.02 to 0.2 µm/s scatter as realizations do; smooth at 300 µm/s",
         (
             *(
                 "claims/velocity-0.02",

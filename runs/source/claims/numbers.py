@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from mesoslip.configuration.config import Config
 
-# The source gives three digits.
+# The source has three digits.
 ROUNDING = 5e-3
 
 
@@ -53,16 +53,16 @@ def cantilever(trees: Sequence[xr.DataTree]) -> Finding:
     """C15: lowest bending frequency of a cantilever over (K/M)^(1/2)."""
     from scipy.optimize import brentq
 
-    told = derived(configuration(trees[0]))["bending_ratio"].value
+    ratio = derived(configuration(trees[0]))["bending_ratio"].value
     # A beam with one free end: cos z cosh z = -1, frequency z^2 (E I/(rho S))^(1/2)/L^2.
     root = brentq(lambda z: math.cos(z) + 1 / math.cosh(z), 1.5, 2.5, xtol=1e-15)
     exact = root**2 / math.sqrt(3)
     return Finding(
         (
-            measured("ratio by the formula with 3.52", told, "1", "2.03"),
+            measured("ratio by the formula with 3.52", ratio, "1", "2.03"),
             measured("ratio from the beam's equation", exact, "1", "2.03"),
         ),
-        verdict(abs(told / 2.03 - 1) < ROUNDING and abs(exact / 2.03 - 1) < ROUNDING),
+        verdict(abs(ratio / 2.03 - 1) < ROUNDING and abs(exact / 2.03 - 1) < ROUNDING),
         "the beam's own equation, cos z cosh z = -1, gives the same",
     )
 

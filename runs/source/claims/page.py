@@ -20,14 +20,14 @@ def as_table(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
             "reason": one.finding.reason,
             "measured": [
                 {
-                    "name": what.name,
-                    "mean": what.mean,
-                    "standard_deviation": what.spread,
-                    "values": list(what.values),
-                    "unit": what.unit,
-                    "source": what.source,
+                    "name": quantity.name,
+                    "mean": quantity.mean,
+                    "standard_deviation": quantity.spread,
+                    "values": list(quantity.values),
+                    "unit": quantity.unit,
+                    "source": quantity.source,
                 }
-                for what in one.finding.measured
+                for quantity in one.finding.measured
             ],
         }
         for one in judgements
@@ -35,7 +35,7 @@ def as_table(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
 
 
 def summary(judgements: Sequence[Judgement]) -> str:
-    """How many claims hold, and how many fail."""
+    """Numbers of claims by verdict."""
     counts = dict.fromkeys(Verdict, 0)
     for one in judgements:
         counts[one.finding.verdict] += 1
@@ -47,9 +47,9 @@ def as_text(judgements: Sequence[Judgement]) -> str:
     lines = []
     for one in judgements:
         lines.append(f"{one.claim.name}: {one.claim.statement}")
-        for what in one.finding.measured:
-            source = f"   (source: {what.source})" if what.source else ""
-            lines.append(f"    {what.name:46} {what!s:>24}{source}")
+        for quantity in one.finding.measured:
+            source = f"   (source: {quantity.source})" if quantity.source else ""
+            lines.append(f"    {quantity.name:46} {quantity!s:>24}{source}")
         reason = f": {one.finding.reason}" if one.finding.reason else ""
         lines += [f"    {one.finding.verdict.value.upper()}{reason}", ""]
     return "\n".join([*lines, summary(judgements)])
@@ -63,7 +63,7 @@ def as_markdown(judgements: Sequence[Judgement]) -> str:
         "Written by `make claims`. Each claim of the source (`C1` to `C16`) is judged from runs in",
         "`runs/source`; values are means and standard deviations over realizations.",
         "",
-        f"In all: {summary(judgements)}.",
+        f"Summary: {summary(judgements)}.",
         "",
         "| claim | statement | verdict |",
         "|---|---|---|",
@@ -81,9 +81,12 @@ def as_markdown(judgements: Sequence[Judgement]) -> str:
             f"*{one.claim.statement}.* Criterion: {one.claim.criterion}. "
             f"Runs: {', '.join(f'`{run}`' for run in one.claim.runs)}.",
             "",
-            "| measured | value | the source |",
+            "| quantity | measured | source |",
             "|---|---|---|",
-            *(f"| {what.name} | {what} | {what.source} |" for what in one.finding.measured),
+            *(
+                f"| {quantity.name} | {quantity} | {quantity.source} |"
+                for quantity in one.finding.measured
+            ),
             "",
             _ending(one),
         ]
@@ -93,5 +96,7 @@ def as_markdown(judgements: Sequence[Judgement]) -> str:
 def _ending(judgement: Judgement) -> str:
     """Verdict and reason, as sentences."""
     finding = judgement.finding
-    told = f"**{finding.verdict.value.capitalize()}.**"
-    return f"{told} {finding.reason[0].upper()}{finding.reason[1:]}." if finding.reason else told
+    verdict = f"**{finding.verdict.value.capitalize()}.**"
+    return (
+        f"{verdict} {finding.reason[0].upper()}{finding.reason[1:]}." if finding.reason else verdict
+    )

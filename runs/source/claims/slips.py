@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from mesoslip.analysis.slips import slips
 from mesoslip.output.samples import series
+from mesoslip.quantities import with_unit
 from mesoslip.theory.derived import derived
 from numpy.typing import NDArray
 from outputs import configuration
@@ -38,7 +39,7 @@ def first_spike(trees: Sequence[xr.DataTree]) -> Finding:
     mean = of_each(tree, lambda one: one["force_before"].values[1:].mean())
     return Finding(
         (
-            measured("first peak", first * 1e6, "uN", "large"),
+            measured("first peak", first, "N", "large"),
             measured("maximum later peak over the first", later / first, "1", "smaller"),
             measured("mean later peak over the first", mean / first, "1", "smaller"),
         ),
@@ -65,13 +66,13 @@ def slip_velocity(trees: Sequence[xr.DataTree]) -> Finding:
 
 
 def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
-    """C5: F falls to zero, all contacts are detached, and F swings with a period K/(Nk Omega_S)."""
+    """C5: F falls to zero, all contacts detach, and F oscillates with a period K/(Nk Omega_S)."""
     (tree,) = trees
     config = configuration(tree)
     contacts = config.contacts
     omega = derived(config)["omega_s"].value
     scale = config.spring_stiffness / (contacts.stiffness * omega)
-    least, most, period = [], [], []
+    minimum, maximum, period = [], [], []
     data = slips(tree)
     for realization in range(tree.sizes["realization"]):
         slip = data.isel(slip=np.flatnonzero(data["realization_index"].values == realization)[0])
@@ -80,22 +81,21 @@ def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
         _, force = series(tree, "contact_force", realization, window)
         half = 0.5 * contacts.count
         bursts = times[1:][(detached[1:] > half) & (detached[:-1] <= half)]
-        least.append(force.min() / contacts.static_force)
-        most.append(detached.max() / contacts.count)
+        minimum.append(force.min() / contacts.static_force)
+        maximum.append(detached.max() / contacts.count)
         period.append(np.diff(bursts).min())
     loading = np.array(period) - contacts.delay
+    source = f"about {with_unit(scale, 's', 3)}"
     return Finding(
         (
-            measured("minimum F over F_s", least, "1", "0"),
-            measured("most detached contacts over N", most, "1", "1"),
-            measured(
-                "shortest period of F", np.array(period) * 1e3, "ms", f"about {scale * 1e3:.3g}"
-            ),
-            measured("that without the delay", loading * 1e3, "ms", f"about {scale * 1e3:.3g}"),
+            measured("minimum F over F_s", minimum, "1", "0"),
+            measured("maximum detached contacts over N", maximum, "1", "1"),
+            measured("shortest period of F", period, "s", source),
+            measured("shortest period of F less the delay", loading, "s", source),
         ),
         verdict(
-            max(least) < 0.01
-            and min(most) > 0.99
+            max(minimum) < 0.01
+            and min(maximum) > 0.99
             and bool(np.all((loading > scale / 3) & (loading < 3 * scale))),
             True,
         ),
@@ -110,19 +110,21 @@ def ringing(trees: Sequence[xr.DataTree]) -> Finding:
     short, long = trees
     quantities = derived(configuration(short))
     omega_s, omega_l = quantities["omega_s"].value, quantities["omega_l"].value
-    least = variable(long, "spring_force").min(axis=1)
+    minimum = variable(long, "spring_force").min(axis=1)
     slow, fast = _free_frequency(long), _ringing_frequency(short)
     after = of_each(short, lambda one: one["force_after"].values[0])
     return Finding(
         (
-            measured("minimum spring force, delay 100 ms", least * 1e6, "uN", "negative"),
+            measured("minimum spring force, delay 100 ms", minimum, "N", "negative"),
             measured("frequency while detached", slow, "1/s", f"Omega_S, {omega_s:.4g}"),
-            measured("spring force after the slip, delay 0.1 ms", after * 1e6, "uN", "above F_b"),
-            measured("frequency of the ringing then", fast, "1/s", f"Omega_L, {omega_l:.4g}"),
+            measured("spring force after the slip, delay 0.1 ms", after, "N", "above F_b"),
+            measured(
+                "frequency of the ringing, delay 0.1 ms", fast, "1/s", f"Omega_L, {omega_l:.4g}"
+            ),
         ),
         verdict(
             bool(
-                np.all(least < 0)
+                np.all(minimum < 0)
                 and np.all(np.abs(slow / omega_s - 1) < 0.05)
                 and np.all(np.abs(fast / omega_l - 1) < 0.05)
                 and np.all(after > 0)
@@ -130,7 +132,7 @@ def ringing(trees: Sequence[xr.DataTree]) -> Finding:
             True,
         ),
         "frequencies agree; but with a short delay the first slip ends at a positive force below "
-        f"F_b = {_back_force(short) * 1e6:.2g} uN",
+        f"F_b = {with_unit(_back_force(short), 'N', 2)}",
     )
 
 
@@ -140,7 +142,7 @@ def _back_force(tree: xr.DataTree) -> float:
 
 
 def _free_frequency(tree: xr.DataTree) -> Array:
-    """Frequency at which the spring force passes zero while no contact is pinned [1/s]."""
+    """Angular frequency of the zeros of the spring force while no contact is pinned [1/s]."""
     times = variable(tree, "time")
     count = configuration(tree).contacts.count
     frequencies = []
@@ -154,7 +156,8 @@ def _free_frequency(tree: xr.DataTree) -> Array:
 
 
 def _ringing_frequency(tree: xr.DataTree) -> Array:
-    """Frequency of the greatest line in the velocity in the 60 ms after the first slip [1/s]."""
+    """Angular frequency of the maximum in the spectrum of the velocity in the 60 ms after the
+    first slip [1/s]."""
     times = variable(tree, "time")
     ends = of_each(tree, lambda one: one["end_time"].values[0])
     frequencies = []
@@ -176,8 +179,8 @@ def periods(trees: Sequence[xr.DataTree]) -> Finding:
     rising = [np.ptp([one.mean() for one in later]), max(one.std(ddof=1) for one in later)]
     return Finding(
         tuple(
-            measured(f"{what}, width {width:g}", values, "s", "shorter for larger widths")
-            for what, all_values in (("first period", first), ("mean of later ones", later))
+            measured(f"{quantity}, width {width:g}", values, "s", "shorter for larger widths")
+            for quantity, all_values in (("first period", first), ("mean of later ones", later))
             for width, values in zip(widths, all_values, strict=True)
         ),
         verdict(
@@ -190,13 +193,13 @@ def periods(trees: Sequence[xr.DataTree]) -> Finding:
 
 
 def layers(trees: Sequence[xr.DataTree]) -> Finding:
-    """C9: the slip time hardly depends on the number of layers."""
+    """C9: the duration of a slip hardly depends on the number of layers."""
     times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
     counts = [configuration(tree).slider.layer_count for tree in trees]
     few, many = (one.mean() for one in times)
     return Finding(
         tuple(
-            measured(f"time of the first slip, {count} layers", one * 1e3, "ms", "the same")
+            measured(f"duration of the first slip, {count} layers", one, "s", "the same")
             for count, one in zip(counts, times, strict=True)
         ),
         verdict(abs(many / few - 1) < 0.1),
@@ -205,7 +208,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Finding:
 
 
 def viscosity(trees: Sequence[xr.DataTree]) -> Finding:
-    """C11: a drag larger by 1e5 leaves the slip time nearly unchanged."""
+    """C11: a drag larger by 1e5 leaves the duration of a slip nearly unchanged."""
     times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
     drops = [of_each(tree, lambda one: one["force_drop"].values[0]) for tree in trees]
     rates = [configuration(tree).contacts.drag_rate for tree in trees]
@@ -213,11 +216,11 @@ def viscosity(trees: Sequence[xr.DataTree]) -> Finding:
     return Finding(
         (
             *(
-                measured(f"time of the first slip, eta = {rate:.0e} 1/s", one * 1e3, "ms", "same")
+                measured(f"duration of the first slip, eta = {rate:.0e} 1/s", one, "s", "the same")
                 for rate, one in zip(rates, times, strict=True)
             ),
             *(
-                measured(f"its drop, eta = {rate:.0e} 1/s", one * 1e6, "uN", "")
+                measured(f"drop in the first slip, eta = {rate:.0e} 1/s", one, "N", "")
                 for rate, one in zip(rates, drops, strict=True)
             ),
         ),
@@ -270,14 +273,14 @@ CLAIMS = (
     ),
     Claim(
         "C9",
-        "the slip time hardly depends on the number of layers, 16 or 64 (S24)",
+        "the duration of a slip hardly depends on the number of layers, 16 or 64 (S24)",
         "within 10 %",
         ("claims/layers-16", "claims/layers-64"),
         layers,
     ),
     Claim(
         "C11",
-        "a film 1e5 times as viscous leaves the slip time nearly unchanged (S28)",
+        "a film 1e5 times as viscous leaves the duration of a slip nearly unchanged (S28)",
         "within a factor 2; with a qualification if it changes by more than a tenth",
         ("claims/drag-2e11", "claims/drag-2e14", "claims/drag-2e16"),
         viscosity,

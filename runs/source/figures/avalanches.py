@@ -10,7 +10,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.analysis.avalanche_sizes import fit_power_law
-from mesoslip.plots import avalanches as avalanche_plots
+from mesoslip.plots.lattice import chosen_snapshot, draw_contacts
+from mesoslip.plots.sizes import draw_distribution
+from mesoslip.quantities import with_error
 from outputs import configuration
 
 from figures.base import SourceFigure
@@ -20,14 +22,14 @@ def spreading_avalanche(trees: Sequence[xr.DataTree]) -> Figure:
     """An avalanche through the whole system as it spreads over the lattice, a part of it at each
     stage."""
     (tree,) = trees
-    snapshot = avalanche_plots.chosen_snapshot(tree)
+    snapshot = chosen_snapshot(tree)
     generation = snapshot["generation"].values.astype(float)
     stages = np.quantile(generation[generation > 0], (0.02, 0.2, 0.5, 1.0)).astype(int)
     figure = Figure(figsize=(6.5, 6.2))
     panels = figure.subplots(2, 2)
     for axes, stage in zip(panels.flat, stages, strict=True):
         broken = np.where((generation > 0) & (generation <= stage), generation, np.nan)
-        drawn = avalanche_plots.draw_contacts(
+        drawn = draw_contacts(
             axes, snapshot, broken, cmap="inferno_r", norm=Normalize(1, generation.max())
         )
         count = np.count_nonzero(np.isfinite(broken))
@@ -47,18 +49,19 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
         fit = fit_power_law(sizes, min_size=10)
         label = f"$K/Nk$ = {config.spring_stiffness / config.contacts.stiffness:g}"
         if fit is not None:
-            label += rf": $\tau$ = {fit.exponent:.3f}, $s_c$ = {fit.cutoff:.3g}"
+            label += rf": $\tau$ = {with_error(fit.exponent, fit.exponent_error)}"
+            label += f", $s_c$ = {with_error(fit.cutoff, fit.cutoff_error)}"
             if fit.is_rejected:
                 label += f" (rejected, p = {fit.p_value:.2g})"
-        avalanche_plots.draw_distribution(stationary, sizes, fit, color=color, label=label)
-    for tree, force_above, color, exponent in (
+        draw_distribution(stationary, sizes, fit, color=color, label=label)
+    for tree, min_ratio, color, exponent in (
         (bundle, None, "black", 2.5),
         (bundle, 0.999, "tab:blue", 1.5),
     ):
-        bursts = avalanche_catalogue.avalanches(tree, min_force_ratio=force_above)
+        bursts = avalanche_catalogue.avalanches(tree, min_force_ratio=min_ratio)
         sizes = bursts["size"].values[~avalanche_catalogue.failures(tree, bursts)]
-        label = "all bursts" if force_above is None else f"above {force_above:g} of the strength"
-        avalanche_plots.draw_distribution(failing, sizes, color=color, label=label)
+        label = "all bursts" if min_ratio is None else f"above {min_ratio:g} of the strength"
+        draw_distribution(failing, sizes, color=color, label=label)
         over = np.array([1.0, 300.0])
         failing.loglog(over, over**-exponent, ":", color=color, label=f"$s^{{-{exponent:g}}}$")
     over = np.array([1.0, 1e4])

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import xarray as xr
 from matplotlib.figure import Figure
 from mesoslip.output.access import group_of
-from mesoslip.plots import run as plots
 from mesoslip.plots.style import CONTACT, SPRING
 from outputs import configuration
 
 from figures.base import SourceFigure
 from figures.panels import stacked
+from figures.traces import draw_series
 
 
 def interactions(trees: Sequence[xr.DataTree]) -> Figure:
@@ -24,7 +24,7 @@ def detaching(trees: Sequence[xr.DataTree]) -> Figure:
     """S26: detached contacts in the first slip for different strengths of the interaction."""
     figure = Figure(figsize=(6.5, 4.2))
     for letter, axes, tree in zip("abcd", figure.subplots(2, 2).flat, trees, strict=True):
-        plots.draw_series(
+        draw_series(
             axes, tree, "detached_contacts", window=_first_slip(tree), time_unit=1e-3, color="black"
         )
         sizes = group_of(tree, "avalanches")["size"].values
@@ -40,8 +40,8 @@ def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
     all_axes = figure.subplots(2, 2).flat
     for letter, axes, tree in zip("abcd", all_axes, trees, strict=True):
         window = _first_slip(tree)
-        plots.draw_series(axes, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
-        plots.draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
+        draw_series(axes, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
         axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
         axes.set_ylabel("force (µN)")

@@ -8,12 +8,13 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 from mesoslip.output.access import group_of
-from mesoslip.plots import run as plots
+from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.style import CONTACT, SPRING
 from outputs import configuration
 
 from figures.base import SourceFigure
 from figures.panels import shared_panels, stacked
+from figures.traces import draw_series
 
 
 def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
@@ -21,17 +22,17 @@ def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
     (tree,) = trees
     figure = Figure(figsize=(6.5, 3.6))
     axes = figure.subplots()
-    plots.draw_series(axes, tree, "spring_force", color="black")
+    draw_series(axes, tree, "spring_force", color="black")
     axes.set_xlabel("time (s)")
     axes.set_ylabel("spring force $F_d$ (µN)")
     axes.set_xlim(0, tree["time"].max().item())
-    slip = plots.largest_slip(tree)
+    slip = largest_slip(tree)
     if slip is not None:
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.6 * (high - low))
         inset = axes.inset_axes((0.4, 0.62, 0.57, 0.36))
-        window = plots.slip_window(slip, before=0.5, after=9)
-        plots.draw_series(inset, tree, "spring_force", window=window, time_unit=1e-3, color="black")
+        window = slip_window(slip, before=0.5, after=9)
+        draw_series(inset, tree, "spring_force", window=window, time_unit=1e-3, color="black")
         inset.set_xlabel(f"time after {window[0]:.3f} s (ms)", fontsize=7)
         inset.tick_params(labelsize=7)
     return figure
@@ -42,13 +43,13 @@ def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
     (tree,) = trees
     figure = Figure(figsize=(4.5, 6))
     velocity, force, detached = figure.subplots(3, 1, sharex=True)
-    slip = plots.largest_slip(tree)
+    slip = largest_slip(tree)
     if slip is not None:
-        window = plots.slip_window(slip, before=0.1, after=0.8)
+        window = slip_window(slip, before=0.1, after=0.8)
         for axes, name in ((velocity, "velocity"), (detached, "detached_contacts")):
-            plots.draw_series(axes, tree, name, window=window, time_unit=1e-3, color="black")
-        plots.draw_series(force, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
-        plots.draw_series(force, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
+            draw_series(axes, tree, name, window=window, time_unit=1e-3, color="black")
+        draw_series(force, tree, "contact_force", window=window, time_unit=1e-3, **CONTACT)
+        draw_series(force, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         detached.set_xlabel(f"time after {window[0]:.4f} s (ms)")
         force.legend()
     velocity.set_ylabel("slider velocity (µm/s)")
@@ -67,7 +68,7 @@ def delays(trees: Sequence[xr.DataTree]) -> Figure:
     for letter, row, tree in zip("abcdefgh", panels, trees, strict=False):
         end = tree["time"].max().item()
         for axes, window in zip(row, ((0, span), (end - span, end)), strict=True):
-            plots.draw_series(axes, tree, "spring_force", window=window, color="black")
+            draw_series(axes, tree, "spring_force", window=window, color="black")
             axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.set_xlim(0, span)
         delay = configuration(tree).contacts.delay
@@ -104,7 +105,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
             slips = group_of(tree, "slips")
             if slips.sizes["slip"]:
                 start = slips["start_time"].values[0] - 3e-3
-                plots.draw_series(
+                draw_series(
                     axes,
                     tree,
                     name,
@@ -113,7 +114,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
                     label=f"$N_l$ = {count}",
                     **line,
                 )
-            plots.draw_series(inset, tree, name, window=(0, 6), linewidth=0.5, color=color)
+            draw_series(inset, tree, name, window=(0, 6), linewidth=0.5, color=color)
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.7 * (high - low))
         inset.tick_params(labelsize=6)
@@ -131,11 +132,11 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
     for tree, style in zip(trees, ("-", "--", ":", "-."), strict=False):
         rate = configuration(tree).contacts.drag_rate
         label = rf"$\eta$ = {rate:.0e} s$^{{-1}}$"
-        plots.draw_series(whole, tree, "spring_force", linestyle=style, label=label)
-        slip = plots.largest_slip(tree)
+        draw_series(whole, tree, "spring_force", linestyle=style, label=label)
+        slip = largest_slip(tree)
         if slip is not None:
             start = slip["start_time"].item() - 5e-3
-            plots.draw_series(
+            draw_series(
                 detail,
                 tree,
                 "spring_force",

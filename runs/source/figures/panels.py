@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from mesoslip.plots import run as plots
 from numpy.typing import NDArray
+
+from figures.traces import draw_series
 
 
 def shared_panels(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
@@ -22,7 +23,7 @@ def stacked(trees: Sequence[xr.DataTree], title: Callable[[xr.DataTree], str]) -
     figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
     panels = shared_panels(figure, len(trees), 1)[:, 0]
     for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
-        plots.draw_series(axes, tree, "spring_force", color="black")
+        draw_series(axes, tree, "spring_force", color="black")
         axes.set_title(f"({letter}) {title(tree)}", loc="left")
         axes.set_ylabel("$F_d$ (µN)")
         axes.set_xlim(0, tree["time"].max().item())

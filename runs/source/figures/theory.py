@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mesoslip.output.samples import series
-from mesoslip.plots.theory import draw_onset
+from mesoslip.plots.views.onset import EQUATIONS
 from outputs import configuration
 
 from figures.base import SourceFigure
@@ -33,7 +34,7 @@ def force_over_displacement(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
-# What the source gives for D0, D2 and D3 at each dispersion of S19; it lost an exponent.
+# The source's D0, D2 and D3 at each dispersion of S19; an exponent is missing in it.
 SOURCE_COEFFICIENTS = {0.01: "0.94, 2.2e5, 1.91e?", 0.1: "0.794, 3.61e3, 4.03e2"}
 
 
@@ -55,7 +56,7 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
                 start = int(np.argmax(displacement >= onset.attrs["X_c"]))
                 tau = onset.attrs["omega_s"] * (times - times[start])
                 axes.plot(tau, (force - force[start]) / static, **style)
-            draw_onset(axes, onset, linestyle="--")
+            _draw_onset(axes, onset)
             axes.set_xlabel(r"$\tau = \Omega_S (t - t_c)$")
             axes.set_ylabel(r"$\Delta F_d/F_s$")
         whole, start_of_slip = columns
@@ -74,6 +75,18 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
         )
     rows[0, 0].legend()
     return figure
+
+
+def _draw_onset(axes: Axes, tree: xr.DataTree) -> None:
+    """Draw the change of the spring force by S46 and S47 against the time since the onset."""
+    for name, style in EQUATIONS.items():
+        if name in tree.children:
+            data = tree.children[name].to_dataset()
+            axes.plot(
+                data["onset_time"].values,
+                data["relative_force_drop"].values,
+                **style | {"linestyle": "--"},
+            )
 
 
 def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:

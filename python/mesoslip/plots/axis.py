@@ -1,0 +1,74 @@
+"""Horizontal axes of pictures of runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from mesoslip.errors import FileError
+from mesoslip.plots.extent import Extent
+from mesoslip.plots.lines import line, max_size
+from mesoslip.plots.trace import UNITS, is_known
+from mesoslip.quantities import Scale, scale_for
+
+
+@dataclass(frozen=True)
+class HorizontalAxis:
+    """A horizontal axis: unit, label, limits in that unit, and origin in SI."""
+
+    scale: Scale
+    label: str
+    limits: tuple[float, float] | None
+    origin: float = 0.0
+
+    def prepare(self, axes: Axes) -> None:
+        """Set the label and the limits of axes."""
+        axes.set_xlabel(self.scale.label(self.label))
+        if self.limits is not None:
+            axes.set_xlim(*self.limits)
+
+
+def horizontal_axis(trees: Sequence[xr.DataTree], extent: Extent) -> HorizontalAxis:
+    """The horizontal axis of the part of outputs that is drawn.
+
+    Raises
+    ------
+    FileError
+        If a measured trace does not have the variable.
+    """
+    name, label = extent.horizontal
+    if name != "time" and not all(is_known(tree, name) for tree in trees):
+        raise FileError(
+            f"the measured trace has no {label}: mesoslip trace computes it from the velocity of "
+            "the drive and the stiffness of the spring, or with --config"
+        )
+    windows = np.array([extent.window(tree) for tree in trees])
+    if name != "time":
+        lines = [
+            line(tree, (name,), extent, window)[0]
+            for tree, window in zip(trees, windows, strict=True)
+        ]
+        return HorizontalAxis(scale_for(max_size(*lines), UNITS[name]), label, None)
+    scale = scale_for(max_size(windows), "s")
+    low, high = float(windows[:, 0].min()), float(windows[:, 1].max())
+    limits = (low / scale.size, high / scale.size) if high > low else None
+    return HorizontalAxis(scale, label, limits)
+
+
+def time_since(window: tuple[float, float]) -> HorizontalAxis:
+    """The axis of time after the start of a window."""
+    start, length = window[0], window[1] - window[0]
+    scale = scale_for(length, "s")
+    label = "time"
+    if start != 0:
+        unit = scale_for(start, "s")
+        # Enough digits to find the window in the whole trace.
+        digits = max(3, 2 + math.ceil(math.log10(max(abs(start) / max(length, 1e-300), 1.0))))
+        label = f"time after {start / unit.size:.{digits}g} {unit.name}"
+    limits = (0.0, length / scale.size) if length > 0 else None
+    return HorizontalAxis(scale, label, limits, start)

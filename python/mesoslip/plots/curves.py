@@ -1,0 +1,91 @@
+"""Curves of runs: variables of the trace over a horizontal axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mesoslip.plots.axis import HorizontalAxis
+from mesoslip.plots.extent import Extent
+from mesoslip.plots.lines import line, max_size
+from mesoslip.plots.trace import NAMES, UNITS
+from mesoslip.quantities import scale_for
+
+Array = NDArray[np.float64]
+
+# Other realizations than the first one that are drawn behind it.
+MAX_OTHERS = 20
+
+
+class Curve(NamedTuple):
+    """A curve in SI, and its style."""
+
+    x: Array
+    y: Array
+    style: dict[str, Any]
+
+
+def curve(tree: xr.DataTree, name: str, extent: Extent, **style: Any) -> Curve:
+    """The curve of a variable of a run."""
+    horizontal, _ = extent.horizontal
+    x, y = line(tree, (horizontal, name), extent, extent.window(tree))
+    if np.count_nonzero(np.isfinite(y)) == 1:
+        # A line of one sample has no length.
+        style = {"marker": ".", **style}
+    return Curve(x, y, style)
+
+
+def draw_curves(
+    axes: Axes,
+    curves: Sequence[Curve],
+    name: str,
+    horizontal: HorizontalAxis,
+    label: str | None = None,
+) -> None:
+    """Draw curves of one unit, with the prefix that suits them.
+
+    Parameters
+    ----------
+    axes, curves
+        Where, and which.
+    name
+        A variable that has their unit.
+    horizontal
+        Their horizontal axis.
+    label
+        Their quantity; the name of the variable by default.
+    """
+    largest = max_size(*(one.y for one in curves))
+    scale = scale_for(largest, UNITS[name])
+    for x, y, style in curves:
+        axes.plot((x - horizontal.origin) / horizontal.scale.size, y / scale.size, **style)
+    axes.set_ylabel(scale.label(label or NAMES[name]))
+    if name == "detached_contacts" and largest == 0:
+        axes.set_ylim(-0.05, 1)
+    horizontal.prepare(axes)
+
+
+def others_behind(tree: xr.DataTree, extent: Extent) -> Iterator[Extent]:
+    """Extents of the realizations behind the first one, if none was chosen."""
+    if extent.realization is None:
+        for number in range(1, min(tree.sizes["realization"], MAX_OTHERS + 1)):
+            yield Extent(number, extent.start, extent.end, extent.against, extent.parts // 4)
+
+
+def about_realizations(tree: xr.DataTree, extent: Extent) -> str:
+    """Which of several realizations are shown."""
+    others = tree.sizes["realization"] - 1
+    if others == 0:
+        return ""
+    if extent.realization is not None:
+        return f"realization {extent.realization} (0 to {others})"
+    if others > MAX_OTHERS:
+        return f"black: realization 0; grey: {MAX_OTHERS} of the other {others} realizations"
+    if others > 1:
+        return f"black: realization 0; grey: the other {others} realizations"
+    return "black: realization 0; grey: realization 1"

@@ -1,0 +1,99 @@
+"""Lines of long traces: all samples of a window, or the extremes of many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from mesoslip.output.samples import Samples, samples
+from mesoslip.plots.extent import MAX_PARTS, Extent
+
+Array = NDArray[np.float64]
+
+# Samples that are read at a time.
+BLOCK = 2**20
+
+
+def extremes(
+    parts: list[Samples],
+    names: Sequence[str],
+    window: tuple[float, float],
+    count: int = MAX_PARTS,
+) -> list[Array]:
+    """Samples at the minima and maxima of variables in each interval of a window of time.
+
+    Intervals have the same duration, or the same number of samples if the time is not among the
+    variables.
+
+    Parameters
+    ----------
+    parts
+        Samples of a realization.
+    names
+        The variables.
+    window
+        Start and end [s].
+    count
+        Number of intervals.
+
+    Returns
+    -------
+    list of array
+        Values of each variable at these samples, in order of time.
+    """
+    start, end = window
+    scale = count / max(end - start, np.finfo(float).tiny)
+    kept_times: list[Array] = []
+    kept: list[list[Array]] = [[] for _ in names]
+    for part in parts:
+        first, after = part.inside(window)
+        for at in range(first, after, BLOCK):
+            to = min(at + BLOCK, after)
+            times = part.times[at:to]
+            if "time" in names:
+                interval = np.minimum(((times - start) * scale).astype(int), count - 1)
+            else:
+                # A slip is short in time and long in space: as many samples in each interval.
+                interval = (np.arange(at, to) - first) * count // (after - first)
+            begins = np.flatnonzero(np.diff(interval, prepend=-1))
+            lengths = np.diff(begins, append=len(interval))
+            columns = [part.values(name, at, to) for name in names]
+            chosen: list[NDArray[np.intp]] = []
+            for name, values in zip(names, columns, strict=True):
+                if name == "time":
+                    continue
+                for extreme_of in (np.fmin, np.fmax):
+                    extreme = np.repeat(extreme_of.reduceat(values, begins), lengths)
+                    hits = np.flatnonzero(values == extreme)
+                    chosen.append(hits[np.diff(interval[hits], prepend=-1) > 0])
+            shown = np.unique(np.concatenate(chosen))
+            kept_times.append(times[shown])
+            for one, values in zip(kept, columns, strict=True):
+                one.append(values[shown])
+    if not kept_times:
+        return [np.empty(0) for _ in names]
+    order = np.argsort(np.concatenate(kept_times), kind="stable")
+    return [np.concatenate(one)[order] for one in kept]
+
+
+def line(
+    tree: xr.DataTree, names: Sequence[str], extent: Extent, window: tuple[float, float]
+) -> list[Array]:
+    """Values of variables along a line: all samples of a window, or the extremes of many."""
+    parts = samples(tree, extent.first)
+    if sum(np.subtract(*part.inside(window)[::-1]) for part in parts) > 4 * extent.parts:
+        return extremes(parts, names, window, extent.parts)
+    times = np.concatenate([part.values("time", *part.inside(window)) for part in parts])
+    order = np.argsort(times, kind="stable")
+    return [
+        np.concatenate([part.values(name, *part.inside(window)) for part in parts])[order]
+        for name in names
+    ]
+
+
+def max_size(*values: Array) -> float:
+    """Maximum absolute value, without missing ones; 0 if there is none."""
+    return max(float(np.max(np.abs(one[np.isfinite(one)]), initial=0.0)) for one in values)

@@ -1,0 +1,94 @@
+"""Axes of pictures of sweeps: swept keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mesoslip.configuration.units import from_cf_units
+from mesoslip.quantities import Scale, number, scale_for
+
+Array = NDArray[np.float64]
+
+# Keys whose values span more than this factor have a logarithmic axis.
+LOGARITHMIC_RANGE = 5.0
+# Values of an axis of a map up to which each has a label.
+MAX_LABELS = 8
+
+
+@dataclass(frozen=True)
+class SweptKey:
+    """An axis of a swept key: its label, and its values in the unit of the label.
+
+    Attributes
+    ----------
+    label
+        The key and its unit.
+    values
+        The values; 0, 1, 2, ... for words.
+    words
+        The words; empty for numbers.
+    is_logarithmic
+        Whether the axis is logarithmic.
+    """
+
+    label: str
+    values: Array
+    words: tuple[str, ...]
+    is_logarithmic: bool
+
+    @classmethod
+    def of(cls, coordinate: xr.DataArray) -> SweptKey:
+        """The axis of a coordinate of a sweep."""
+        values = coordinate.values
+        if values.dtype.kind not in "fiu":
+            positions = np.arange(len(values), dtype=np.float64)
+            return cls(str(coordinate.name), positions, tuple(map(str, values)), False)
+        scale = scale_of(coordinate)
+        is_wide = np.min(values) > 0 and np.max(values) > LOGARITHMIC_RANGE * np.min(values)
+        return cls(scale.label(str(coordinate.name)), values / scale.size, (), bool(is_wide))
+
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """Indices of the values in increasing order."""
+        return np.argsort(self.values)
+
+    @property
+    def edges(self) -> Array:
+        """Midpoints between the values, and the edges of the first and the last cell."""
+        values = self.values[self.order]
+        values = np.log(values) if self.is_logarithmic else values
+        if len(values) == 1:
+            only = self.values[0]
+            return only * np.array([0.5, 1.5]) if only else np.array([-1.0, 1.0])
+        middles = (values[1:] + values[:-1]) / 2
+        edges = np.concatenate(
+            [[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]]
+        )
+        return np.exp(edges) if self.is_logarithmic else edges
+
+    def apply(self, axes: Axes, which: str) -> None:
+        """Label an axis ("x" or "y") of a panel."""
+        getattr(axes, f"set_{which}label")(self.label)
+        if self.is_logarithmic:
+            getattr(axes, f"set_{which}scale")("log")
+        if self.words:
+            getattr(axes, f"set_{which}ticks")(self.values, self.words)
+
+    def label_values(self, axes: Axes, which: str) -> None:
+        """Label each value of an axis of a map, if they are few."""
+        if len(self.values) <= MAX_LABELS and not self.words:
+            getattr(axes, f"set_{which}ticks")([], minor=True)
+            labels = [number(one, 3) for one in self.values.tolist()]
+            getattr(axes, f"set_{which}ticks")(self.values, labels)
+
+
+def scale_of(data: xr.DataArray) -> Scale:
+    """The unit that suits a key or a measure."""
+    values = np.abs(data.values[np.isfinite(data.values)])
+    unit = from_cf_units(data.attrs.get("units", "1"))
+    return scale_for(float(values.max(initial=0.0)), unit)

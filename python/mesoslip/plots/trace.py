@@ -1,0 +1,32 @@
+"""Variables of a trace in pictures: names, units, and which of them an output has."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from mesoslip.configuration.units import from_cf_units
+from mesoslip.output.access import is_measured
+from mesoslip.output.variables import TRACE
+
+NAMES = {
+    "spring_force": "spring force",
+    "elastic_force": "mean elastic force",
+    "contact_force": "contact force",
+    "velocity": "velocity",
+    "detached_contacts": "detached contacts",
+}
+# Units of the trace as a configuration writes them.
+UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()} | {"time": "s"}
+
+
+def is_known(tree: xr.DataTree, name: str) -> bool:
+    """Whether an output has values of a variable of the trace: a measured one may not."""
+    if not is_measured(tree):
+        return True
+    return bool(np.isfinite(tree.to_dataset()[name][0, 0].item()))
+
+
+def force_of(tree: xr.DataTree) -> str:
+    """The force that shows the motion: for an elastic slider the mean one in it."""
+    return "elastic_force" if "elastic_force" in tree.data_vars else "spring_force"

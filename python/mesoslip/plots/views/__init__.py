@@ -1,0 +1,53 @@
+"""The views: a file each, with its `View` in the variable ``VIEW``.
+
+Adding one is adding a file to this folder, and its name to the build.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from importlib import import_module
+
+import xarray as xr
+
+from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.output.kinds import KINDS, kind_of
+from mesoslip.plots.views.base import Options, View
+
+VIEWS: tuple[View, ...] = tuple(
+    import_module(f"{__name__}.{file.name}").VIEW
+    for file in pkgutil.iter_modules(__path__)
+    if file.name != "base"
+)
+
+
+def names_of_views(kind: str) -> list[str]:
+    """Names of the views of a kind of output, the default first."""
+    names = {view.name for view in VIEWS if view.kind == kind}
+    return sorted(names, key=lambda name: (name != kind, name))
+
+
+def view_of(tree: xr.DataTree, name: str | None, options: Options) -> View:
+    """The view of an output, by default that of its kind.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such view, or it does not have one of the options.
+    FileError
+        If the view is for another kind of output.
+    """
+    kind = kind_of(tree)
+    there = [one for one in VIEWS if one.kind == kind and one.name == (name or kind)]
+    if not there:
+        if any(one.name == name for one in VIEWS):
+            raise FileError(f"the output is {KINDS[kind].description}: it has no view {name!r}")
+        choice = ", ".join(names_of_views(kind))
+        text = f"no such view of {KINDS[kind].description}; choose from {choice}"
+        raise ConfigError([Problem("", "view", text, name)])
+    view = next((one for one in there if one.applies(tree)), there[0])
+    unknown = options.given - view.options
+    if unknown:
+        text = f"no option of the view {view.name!r} of {KINDS[kind].description}"
+        raise ConfigError([Problem("", one, text) for one in sorted(unknown)])
+    return view

@@ -1,0 +1,39 @@
+"""View of the contacts on their lattice, and of the avalanche before a snapshot."""
+
+from __future__ import annotations
+
+import xarray as xr
+from matplotlib.axes import Axes
+
+from mesoslip.plots.lattice import chosen_snapshot, draw_generations, draw_load
+from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.plots.views.base import Options, View
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+    """Force over threshold of each contact, and generations of the avalanche before."""
+    snapshot = chosen_snapshot(tree, options.snapshot)
+    size = snapshot["avalanche_size"].item()
+    with styled():
+        figure = canvas(figure, (6.5, 3.4) if size else (3.6, 3.4))
+        panels = figure.subplots(1, 2 if size else 1, squeeze=False)[0]
+        draw_load(panels[0], snapshot)
+        if size:
+            draw_generations(panels[1], snapshot)
+            panels[1].set_title(f"avalanche of size {size}", loc="left")
+    return figure
+
+
+def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+    """Draw the force over threshold of each contact."""
+    draw_load(axes, chosen_snapshot(tree, options.snapshot))
+
+
+VIEW = View(
+    name="lattice",
+    kind="run",
+    summary="contacts on their lattice, at a snapshot",
+    draw=draw,
+    panel=draw_panel,
+    options=frozenset({"snapshot"}),
+)

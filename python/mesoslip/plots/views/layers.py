@@ -1,0 +1,115 @@
+"""View of the waves in an elastic slider."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from numpy.typing import NDArray
+
+from mesoslip.errors import FileError
+from mesoslip.output.samples import times_of
+from mesoslip.plots.axis import time_since
+from mesoslip.plots.close_up import largest_slip, slip_window
+from mesoslip.plots.curves import about_realizations, curve, draw_curves
+from mesoslip.plots.extent import Extent
+from mesoslip.plots.lines import max_size
+from mesoslip.plots.style import SPRING, Canvas, canvas, legend_above, styled, titles
+from mesoslip.plots.views.base import Options, View
+from mesoslip.quantities import scale_for
+
+Array = NDArray[np.float64]
+
+# Instants at which the velocities of layers are drawn.
+MAX_INSTANTS = 2000
+NO_LAYERS = (
+    "the output has no displacements of layers: they are recorded with "
+    'slider.kind = "layered" and output.layers = true'
+)
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+    """Velocities of layers over time, above the forces at both ends of the slider."""
+    extent = options.extent
+    window = _window(tree, extent)
+    near = Extent(extent.first, *window, parts=extent.parts)
+    with styled():
+        figure = canvas(figure, (6.5, 5.0))
+        waves, force = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
+        draw_waves(waves, tree, options)
+        waves.set_xlabel("")
+        curves = [
+            curve(tree, "contact_force", near, color="black", label="contact force"),
+            curve(tree, "elastic_force", near, color="tab:green", label="mean elastic force"),
+            curve(tree, "spring_force", near, **SPRING | {"label": "force at the drive"}),
+        ]
+        draw_curves(force, curves, "spring_force", time_since(window), "force")
+        legend_above(force)
+    return figure
+
+
+def draw_waves(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+    """Draw the velocity of each layer over time and the number of the layer."""
+    extent = options.extent
+    window = _window(tree, extent)
+    times, velocity = layer_motion(tree, extent, window)
+    largest, horizontal = max_size(velocity) or 1.0, time_since(window)
+    scale = scale_for(largest, "m/s")
+    drawn = axes.pcolormesh(
+        (times - window[0]) / horizontal.scale.size,
+        np.arange(velocity.shape[1] + 1) + 0.5,
+        velocity.T / scale.size,
+        cmap="RdBu_r",
+        norm=Normalize(-largest / scale.size, largest / scale.size),
+        rasterized=True,
+    )
+    axes.figure.colorbar(drawn, ax=axes, label=scale.label("velocity of the layer"))
+    axes.set_ylabel("layer, 1 at the contacts")
+    horizontal.prepare(axes)
+    titles(axes, tree, about_realizations(tree, Extent(extent.first)))
+
+
+def _window(tree: xr.DataTree, extent: Extent) -> tuple[float, float]:
+    """The window of time that was asked for, by default around the largest slip."""
+    if "layer_displacement" not in tree.data_vars:
+        raise FileError(NO_LAYERS)
+    slip = largest_slip(tree, extent)
+    window = extent.window(tree)
+    if not extent.is_whole or slip is None:
+        return window
+    low, high = slip_window(slip)
+    return max(low, window[0]), min(high, window[1])
+
+
+def layer_motion(
+    tree: xr.DataTree, extent: Extent, window: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Times [s], shape (T + 1), and mean velocities of the layers between them, shape (T, layers).
+
+    Raises
+    ------
+    FileError
+        If there are not two samples in the window.
+    """
+    times = times_of(tree)
+    first, after = np.searchsorted(times, window[0]), np.searchsorted(times, window[1], "right")
+    step = max(1, math.ceil((after - first) / MAX_INSTANTS))
+    samples = slice(int(first), int(after), step)
+    data = tree.to_dataset()["layer_displacement"].isel(realization=extent.first, time=samples)
+    times = times[samples]
+    if len(times) < 2:
+        raise FileError("the output has fewer than two samples of the layers in the window of time")
+    return times, np.diff(data.values, axis=0) / np.diff(times)[:, None]
+
+
+VIEW = View(
+    name="layers",
+    kind="run",
+    summary="waves in an elastic slider",
+    draw=draw,
+    panel=draw_waves,
+    options=frozenset({"realization", "start, end"}),
+)

@@ -1,0 +1,131 @@
+"""View of an onset of slip: the change of the spring force after it."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mesoslip.output.access import config_of
+from mesoslip.plots.style import COLORS, Canvas, canvas, legend_above, plain, styled, titles
+from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.quantities import scale_for
+
+Array = NDArray[np.float64]
+
+# Styles of the equations for the onset of slip, as in the source.
+EQUATIONS: dict[str, dict[str, Any]] = {
+    "sequential": {"color": "black", "label": "sequential breaking (S46)"},
+    "melting": {"color": "tab:blue", "label": "instant melting (S47)"},
+}
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+    """Change of the spring force after the onset of slip, beside it with logarithmic axes."""
+    solutions = _solutions([tree])
+    with styled():
+        figure = canvas(figure, (6.5, 3.2))
+        if not solutions:
+            draw_drop(figure.subplots(), tree, options)
+            return figure
+        linear, logarithmic = figure.subplots(1, 2)
+        draw_drop(linear, tree, options)
+        time = scale_for(max(one.times[-1] for one in solutions), "s")
+        force = scale_for(max(np.abs(one.drop).max() for one in solutions), "N")
+        for one in solutions:
+            color, falls = EQUATIONS[one.equation]["color"], one.drop < 0
+            times = one.times / time.size
+            logarithmic.loglog(times[falls], -one.drop[falls] / force.size, color=color)
+            asymptote = -one.asymptote[1:] / force.size
+            logarithmic.loglog(times[1:], asymptote, color=color, linestyle=":")
+        logarithmic.set_xlabel(time.label("time $t - t_c$ since the onset"))
+        logarithmic.set_ylabel(force.label(r"$-\Delta F_d$"))
+        logarithmic.set_title("dotted: short-time asymptotes", loc="left")
+    return figure
+
+
+def draw_drop(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+    """Draw the change of the spring force after the onset of slip."""
+    draw_drops(axes, [tree], [""], options)
+    titles(axes, tree, beside_legend=bool(tree.children))
+    if tree.children:
+        legend_above(axes)
+    else:
+        axes.set_axis_off()
+        text = textwrap.fill(plain(tree.attrs["comment"]), 90)
+        axes.text(0.5, 0.6, text, ha="center", va="center", transform=axes.transAxes)
+
+
+def draw_drops(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options) -> None:
+    """Draw the change of the spring force after several onsets of slip over each other."""
+    solutions = _solutions(trees)
+    time = scale_for(max((one.times[-1] for one in solutions), default=1.0), "s")
+    force = scale_for(max((np.abs(one.drop).max() for one in solutions), default=1.0), "N")
+    for one in solutions:
+        style, label = EQUATIONS[one.equation], labels[one.output]
+        is_sequential = one.equation == "sequential"
+        if label:
+            style = {
+                "color": COLORS[one.output % len(COLORS)],
+                "linestyle": "-" if is_sequential else "--",
+                "label": f"{label}: {style['label']}",
+            }
+        axes.plot(one.times / time.size, one.drop / force.size, **style)
+        if is_sequential:
+            # The end of S46, which may be so early that its line is not visible.
+            end = one.times[-1] / time.size, one.drop[-1] / force.size
+            axes.plot(*end, ".", color=style["color"], markersize=3)
+    axes.set_xlabel(time.label("time $t - t_c$ since the onset"))
+    axes.set_ylabel(force.label(r"change of the spring force $\Delta F_d$"))
+
+
+class _Solution(NamedTuple):
+    """A solution of an equation: index of the output, name of the equation, times [s], change of
+    the spring force [N], and that at short times [N]."""
+
+    output: int
+    equation: str
+    times: Array
+    drop: Array
+    asymptote: Array
+
+
+def _solutions(trees: Sequence[xr.DataTree]) -> list[_Solution]:
+    """The solutions of outputs."""
+    found = []
+    for index, tree in enumerate(trees):
+        static = config_of(tree).contacts.static_force
+        for name in EQUATIONS:
+            if name in tree.children:
+                data = tree.children[name].to_dataset()
+                times = data["onset_time"].values / tree.attrs["omega_s"]
+                drops = (data[one].values * static for one in ("relative_force_drop", "asymptote"))
+                found.append(_Solution(index, name, times, *drops))
+    return found
+
+
+def compare(
+    trees: Sequence[xr.DataTree],
+    labels: Sequence[str],
+    options: Options,
+    figure: Canvas | None = None,
+) -> Canvas:
+    """Several onsets of slip over each other."""
+    entries = len(EQUATIONS) * len(trees)
+    return single_panel(lambda axes: draw_drops(axes, trees, labels, options), entries, figure)
+
+
+VIEW = View(
+    name="onset",
+    kind="onset",
+    summary="change of the spring force after the onset of slip",
+    draw=draw,
+    panel=draw_drop,
+    compare=compare,
+    compare_panel=draw_drops,
+)

@@ -1,0 +1,176 @@
+"""View of a run with inertia or of a measured trace: forces, velocity and detached contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import xarray as xr
+from matplotlib.axes import Axes
+
+from mesoslip.output.access import config_of, is_measured
+from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
+from mesoslip.plots.close_up import draw_slip, largest_slip
+from mesoslip.plots.curves import about_realizations, curve, draw_curves, others_behind
+from mesoslip.plots.extent import Extent
+from mesoslip.plots.style import (
+    COLORS,
+    OTHERS,
+    Canvas,
+    canvas,
+    legend_above,
+    shared_legend,
+    styled,
+    titles,
+)
+from mesoslip.plots.trace import NAMES, force_of, is_known
+from mesoslip.plots.views.base import EXTENT, Options, View
+
+BELOW = ("velocity", "detached_contacts")
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+    """Force, velocity and detached contacts; beside them the same during the largest slip."""
+    extent = options.extent
+    slip, horizontal = largest_slip(tree, extent), horizontal_axis([tree], extent)
+    below = _known_below([tree])
+    with styled():
+        figure = canvas(figure, (6.5 if slip is None else 8.0, _height(below)))
+        columns = 1 if slip is None else 2
+        panels = figure.subplots(
+            1 + len(below),
+            columns,
+            sharex="col",
+            squeeze=False,
+            height_ratios=[1.7, *(1 for _ in below)],
+            width_ratios=[2.1, 1][:columns],
+        )
+        _draw_force(panels[0, 0], tree, extent, horizontal)
+        for axes, name in zip(panels[1:, 0], below, strict=True):
+            _draw_variable(axes, tree, name, extent, horizontal)
+        if slip is not None:
+            is_shaded = extent.horizontal[0] == "time"
+            title = "largest slip (shaded at left)" if is_shaded else "largest slip"
+            draw_slip(list(panels[:, 1]), tree, slip, below, extent, title)
+            if is_shaded:
+                edges = [
+                    slip[name].item() / horizontal.scale.size for name in ("start_time", "end_time")
+                ]
+                for axes in panels[:, 0]:
+                    axes.axvspan(*edges, color="tab:orange", alpha=0.25, linewidth=0.8, zorder=0)
+        for axes in panels[:-1].flat:
+            axes.set_xlabel("")
+        figure.align_ylabels(panels)
+    return figure
+
+
+def draw_force(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+    """Draw the spring force; for an elastic slider the mean force in it, and that at the drive."""
+    _draw_force(axes, tree, options.extent, horizontal_axis([tree], options.extent))
+
+
+def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: HorizontalAxis) -> None:
+    name = force_of(tree)
+    is_elastic = name != "spring_force"
+    curves = [curve(tree, name, other, **OTHERS) for other in others_behind(tree, extent)]
+    front: dict[str, Any] = {"color": "black"}
+    if is_elastic:
+        at_drive = {"color": "tab:blue", "alpha": 0.5, "label": "force at the drive"}
+        curves.append(curve(tree, "spring_force", extent, **at_drive))
+        front["label"] = "mean elastic force $K(X_d - X_1)$"
+    curves.append(curve(tree, name, extent, **front))
+    draw_curves(axes, curves, name, horizontal)
+    titles(axes, tree, about_realizations(tree, extent), beside_legend=is_elastic)
+    if is_elastic:
+        legend_above(axes)
+
+
+def _draw_variable(
+    axes: Axes, tree: xr.DataTree, name: str, extent: Extent, horizontal: HorizontalAxis
+) -> None:
+    """Draw a variable of the trace, with other realizations behind it."""
+    curves = [curve(tree, name, other, **OTHERS) for other in others_behind(tree, extent)]
+    draw_curves(axes, [*curves, curve(tree, name, extent, color="black")], name, horizontal)
+
+
+def _known_below(trees: Sequence[xr.DataTree]) -> list[str]:
+    """Variables below the force, those that some output has."""
+    return [name for name in BELOW if any(is_known(tree, name) for tree in trees)]
+
+
+def _height(below: Sequence[str]) -> float:
+    """Height of a figure [inch] of the force, with panels below it."""
+    return 2.8 + 1.2 * len(below)
+
+
+def compare(
+    trees: Sequence[xr.DataTree],
+    labels: Sequence[str],
+    options: Options,
+    figure: Canvas | None = None,
+) -> Canvas:
+    """Force, velocity and detached contacts of several runs over each other."""
+    horizontal = horizontal_axis(trees, options.extent)
+    below = _known_below(trees)
+    with styled():
+        figure = canvas(figure, (6.5, _height(below) + 0.16 * len(trees)))
+        ratios = [1.7, *(1 for _ in below)]
+        panels = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)
+        for axes, name in zip(panels[:, 0], (None, *below), strict=True):
+            _compare(axes, trees, labels, name, options.extent, horizontal)
+        for axes in panels[:-1, 0]:
+            axes.set_xlabel("")
+        shared_legend(figure, panels[0, 0])
+    return figure
+
+
+def compare_forces(
+    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], options: Options
+) -> None:
+    """Draw the forces of several runs over each other."""
+    extent = options.extent
+    _compare(axes, trees, labels, None, extent, horizontal_axis(trees, extent))
+
+
+def _compare(
+    axes: Axes,
+    trees: Sequence[xr.DataTree],
+    labels: Sequence[str],
+    name: str | None,
+    extent: Extent,
+    horizontal: HorizontalAxis,
+) -> None:
+    """Draw a variable of several runs over each other; the force of each (`force_of`) if None."""
+    names = [name or force_of(tree) for tree in trees]
+    # The noise of measured traces must not hide computed ones.
+    curves = [
+        curve(
+            tree,
+            one,
+            extent,
+            label=label,
+            color=COLORS[number % len(COLORS)],
+            alpha=0.8,
+            zorder=1.9 if is_measured(tree) else 2.0,
+        )
+        for number, (tree, one, label) in enumerate(zip(trees, names, labels, strict=True))
+    ]
+    quantities = ", ".join(dict.fromkeys(NAMES[one] for one in names))
+    draw_curves(axes, curves, names[0], horizontal, quantities)
+
+
+def _has_velocity(tree: xr.DataTree) -> bool:
+    return is_measured(tree) or not config_of(tree).slider.jumps
+
+
+VIEW = View(
+    name="run",
+    kind="run",
+    summary="force, velocity and detached contacts, with the largest slip beside them",
+    draw=draw,
+    panel=draw_force,
+    options=EXTENT,
+    compare=compare,
+    compare_panel=compare_forces,
+    applies=_has_velocity,
+)

@@ -1,0 +1,198 @@
+"""View of a sweep: each measure over one swept key, or as a map over two."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from numpy.typing import NDArray
+
+from mesoslip.errors import FileError
+from mesoslip.plots.boundaries import BOUNDARIES, REGIME, draw_contours, draw_crossings
+from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.plots.sweep_axis import SweptKey, scale_of
+from mesoslip.plots.views.base import Options, View
+from mesoslip.quantities import number
+
+Array = NDArray[np.float64]
+
+# Measures of an overview.
+MAX_PANELS = 6
+# Panels in a row, of an overview and of the maps of one measure.
+COLUMNS = 2
+MAP_COLUMNS = 3
+# Smooth, stick-slip, irregular, transient; further choices of measures to come.
+CHOICE_COLORS = ("#a6cee3", "#ee8877", "#e6d488", "#d9d9d9", "#7fbf7b", "#c2a5cf")
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+    """A panel for each of the first measures of a sweep; or one measure, with a panel for each
+    value of the first of three dimensions.
+
+    Raises
+    ------
+    FileError
+        If the sweep has no such measure.
+    """
+    data = tree.to_dataset()
+    if options.measure is None:
+        panels = [(data, one) for one in measures(data)[:MAX_PANELS]]
+    else:
+        name = _known(data, options.measure)
+        panels = [(part, name) for part in _parts(data)]
+    columns = min(len(panels), COLUMNS if options.measure is None else MAP_COLUMNS)
+    rows = -(-len(panels) // columns)
+    with styled(), mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
+        figure = canvas(figure, (max(4.4, 3.4 * columns), 2.5 * rows + 0.4))
+        all_axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axes, (part, name) in zip(all_axes, panels, strict=False):
+            _draw_measure(axes, part, name)
+        for axes in all_axes[len(panels) :]:
+            axes.remove()
+    return figure
+
+
+def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+    """Draw a measure of a sweep, the first one by default.
+
+    Over one key: realizations as dots, and their mean; over two: a map of the mean. Of a choice
+    such as the regime: the most frequent one.
+
+    Raises
+    ------
+    FileError
+        If the sweep has no such measure.
+    """
+    data = tree.to_dataset()
+    name = measures(data)[0] if options.measure is None else _known(data, options.measure)
+    _draw_measure(axes, data, name)
+
+
+def measures(data: xr.Dataset) -> list[str]:
+    """Measures of a sweep that have a picture; those of boundaries in that of the regime do not."""
+    names = [str(name) for name in data.data_vars if name != "status"]
+    lines = {one.measure for one in BOUNDARIES}
+    return [name for name in names if REGIME not in names or name not in lines]
+
+
+def _known(data: xr.Dataset, name: str) -> str:
+    there = [str(one) for one in data.data_vars if one != "status"]
+    if name not in there:
+        raise FileError(f"the sweep has no measure {name!r}; it has {', '.join(there)}")
+    return name
+
+
+def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> None:
+    data, names, fixed = _first_two_keys(data)
+    keys = [SweptKey.of(data[one]) for one in names]
+    scale = scale_of(data[name])
+    measure = (data[name] / scale.size).assign_attrs(data[name].attrs)
+    choices = tuple(measure.attrs.get("flag_meanings", "").replace("_", "-").split())
+    if len(keys) == 1:
+        _draw_dots(axes, measure, keys[0], choices)
+        if name == REGIME:
+            draw_crossings(axes, data, keys[0])
+    else:
+        _draw_map(axes, measure, keys, choices)
+        if name == REGIME:
+            draw_contours(axes, data, keys)
+    for key, which in zip(keys, "xy", strict=False):
+        key.apply(axes, which)
+    if len(keys) == 2:
+        for key, which in zip(keys, "xy", strict=True):
+            key.label_values(axes, which)
+    axes.set_title("; ".join([scale.label(name), *fixed]), loc="left")
+
+
+def _first_two_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
+    """A sweep at the first values of its third and further dimensions, the keys along the first
+    two, and the values of the others in words."""
+    dimensions = [str(name) for name in data["status"].dims if name != "realization"]
+    further = dimensions[2:]
+    fixed = [f"{name} = {_value(data[name])}" for name in further]
+    data = data.isel(dict.fromkeys(further, 0))
+    keys = []
+    for name in dimensions[:2]:
+        # The samples of a hypercube are drawn over the first of its keys.
+        along = [key for key in data.coords if data[key].dims == (name,) and key != name]
+        keys.append(str(along[0]) if name == "sample" and along else name)
+    return data, keys, fixed
+
+
+def _value(coordinate: xr.DataArray) -> str:
+    """The first value of a swept key, with the unit that suits all of them."""
+    value = coordinate.values[0]
+    if coordinate.dtype.kind not in "fiu":
+        return str(value)
+    scale = scale_of(coordinate)
+    return f"{number(value / scale.size)} {scale.name}".rstrip()
+
+
+def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[str, ...]) -> None:
+    values = measure.transpose(..., "realization").values
+    axes.plot(key.values, values, ".", color="tab:blue", markersize=3)
+    if choices:
+        axes.set_yticks(range(len(choices)), choices)
+        axes.set_ylim(-0.5, len(choices) - 0.5)
+    elif values.shape[1] > 1 and measure.dims[0] != "sample":
+        mean = measure.mean("realization").values
+        axes.plot(key.values[key.order], mean[key.order], color="black")
+
+
+def _draw_map(
+    axes: Axes, measure: xr.DataArray, keys: list[SweptKey], choices: tuple[str, ...]
+) -> None:
+    values = measure.transpose(..., "realization").values
+    shown = _most_frequent(values, len(choices)) if choices else _mean(values)
+    shown = shown[np.ix_(*(key.order for key in keys))].T
+    edges = keys[0].edges, keys[1].edges
+    if not choices:
+        mesh = axes.pcolormesh(*edges, shown, cmap="viridis")
+        axes.figure.colorbar(mesh, ax=axes)
+        return
+    colors = ListedColormap(CHOICE_COLORS[: len(choices)])
+    norm = BoundaryNorm(np.arange(len(choices) + 1) - 0.5, len(choices))
+    mesh = axes.pcolormesh(*edges, shown, cmap=colors, norm=norm)
+    bar = axes.figure.colorbar(mesh, ax=axes, ticks=range(len(choices)))
+    bar.ax.set_yticklabels(choices)
+
+
+def _mean(values: Array) -> Array:
+    """Mean over the last dimension, without missing values; NaN where all are missing."""
+    known = np.isfinite(values)
+    counts = known.sum(axis=-1)
+    sums = np.where(known, values, 0.0).sum(axis=-1)
+    mean: Array = np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
+    return mean
+
+
+def _most_frequent(values: Array, count: int) -> Array:
+    """The most frequent of some choices over the last dimension; NaN where there are none."""
+    counts = np.stack([np.sum(values == one, axis=-1) for one in range(count)])
+    return np.where(counts.sum(axis=0) > 0, np.argmax(counts, axis=0), np.nan)
+
+
+def _parts(data: xr.Dataset) -> Iterator[xr.Dataset]:
+    """The sweep at each value of its first dimension, if it has three."""
+    dimensions = [str(name) for name in data["status"].dims if name != "realization"]
+    if len(dimensions) != 3:
+        yield data
+        return
+    first = dimensions[0]
+    for index in range(data.sizes[first]):
+        # The dimension comes last, where its single value becomes part of the title.
+        yield data.isel({first: [index]}).transpose(*dimensions[1:], first, ...)
+
+
+VIEW = View(
+    name="sweep",
+    kind="sweep",
+    summary="measures over the swept keys",
+    draw=draw,
+    panel=draw_panel,
+    options=frozenset({"measure"}),
+)

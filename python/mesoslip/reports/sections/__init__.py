@@ -1,0 +1,39 @@
+"""The sections in the report of each kind of output, in their order.
+
+A new section is a file in this folder and a line in `SECTIONS`; a new kind of output is a line in
+`mesoslip.output.kinds.KINDS` and one here.
+"""
+
+from __future__ import annotations
+
+from mesoslip.reports.content import Writer
+from mesoslip.reports.sections.avalanches import avalanches
+from mesoslip.reports.sections.changes import changes
+from mesoslip.reports.sections.configuration import configuration
+from mesoslip.reports.sections.energy import energy
+from mesoslip.reports.sections.parameters import parameters
+from mesoslip.reports.sections.pictures import pictures
+from mesoslip.reports.sections.provenance import provenance
+from mesoslip.reports.sections.regime import regime
+from mesoslip.reports.sections.response import response
+from mesoslip.reports.sections.slips import slips
+from mesoslip.reports.sections.sweep import maps, sweep
+from mesoslip.reports.sections.theory import curve, onset
+
+SECTIONS: dict[str, tuple[Writer, ...]] = {
+    "run": (
+        changes,
+        regime,
+        pictures,
+        slips,
+        avalanches,
+        response,
+        energy,
+        configuration,
+        provenance,
+    ),
+    "sweep": (sweep, maps, provenance),
+    "curve": (changes, pictures, curve, configuration, provenance),
+    "onset": (changes, pictures, onset, configuration, provenance),
+    "fit": (parameters, configuration, provenance),
+}

@@ -1,0 +1,48 @@
+"""Energy balances of runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from mesoslip.output import variables
+from mesoslip.output.access import group_of, is_measured
+from mesoslip.quantities import UNKNOWN, number
+from mesoslip.reports.content import Block, Section, Subject, Table, Text
+from mesoslip.reports.sections.base import columns_in_one_unit, named
+
+DIGITS = 5
+
+
+def energy(subjects: Sequence[Subject]) -> Section | None:
+    """The energy balance of each run, its audit, and whether the run is complete."""
+    blocks: list[Block] = []
+    # A measured trace has no balance.
+    for subject in (one for one in subjects if not is_measured(one.tree)):
+        attributes = subject.tree.attrs
+        audit = attributes.get("audit", "")
+        residual = abs(float(attributes.get("energy_residual", math.nan)))
+        text = f"Residual of the balance: {residual:.1g} of the drive's work. Audit: {audit}."
+        blocks.append(Text(named(subjects, subject, text), warns=audit not in {"passed", ""}))
+        if attributes.get("complete") == "false":
+            blocks.append(Text(named(subjects, subject, attributes["comment"]), warns=True))
+        if "energy" in subject.tree.children:
+            blocks.append(_balance(subject))
+    return Section("Energy", tuple(blocks)) if blocks else None
+
+
+def _balance(subject: Subject) -> Table:
+    """Energies, and their parts of the work of the drive."""
+    data = group_of(subject.tree, "energy").sum("realization")
+    work = abs(data["drive_work"].item())
+    energies = {
+        meaning.long_name: data[name].item()
+        for name, meaning in variables.ENERGY.items()
+        if name in data
+    }
+    (head,), cells = columns_in_one_unit([("energy", list(energies.values()), "J", DIGITS)])
+    rows = tuple(
+        (name, text, number(100 * value / work, DIGITS) if work > 0 else UNKNOWN)
+        for (name, value), (text,) in zip(energies.items(), cells, strict=True)
+    )
+    return Table(("sum over realizations", head, "part of the drive's work (%)"), rows)

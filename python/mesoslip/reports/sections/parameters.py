@@ -1,0 +1,45 @@
+"""Parameters of fits, with their uncertainties."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mesoslip.inference import posterior
+from mesoslip.quantities import column
+from mesoslip.reports.content import Block, Section, Subject, Table, Text
+from mesoslip.reports.sections.base import picture_of
+
+HEAD = (
+    "parameter",
+    "median",
+    "50 % interval",
+    "90 % interval",
+    "verdict",
+    "most informative feature",
+)
+
+
+def parameters(subjects: Sequence[Subject]) -> Section:
+    """Parameters of fits with their intervals, and the warnings of the fits."""
+    blocks: list[Block] = []
+    for subject in subjects:
+        if len(subjects) > 1:
+            blocks.append(Text(subject.name))
+        probability = float(subject.tree.attrs["agreement_probability"])
+        note = f"Agreement of the model with the trace: p = {probability:.2g}."
+        rows = tuple(_row(one) for one in posterior.table(subject.tree))
+        blocks.append(Table(HEAD, rows, note))
+        warnings = str(subject.tree.attrs["warnings"]).split("\n")
+        blocks += [Text(f"Warning: {one}.", warns=True) for one in warnings if one]
+        caption = "Parameters, and predicted traces beside the measured one"
+        blocks.append(picture_of(subjects, subject, caption))
+    return Section("Parameters", tuple(blocks))
+
+
+def _row(parameter: posterior.Row) -> tuple[str, ...]:
+    """A parameter with its unit, its median and intervals in that unit, and its verdict."""
+    shown = column(parameter.percentiles, parameter.unit, parameter.digits)
+    low, lower, median, upper, high = (shown.text(one) for one in parameter.percentiles)
+    intervals = (f"{lower} to {upper}", f"{low} to {high}")
+    key = shown.head(parameter.key)
+    return (key, median, *intervals, parameter.verdict, parameter.informed_by)

@@ -1,0 +1,125 @@
+"""Catalogues of slips: statistics, distributions, rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from mesoslip.analysis import slips as catalogue
+from mesoslip.output.access import group_of
+from mesoslip.plots.lines import max_size
+from mesoslip.plots.style import COLORS
+from mesoslip.quantities import scale_for
+from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn
+from mesoslip.reports.sections.base import columns_in_one_unit, named, row_in_one_unit
+
+# Rows of a catalogue on a page.
+MAX_ROWS = 60
+# Bins of a histogram.
+BINS = 24
+
+# Columns of the catalogue: header, and SI unit.
+COLUMNS = {
+    "force_before": ("force before", "N"),
+    "force_after": ("force after", "N"),
+    "force_drop": ("force drop", "N"),
+    "peak_velocity": ("peak velocity", "m/s"),
+    "contacts_broken": ("breaks", "1"),
+    "duration": ("duration", "s"),
+    "waiting_time": ("waiting time", "s"),
+}
+# Columns of which there are histograms.
+DISTRIBUTIONS = ("force_drop", "duration", "waiting_time")
+STATISTICS = {
+    "mean": "mean",
+    "standard_deviation": "standard deviation",
+    "minimum": "minimum",
+    "maximum": "maximum",
+}
+
+
+def slips(subjects: Sequence[Subject]) -> Section | None:
+    """The catalogues of slips of runs with inertia."""
+    with_slips = [one for one in subjects if not one.config.slider.jumps]
+    if not with_slips:
+        return None
+    blocks: list[Block] = []
+    for subject in with_slips:
+        blocks += _statistics(subjects, subject)
+    if any(group_of(one.tree, "slips").sizes["slip"] > 1 for one in with_slips):
+        blocks.append(drawn("Distributions of the slips", lambda: _histograms(with_slips)))
+    if len(subjects) == 1:
+        blocks += _rows(with_slips[0])
+    return Section("Slips", tuple(blocks))
+
+
+def _statistics(subjects: Sequence[Subject], subject: Subject) -> list[Block]:
+    """Statistics of each column of a catalogue."""
+    statistics = catalogue.statistics(subject.tree)
+    count = int(statistics["slips"]["count"])
+    if count == 0:
+        return [Text(named(subjects, subject, "There is no slip."))]
+    rows = tuple(
+        row_in_one_unit(header, [statistics[name][one] for one in STATISTICS], unit)
+        for name, (header, unit) in COLUMNS.items()
+        if name in statistics
+    )
+    head = (f"{count} slip{'s' if count > 1 else ''}", *STATISTICS.values())
+    note = "Statistics include the first slip, which is larger if all contacts were relaxed."
+    name: list[Block] = [Text(subject.name)] if len(subjects) > 1 else []
+    return [*name, Table(head, rows, note)]
+
+
+def _rows(subject: Subject) -> list[Block]:
+    """The first rows of a catalogue."""
+    rows = catalogue.rows(subject.tree)
+    if not rows:
+        return []
+    shown = rows[:MAX_ROWS]
+    columns = [("realization", [float(row["realization_index"]) for row in shown], "1", 4)]
+    columns.append(("start", [row["start_time"] for row in shown], "s", 7))
+    # A measured trace has no breaks.
+    columns += [
+        (header, [row[name] for row in shown], unit, 4)
+        for name, (header, unit) in COLUMNS.items()
+        if any(row[name] is not None for row in shown)
+    ]
+    note = f"The first {MAX_ROWS} of {len(rows)} slips." if len(rows) > MAX_ROWS else ""
+    return [Table(*columns_in_one_unit(columns), note)]
+
+
+def _histograms(subjects: Sequence[Subject]) -> Figure:
+    """Force drops, durations and waiting times of slips, each output in a colour."""
+    figure = Figure(figsize=(7.5, 2.5))
+    panels = figure.subplots(1, len(DISTRIBUTIONS))
+    catalogues = [catalogue.slips(one.tree) for one in subjects]
+    for axes, name in zip(panels, DISTRIBUTIONS, strict=True):
+        header, unit = COLUMNS[name]
+        all_values = [one[name].values for one in catalogues]
+        all_values = [values[np.isfinite(values)] for values in all_values]
+        scale = scale_for(max_size(*all_values), unit)
+        together = np.concatenate(all_values) / scale.size
+        axes.set_xlabel(scale.label(header))
+        if together.size == 0:
+            continue
+        low, high = together.min(), together.max()
+        # Values that are equal up to rounding have no distribution.
+        if high - low <= 1e-9 * max(abs(low), abs(high)):
+            low, high = low - 0.5 * abs(low), high + 0.5 * abs(high) or 1.0
+        bins = np.linspace(low, high, BINS + 1)
+        for number, (values, subject) in enumerate(zip(all_values, subjects, strict=True)):
+            axes.hist(
+                values / scale.size,
+                bins,
+                histtype="step" if len(subjects) > 1 else "stepfilled",
+                color=COLORS[number % len(COLORS)] if len(subjects) > 1 else "0.6",
+                label=subject.name,
+            )
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    panels[0].set_ylabel("number of slips")
+    if len(subjects) > 1:
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+    return figure

@@ -276,7 +276,8 @@ def test_pages_that_were_left_leave_nothing(browser):
             browser.open(server.address)
             browser.wait_until_done()
             browser.driver.get("about:blank")
-            assert eventually(lambda: server.threads() == 1, 60)
+            # The server's own, and the one that builds pages.
+            assert eventually(lambda: server.threads() <= 2, 60)
             memory.append(server.memory())
         assert memory[-1] < 1.15 * memory[0], memory
     finally:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import shlex
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -488,3 +490,123 @@ def test_changes_leave_nothing_behind():
         assert many[2] == few[2]
     finally:
         page.close()
+
+
+def test_a_run_too_large_for_a_page_is_refused_at_its_control(session, monkeypatch):
+    """With one sentence, and the configuration stays as it was."""
+    before = session.config
+    assert not session.change("contacts.count", "100000000")
+    message = session.problems["contacts.count"]
+    assert "too long to start" in message
+    assert message.count(".") == 0
+    assert session.config is before
+    assert session.change("contacts.count", "4000")
+    monkeypatch.setattr("mesoslip.explorer.following.free_memory", lambda: 1e6)
+    assert not session.change("contacts.count", "100000")
+    assert "GiB" in session.problems["contacts.count"]
+    assert session.config.contacts.count == 4000
+    # Also through what counts the contacts of a lattice.
+    monkeypatch.undo()
+    assert session.change("contacts.count", "4080")
+    assert session.change("interaction.lattice", "square")
+    assert not session.change("interaction.columns", "1000000")
+    assert "too long to start" in session.problems["interaction.columns"]
+
+
+def test_a_start_too_large_for_a_page_is_not_run():
+    session = Session(Config.load(KLEIN, ["contacts.count=100000000"]), KLEIN)
+    assert "contacts.count" in session.problems
+    assert session.change("contacts.count", "4080")
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not say")
+def test_memory_of_a_run_that_was_replaced_is_returned():
+    def resident():
+        status = Path("/proc/self/status").read_text()
+        return int(status.split("VmRSS:")[1].split()[0]) / 1024
+
+    large = explored(Config.load(KLEIN, ["contacts.count=1000000", "run.duration=1000 s"]))
+    small = explored(Config.load(KLEIN, ["run.duration=0.1 s"]))
+    worker, peaks, done = Newest(), [], threading.Event()
+    before = resident()
+    try:
+        worker.submit(lambda stop: follow(large, stop, lambda _: peaks.append(resident())))
+        end = time.monotonic() + 60
+        while not peaks and time.monotonic() < end:
+            time.sleep(0.01)
+        worker.submit(lambda stop: follow(small, stop, lambda _: None))
+        worker.submit(lambda _: done.set())
+        assert done.wait(60)
+    finally:
+        worker.close()
+    assert peaks[0] - before > 50
+    end = time.monotonic() + 30
+    while resident() - before > 0.3 * (peaks[0] - before) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert resident() - before < 0.3 * (peaks[0] - before)
+
+
+def test_a_refused_change_leaves_the_run_as_it_was():
+    """It goes on to its end, and its output can be downloaded."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer.view import Page
+
+    page = Page(document, Config.load(KLEIN, ["run.duration=1 s"]), KLEIN)
+    status, drawn = (document.get_model_by_name(name) for name in ("status", "drawn"))
+    try:
+        page._update()
+        document.get_model_by_name("contacts.count").value = "100000000"
+        assert "red" in status.text
+        assert document.get_model_by_name("contacts.count:message").visible
+        end = time.monotonic() + 60
+        while page._results is None and time.monotonic() < end:
+            for callback in document.session_callbacks:
+                document.remove_next_tick_callback(callback)
+                callback.callback()
+            drawn.tags = [drawn.tags[0] + 1]
+            time.sleep(0.001)
+        assert page._results is not None
+        assert page._results.config.contacts.count == 4080
+        # What is wrong is still reported.
+        assert "red" in status.text
+    finally:
+        page.close()
+
+
+def test_a_page_is_built_beside_the_pages_that_are_open(monkeypatch):
+    """On another thread: the server's own goes on."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer import server
+
+    answered, waited = threading.Event(), []
+    monkeypatch.setattr(server, "Page", lambda *_: waited.append(answered.wait(5)))
+
+    class Context:
+        async def with_locked_document(self, build):
+            await build(document)
+
+    async def serve():
+        building = asyncio.create_task(
+            server.Pages(Config.load(KLEIN), KLEIN).on_session_created(Context())
+        )
+        await asyncio.sleep(0.1)
+        answered.set()
+        await building
+
+    asyncio.run(serve())
+    assert waited == [True]
+
+
+def test_the_models_of_a_page_are_collected_once(monkeypatch):
+    """Though it has fifty roots."""
+    document = pytest.importorskip("bokeh.document").Document()
+    from mesoslip.explorer.view import Page
+
+    collected = []
+    collect = type(document.models).recompute
+    monkeypatch.setattr(
+        type(document.models), "recompute", lambda self: collected.append(collect(self))
+    )
+    Page(document, Config.load(KLEIN), KLEIN).close()
+    assert len(document.roots) > 40
+    assert len(collected) <= 2

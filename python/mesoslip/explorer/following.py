@@ -7,7 +7,9 @@ import time
 from collections.abc import Callable
 
 from mesoslip.configuration.config import Config
+from mesoslip.errors import ConfigError, Problem
 from mesoslip.execution.stop import StopRequest
+from mesoslip.simulation.memory import check_memory, free_memory
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results
 
@@ -30,6 +32,11 @@ SAMPLES_IN_SLIP = 100
 MAX_SNAPSHOTS = 100
 MAX_SNAPSHOT_BYTES = 50_000_000
 BYTES_PER_CONTACT = 24
+
+# Contacts of a run: each takes up to 1 us before the first segment, which nothing interrupts.
+MAX_CONTACTS = 10_000_000
+# Part of the free memory that a run may take: there may be other pages, and other programs.
+MAX_MEMORY_PART = 0.5
 
 
 class Pace:
@@ -75,6 +82,26 @@ def explored(config: Config) -> Config:
         times = [expected * (number + 1) / count for number in range(count - 1)]
         output |= {"snapshots": times, "avalanche_size": max(1, config.contacts.count // 100)}
     return config.replace({"run.realizations": 1}, {"output": output})
+
+
+def runnable(config: Config) -> Config:
+    """A configuration as it is run for the page, if the machine has the memory for it and a run
+    starts soon; see `explored`.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be run so, with each key that asks for too much.
+    """
+    wanted = explored(config)
+    count = wanted.contacts.count
+    if wanted.contact_kind.is_discrete and count > MAX_CONTACTS:
+        message = (
+            f"more than {MAX_CONTACTS} contacts take too long to start on a page: use mesoslip run"
+        )
+        raise ConfigError([Problem("", "contacts.count", message, count)])
+    check_memory(wanted, MAX_MEMORY_PART * free_memory())
+    return wanted
 
 
 def follow(config: Config, stop: StopRequest, show: Callable[[Results], None]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import logging
 import webbrowser
@@ -11,7 +12,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from bokeh.application import Application
-from bokeh.application.handlers import FunctionHandler
+from bokeh.application.application import SessionContext
+from bokeh.application.handlers import Handler
 from bokeh.document import Document
 from bokeh.server.auth_provider import AuthProvider
 from bokeh.server.server import Server
@@ -40,6 +42,29 @@ POLICY = (
 TEMPLATE = Environment(autoescape=False).from_string(
     files("mesoslip.explorer").joinpath("page.html").read_text("utf-8")
 )
+
+
+class Pages(Handler):
+    """Builds the page of a new tab on another thread, so that other tabs are answered meanwhile.
+
+    One at a time: several would not be done sooner, and would slow the server down.
+    """
+
+    def __init__(self, config: Config, source: str) -> None:
+        super().__init__()
+        self._config, self._source = config, source
+        self._turn = asyncio.Lock()
+
+    async def on_session_created(self, session_context: SessionContext) -> None:
+        async with self._turn:
+            await session_context.with_locked_document(self._build)
+
+    async def _build(self, document: Document) -> None:
+        document.template = TEMPLATE
+        await asyncio.to_thread(Page, document, self._config, self._source)
+
+    def modify_document(self, doc: Document) -> None:
+        """Nothing is left to do."""
 
 
 class OnlyHere(AuthProvider):
@@ -128,10 +153,8 @@ def make_server(config: Config, source: str, port: int) -> Server:
 
     # Scripts and styles come from this server, whatever its environment says.
     settings.resources = "server"
-
-    def make(document: Document) -> None:
-        document.template = TEMPLATE
-        Page(document, config, source)
+    # Whether models fit together is for tests to check, not for each tab.
+    settings.perform_document_validation = False
 
     for one in [0] if port == 0 else range(port, port + MORE_PORTS):
         gate = OnlyHere()
@@ -144,7 +167,7 @@ def make_server(config: Config, source: str, port: int) -> Server:
             "check_unused_sessions_milliseconds": UNUSED_MILLISECONDS // 3,
         }
         try:
-            server = Server({"/": Application(FunctionHandler(make))}, **options)
+            server = Server({"/": Application(Pages(config, source))}, **options)
         except OSError:
             continue
         gate.hosts = {f"{name}:{server.port}" for name in (ADDRESS, "localhost")}

@@ -9,6 +9,7 @@ from mesoslip.configuration.differences import text_of
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.errors import ConfigError, MesoslipError, Problem
 from mesoslip.explorer.controls import BY_KEY, COUNTED, FOR_TABLES, NONE, values
+from mesoslip.explorer.following import runnable
 
 
 class Session:
@@ -36,6 +37,7 @@ class Session:
         self.changes: dict[str, str] = {}
         self.problems: dict[str, str] = {}
         self.values = self._at_start = values(start)
+        self._check("")
 
     def change(self, key: str, text: str) -> bool:
         """Change a key; returns whether the configuration can be run with all changes.
@@ -133,9 +135,8 @@ class Session:
         """Lay all changes over the start, and keep the result if it can be run."""
         self.problems = {}
         try:
-            self.config = self.start.replace(
-                *(f"{key}={text}" for key, text in self.changes.items())
-            )
+            config = self.start.replace(*(f"{key}={text}" for key, text in self.changes.items()))
+            runnable(config)
         except ConfigError as error:
             for problem in error.problems:
                 key = self._place(problem, last)
@@ -146,7 +147,8 @@ class Session:
         except MesoslipError as error:
             self.problems[last] = str(error)
         else:
-            self.values = values(self.config)
+            self.config = config
+            self.values = values(config)
             # What is written otherwise, as 500 us for 0.5 ms, is not changed.
             for key in list(self.changes):
                 if key in self.values and self.values[key] == self._at_start.get(key):
@@ -156,4 +158,7 @@ class Session:
     def _place(self, problem: Problem, last: str) -> str:
         """The control that a problem is shown at: its own, or else the one that was changed."""
         is_there = problem.key in self.values or problem.key in self.changes
+        if problem.key == "contacts.count" and self.text("interaction.lattice") != NONE:
+            # The number of contacts is that of the lattice, and has no control.
+            is_there = False
         return problem.key if problem.key in BY_KEY and is_there else last

@@ -27,7 +27,7 @@ from mesoslip.execution.newest import Newest
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import BY_KEY
 from mesoslip.explorer.figures import FIRST, SECOND, LatticeView, MotionView, TheoryView
-from mesoslip.explorer.following import explored, follow
+from mesoslip.explorer.following import explored, follow, runnable
 from mesoslip.explorer.knobs import PLAIN, RED, ControlView, set_changed
 from mesoslip.explorer.pictures import Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
@@ -75,8 +75,9 @@ class Page:
         self._stem = Path(source).stem or "run"
         self.session = Session(start, source)
         self._results: Results | None = None
-        # Numbers of the last change, of that which is shown, and of that whose theory was begun.
-        self._turn = self._shown = self._explained = 0
+        # Numbers of the last change, of the last one that could be run, of that which is shown, and
+        # of that for which the theory was started.
+        self._change_count = self._turn = self._shown = self._explained = 0
         self._is_closed = False
         self._workers = {
             "run": Newest(),
@@ -102,8 +103,10 @@ class Page:
         self._theory = TheoryView()
         self._lattice = LatticeView(document, self._motion.now)
         document.title = f"mesoslip explore: {start.title or source}"
-        for root in self._roots():
-            document.add_root(root)
+        # The models of a document are collected once, and not again for each piece of the page.
+        with document.models.freeze():
+            for root in self._roots():
+                document.add_root(root)
         groups: dict[str, list[str]] = {}
         for key, control in BY_KEY.items():
             groups.setdefault(control.group, []).append(f"{key}:control")
@@ -175,22 +178,20 @@ class Page:
         set_changed(self._command, value=self.session.command)
 
     def _update(self) -> None:
-        """Show the controls as they are, and run what they say if it can be run."""
-        self._results = None
-        self._turn += 1
+        """Show the controls as they are, and run the configuration if it can be run; otherwise the
+        run that is shown goes on.
+        """
+        self._change_count += 1
         with self._together():
             self._show_controls()
             if self.session.problems:
-                for worker in self._workers.values():
-                    worker.cancel()
-                self._refuse("what is marked in red cannot be run")
+                self._refuse("not run: correct the values marked in red")
                 return
-            self._tell("running …")
+            self._results = None
+            self._turn = self._change_count
+            self._report("running …")
             self._workers["theory"].cancel()
-            try:
-                self._start("run", self.session.config)
-            except ConfigError as error:
-                self._refuse("; ".join(one.message for one in error.problems))
+            self._start("run", explored(self.session.config))
             self._start_limit(self.session.config)
 
     def _start_limit(self, config: Config) -> None:
@@ -200,7 +201,7 @@ class Page:
         self._workers["limit"].cancel()
         if is_wanted:
             try:
-                self._start("limit", config.replace({"run.engine": "me"}))
+                self._start("limit", runnable(config.replace({"run.engine": "me"})))
             except ConfigError as error:
                 told = "N → ∞: " + "; ".join(one.message for one in error.problems)
         set_changed(self._limit_message, text=html.escape(told), visible=bool(told))
@@ -213,7 +214,7 @@ class Page:
         set_changed(self._arrangement, tags=there)
 
     def _start(self, name: str, config: Config) -> None:
-        turn, wanted = self._turn, explored(config)
+        turn = self._turn
         view = self._motion if name == "run" else self._beside
         show = self._show_motion if name == "run" else self._show_limit
 
@@ -225,7 +226,7 @@ class Page:
                 self._publish(show, turn, shown)
 
             try:
-                follow(wanted, stop, look)
+                follow(config, stop, look)
             except MesoslipError as error:
                 self._publish(self._fail, turn, str(error))
             except Exception as error:
@@ -275,13 +276,13 @@ class Page:
             with self._together():
                 show(turn, shown)
 
-    def _tell(self, text: str) -> None:
+    def _report(self, text: str) -> None:
         set_changed(self._status, text=html.escape(text), styles=PLAIN)
 
     def _refuse(self, told: str) -> None:
         """Tell why what is wanted is not run."""
         set_changed(self._status, text=html.escape(told), styles=RED)
-        self._status.tags = [self._turn, REFUSED]
+        self._status.tags = [self._change_count, REFUSED]
 
     def _fail(self, turn: int, told: str) -> None:
         if turn == self._turn:
@@ -296,9 +297,10 @@ class Page:
         if turn < self._turn:
             return
         self._results = results
-        self._tell(drawn.progress)
-        # What a test, or who measures, waits for.
-        self._status.tags = [turn, drawn.part_done]
+        if turn == self._change_count:
+            self._report(drawn.progress)
+            # Tests and measurements wait for this.
+            self._status.tags = [turn, drawn.part_done]
 
     def _show_limit(self, _turn: int, shown: tuple[Motion, Results | None]) -> None:
         self._beside.show(shown[0])
@@ -309,13 +311,13 @@ class Page:
 
     def _save(self) -> None:
         if self.session.problems:
-            self._tell("what is marked in red cannot be saved")
+            self._report("what is marked in red cannot be saved")
             return
         self._send(f"{self._stem}.toml", self.session.config.to_toml().encode())
 
     def _download(self) -> None:
         if self._results is None:
-            self._tell("the run is not over; the output is there when it is")
+            self._report("the run is not over; the output is there when it is")
             return
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{self._stem}.nc"

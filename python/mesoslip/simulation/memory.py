@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mesoslip.errors import ConfigError, Problem
@@ -20,8 +21,31 @@ BYTES_PER_AVALANCHE = 3 * 10 * 8
 BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
 
 
-def check_memory(config: Config) -> None:
-    """Make sure, before a run, that what it records fits into the memory of this machine.
+def machine_memory() -> int:
+    """Memory of this machine [bytes]."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def free_memory() -> int:
+    """Memory of this machine that programs may still take [bytes]; all of it where the system does
+    not say.
+    """
+    try:
+        lines = Path("/proc/meminfo").read_text("ascii").splitlines()
+        return next(1024 * int(one.split()[1]) for one in lines if one.startswith("MemAvailable:"))
+    except (OSError, StopIteration):
+        return machine_memory()
+
+
+def check_memory(config: Config, available: float | None = None) -> None:
+    """Make sure, before a run, that what it records fits into memory.
+
+    Parameters
+    ----------
+    config
+        The run.
+    available
+        Memory that it may take [bytes]; by default that of this machine.
 
     Raises
     ------
@@ -29,7 +53,8 @@ def check_memory(config: Config) -> None:
         If it does not, with each key that asks for too much.
     """
     run, output, contacts = config.run, config.output, config.contacts
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = machine_memory() if available is None else available
+    owner = "the machine has" if available is None else "it may take"
     together = min(run.realizations, os.cpu_count() or 1)
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
@@ -70,7 +95,7 @@ def check_memory(config: Config) -> None:
                 Problem(
                     "",
                     key,
-                    f"the run may need {needed / 2**30:.3g} GiB for this, and the machine has "
+                    f"the run may need {needed / 2**30:.3g} GiB for this, and {owner} "
                     f"{memory / 2**30:.3g} GiB",
                     value,
                 )

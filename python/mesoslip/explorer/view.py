@@ -95,7 +95,7 @@ class Page:
         )
         self._files = ColumnDataSource({"content": []}, name="files", tags=[""])
         self._files.js_on_change("data", CustomJS(code=SAVE))
-        self._limit = Toggle(label="beside N → ∞", name="limit", width=120)
+        self._limit = Toggle(label="compare with N → ∞", name="limit", width=150)
         self._limit.on_change("active", lambda _a, _o, _n: self._update())
         self._limit_message = Div(visible=False, styles=RED, name="limit:message")
         self._motion = MotionView("", "N contacts", FIRST, self._explain)

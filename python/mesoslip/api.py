@@ -22,17 +22,17 @@ def run(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.DataTree:
-    """Simulate.
+    """Simulate a configuration.
 
     Parameters
     ----------
     config
         A TOML file, an output to run again, nested tables, or a `Config`.
     executor
-        Where realizations are computed: `Threads`, `Processes` or `Dask`, or a number of threads;
-        by default as many as there are processors. The result does not depend on it.
+        Where realizations are computed: `Threads`, `Processes` or `Dask`, or a number of threads,
+        by default the number of processors. The result does not depend on it.
     progress
-        Called now and then with the fraction of the work that is done, 0 to 1.
+        Called repeatedly with the fraction of the work that is done, 0 to 1.
 
     Returns
     -------

@@ -1,16 +1,16 @@
-"""Errors that mesoslip raises; the command line prints them and exits with their status."""
+"""Exceptions of mesoslip; the command line prints them and exits with their status."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# Characters of the longest value in a message.
+# Maximum number of characters of a value in a message.
 MAX_SHOWN = 100
 
 
 class MesoslipError(Exception):
-    """Any error that mesoslip itself finds."""
+    """Base class of all errors of mesoslip."""
 
     exit_status = 1
 
@@ -19,10 +19,9 @@ class MesoslipError(Exception):
 
 
 def printable(text: str) -> str:
-    """A text as a terminal may show it: characters that would steer it are escaped.
+    """A text that is safe on a terminal: control characters are escaped.
 
-    So are bytes of names of files that are not text, and characters that change the direction of
-    writing.
+    So are undecodable bytes of file names, and characters that change the direction of writing.
     """
     return "".join(
         one if one.isprintable() else one.encode("unicode_escape").decode() for one in text
@@ -31,7 +30,7 @@ def printable(text: str) -> str:
 
 @dataclass(frozen=True)
 class Problem:
-    """One error in a configuration: where, what, and what would be right."""
+    """One error of a configuration: source, key, value, and the fix."""
 
     source: str
     key: str
@@ -39,24 +38,24 @@ class Problem:
     value: object = None
 
     def __str__(self) -> str:
-        place = ": ".join(printable(part) for part in (self.source, self.key) if part)
+        where = ": ".join(printable(part) for part in (self.source, self.key) if part)
         if self.value is None:
-            return f"{place}: {self.message}"
-        return f"{place} = {shown(self.value)}: {self.message}"
+            return f"{where}: {self.message}"
+        return f"{where} = {shown(self.value)}: {self.message}"
 
 
 def shown(value: object) -> str:
     """A value as a message shows it, shortened if it is long."""
     try:
         text = repr(value)
-    # Python writes no integer of thousands of digits, and no tables in tables without end.
+    # Python does not write integers of thousands of digits, nor tables nested without end.
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} that is too long to show"
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 10]} ... {text[-5:]}"
 
 
 class ConfigError(MesoslipError):
-    """A configuration that cannot be run; ``problems`` has all its errors."""
+    """A wrong configuration; ``problems`` has all its errors."""
 
     exit_status = 2
 
@@ -72,7 +71,7 @@ class FileError(MesoslipError):
 
 
 class WriteError(FileError):
-    """A file that the system failed to write, such as on a full disk."""
+    """A file that could not be written, as on a full disk."""
 
     exit_status = 1
 

@@ -18,7 +18,13 @@ Tables = dict[str, Any]
 MOST_BREAKS = 6e3
 MOST_PERIODS = 3e3
 
-WIDEST = {"gaussian": 1.0, "uniform": 0.577, "lognormal": 2.0, "weibull": 2.0, "exponential": 1.0}
+MAX_WIDTH = {
+    "gaussian": 1.0,
+    "uniform": 0.577,
+    "lognormal": 2.0,
+    "weibull": 2.0,
+    "exponential": 1.0,
+}
 
 
 def decades(random: Random, least: float, most: float) -> float:
@@ -66,8 +72,8 @@ def draw(random: Random) -> Tables:
 
 
 def _contacts(random: Random, engine: str) -> tuple[Tables, Tables]:
-    law = random.choice(list(WIDEST))
-    width = min(decades(random, -4, 0.3), WIDEST[law])
+    law = random.choice(list(MAX_WIDTH))
+    width = min(decades(random, -4, 0.3), MAX_WIDTH[law])
     if engine == "me":
         width = max(width, 0.005)
     interaction: Tables = {}

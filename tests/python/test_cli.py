@@ -300,7 +300,7 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     lost.write_text('base = "nothing.toml"\n')
     status, _, told = command("info", lost)
     assert status == 2
-    assert "lost.toml: base = 'nothing.toml': there is no such file beside it" in told
+    assert "lost.toml: base = 'nothing.toml': there is no such file;" in told
     lost.write_text("[slider]\nstiffness = 97 N/m\n")
     assert 'quotes, as in "97 N/m"' in command("info", lost)[2]
     assert "mesoslip example lists them" in command("example", "mine")[2]

@@ -18,7 +18,7 @@ from conftest import ROOT, klein_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError, MesoslipError, ThresholdLaw
-from mesoslip.configuration.files import Laid, override
+from mesoslip.configuration.files import Merged, override
 from mesoslip.configuration.messages import all_keys
 from mesoslip.configuration.sliders import KINDS as SLIDER_KINDS
 from mesoslip.configuration.sliders import SLIDERS
@@ -61,7 +61,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("slider__damping", 5.0, ["slider.damping", "not both"]),
         ("slider__stifness", 97, ["slider.stifness", "unknown key", "'stiffness'"]),
         ("slider__layers", 16, ["slider.layers", 'for slider.kind = "layered" only']),
-        ("slider", {"kind": "quasistatic"}, ["slider.stiffness", "missing", "by force"]),
+        ("slider", {"kind": "quasistatic"}, ["slider.stiffness", "missing", "drive.force_rate"]),
         (
             "slider",
             {"kind": "quasistatic", "stiffness": 97.0, "mass": 1.0},
@@ -99,11 +99,15 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
             {"engine": "me", "resolution": 1e-3, "duration": 12.0},
             ["run.resolution", "populations"],
         ),
-        ("curve", {"newborn_width": "9 nm"}, ["curve.newborn_width", "spread"]),
+        ("curve", {"newborn_width": "9 nm"}, ["curve.newborn_width", "a quarter of"]),
         ("run__duration", "0 s", ["run.duration", "greater than 0"]),
         ("run__duration", None, ["run.duration", "needed"]),
         ("run__realizations", 0, ["run.realizations", "greater than or equal to 1"]),
-        ("run", {"engine": "me", "realizations": 2, "duration": 12.0}, ["must be 1", "chance"]),
+        (
+            "run",
+            {"engine": "me", "realizations": 2, "duration": 12.0},
+            ["must be 1", "no random numbers"],
+        ),
         ("run__seed", -1, ["run.seed", "greater than or equal to 0"]),
         ("drive__velocity", "3 s", ["drive.velocity", "um/s"]),
         ("drive__velocity", None, ["drive.velocity", "either"]),
@@ -144,7 +148,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         (
             "interaction",
             LATTICE | {"strength": 1e9},
-            ["interaction.strength", "cannot attach", "digits", "at most 9.66e+05"],
+            ["interaction.strength", "attaches", "double precision", "at most 9.66e+05"],
         ),
         ("interaction", LATTICE | {"lattice": "cubic"}, ["interaction.lattice", "cubic", "square"]),
         ("interaction", LATTICE | {"xi": 1}, ["interaction.xi", "unknown key"]),
@@ -175,7 +179,7 @@ def test_what_is_wrong_is_told(key, value, words):
     [
         (
             {"run__engine": "me", "interaction": LATTICE},
-            ["interaction", 'engine "eq"', "no neighbours", "narrower"],
+            ["interaction", 'engine "eq"', "no neighbours", "smaller"],
         ),
         (
             {"run__engine": "me", "slider": {"kind": "quasistatic", "stiffness": 97.0}},
@@ -191,7 +195,7 @@ def test_what_is_wrong_is_told(key, value, words):
         ),
         (
             {"interaction": LATTICE, "output__snapshots": [3.0, 2.0]},
-            ["output.snapshots", "grow", "3"],
+            ["output.snapshots", "increase", "3"],
         ),
         ({"interaction": LATTICE, "output__snapshots": [13.0]}, ["output.snapshots", "duration"]),
         (
@@ -219,7 +223,7 @@ def test_what_is_wrong_between_tables_is_told(changes, words):
 
 
 def test_lengths_of_a_run():
-    """A way laid over a duration replaces it; avalanches end a run whatever its duration."""
+    """A distance replaces the duration of a base; avalanches end a run whatever its duration."""
     quasistatic = {"kind": "quasistatic", "stiffness": 97.0}
     tables = klein_tables(slider=quasistatic)
     assert Config.from_dict(tables).duration == 12
@@ -238,13 +242,13 @@ def test_lengths_of_a_run():
 @pytest.mark.parametrize(
     ("way", "duration"), [(1e-6, 1.0), (3e-6, 4.0), (4.5e-6, 5.25), (8e-6, 7.0), (10e-6, 8.0)]
 )
-def test_a_way_of_stages(klein, way, duration):
+def test_the_time_for_a_path_length_of_stages(klein, way, duration):
     """There, a hold, back, and on after the end of the last stage."""
     stages = [(2.0, 1e-6), (1.0, 0.0), (2.0, -1e-6), (2.0, 2e-6)]
     drive = {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
     config = klein(run={"drive_displacement": way}, drive=drive)
     assert config.duration == pytest.approx(duration)
-    assert math.fsum(part.way for part in config.drive_parts) == pytest.approx(way)
+    assert math.fsum(part.path_length for part in config.drive_parts) == pytest.approx(way)
 
 
 def test_a_way_that_stages_do_not_go():
@@ -440,7 +444,7 @@ def test_overrides():
     assert config.title == "another"
     with pytest.raises(ConfigError, match=r"did you mean 'contacts\.delay'"):
         Config.load(path, ["delay=1ms"])
-    with pytest.raises(ConfigError, match=r"base: names the file under another one"):
+    with pytest.raises(ConfigError, match=r"base: names the file that a file is based on"):
         Config.load(path, ["base=klein.toml"])
     with pytest.raises(ConfigError, match="did you mean 'delay'"):
         Config.load(path, ["contacts.delays=1ms"])
@@ -572,7 +576,7 @@ def test_notebooks_show_a_short_table(klein):
     )._repr_html_()
     assert "&lt;b&gt;" in shown
     assert "delay = 0.0005" in shown
-    assert "(9 in all)" in shown
+    assert "(9 in total)" in shown
     assert shown.count("<tr>") == 6
     assert len(shown) < 2000
 
@@ -592,7 +596,7 @@ def much_too_long(path):
         (os.mkfifo, "not a regular file"),
         (lambda path: path.symlink_to("/dev/zero"), "not a regular file"),
         (links_in_a_loop, "Too many levels"),
-        (much_too_long, "128 MiB are too much"),
+        (much_too_long, "128 MiB is too large"),
         (lambda path: path.write_bytes(b"title = '\xff'"), "text in UTF-8"),
         (lambda path: path.write_text('base = "a\\u0000b"'), "name of a file"),
         (lambda path: path.write_text('base = ""'), "name of a file"),
@@ -758,7 +762,7 @@ def test_nothing_breaks_the_checks(key, value, slider):
     changes = {"slider": slider} if slider else {}
     for config in (
         lambda: Config.from_dict(klein_tables(**changes)).replace({key: value}),
-        lambda: Config.from_dict(override(Laid(klein_tables(**changes)), [{key: value}]).tables),
+        lambda: Config.from_dict(override(Merged(klein_tables(**changes)), [{key: value}]).tables),
     ):
         with contextlib.suppress(ConfigError):
             checked = config()
@@ -807,7 +811,7 @@ def test_what_a_law_does_not_have():
 
 
 def test_tables_on_a_base(tmp_path, monkeypatch):
-    """Nested tables are laid over a file of the current folder, as a file over one of its own."""
+    """The base of nested tables is in the current folder, that of a file beside it."""
     (tmp_path / "klein.toml").write_text((ROOT / "runs" / "klein.toml").read_text())
     monkeypatch.chdir(tmp_path)
     config = Config.from_dict({"base": "klein.toml", "contacts": {"delay": "2 ms"}})
@@ -956,7 +960,7 @@ def test_what_the_kernel_is_told_of_contacts(klein):
     kind = config.contact_kind
     assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("populations", False, False)
     assert kind.kernel_parameters(config) == common | {"resolution": 0.25}
-    assert kind.most_realizations == 1
+    assert kind.max_realizations == 1
 
     config = klein(slider=QUASISTATIC)
     told = config.contact_kind.kernel_parameters(config)

@@ -26,11 +26,11 @@ def test_a_configuration_knows_what_it_was_laid_over(tmp_path):
     assert plain.base is None
     changed = mesoslip.Config.load(KLEIN, ["contacts.delay=2 ms"])
     assert changed.base == plain
-    assert differences.told(changed, plain) == ["contacts.delay = 2 ms (was 500 µs)"]
+    assert differences.changes(changed, plain) == ["contacts.delay = 2 ms (was 500 µs)"]
     (tmp_path / "mine.toml").write_text(f'base = "{KLEIN}"\n[slider]\nmass = "2 g"\n')
     mine = mesoslip.Config.load(tmp_path / "mine.toml", ["run.seed=7"])
     assert mine.base == plain
-    assert differences.told(mine, plain) == [
+    assert differences.changes(mine, plain) == [
         "slider.mass = 2 g (was 1.47 g)",
         "run.seed = 7 (was 1)",
     ]
@@ -89,4 +89,4 @@ def test_labels_name_what_differs(klein):
 def test_stages_are_told(klein):
     stages = [{"duration": 4, "velocity": 1e-7}, {"duration": 1, "velocity": 0}]
     turned = klein(drive={"stage": stages})
-    assert differences.told(turned, klein()) == ["drive.stage = [(4 s, 100 nm/s), (1 s, 0 m/s)]"]
+    assert differences.changes(turned, klein()) == ["drive.stage = [(4 s, 100 nm/s), (1 s, 0 m/s)]"]

@@ -293,7 +293,7 @@ def test_a_way_of_ramps(klein, way):
         {"duration": 2.0, "velocity": 1e-6},
     ]
     config = klein(run={"drive_displacement": way}, drive={"stage": stages})
-    assert math.fsum(part.way for part in config.drive_parts) == pytest.approx(way)
+    assert math.fsum(part.path_length for part in config.drive_parts) == pytest.approx(way)
     fine = []
     for part in config.drive_parts:
         middle = (np.arange(10_000) + 0.5) / 10_000
@@ -333,7 +333,7 @@ def stage(**keys):
         ({"history": {}}, ["drive.history.file", "missing"]),
         ({"history": {"time": [0, 1], "displacement": [0]}}, ["as many values"]),
         ({"history": {"time": [0], "displacement": [0]}}, ["two values"]),
-        ({"history": {"time": [0, 1, 1], "displacement": [0, 1, 2]}}, ["time", "must grow"]),
+        ({"history": {"time": [0, 1, 1], "displacement": [0, 1, 2]}}, ["time", "must increase"]),
         ({"history": {"time": [0, 1e-9], "displacement": [0, 1]}}, ["moves at 1e+09 m/s"]),
         ({"history": {"file": "nowhere.csv"}}, ["nowhere.csv: no such file"]),
     ],
@@ -363,8 +363,8 @@ HEADER = "time [s],displacement [um]\n"
         (HEADER + "0,0\n1\n2,1\n", "line 3: the displacement is missing"),
         (HEADER + "0,0\n1,nan\n", "line 3: the displacement, 'nan', is not a finite number"),
         (HEADER + "0,0\n1,one\n", "line 3: the displacement, 'one', is not a number"),
-        (HEADER + "0,0\n1,1\n0.5,2\n", "line 4: the time must grow"),
-        (HEADER + "0,0\n1,1\n1,2\n", "line 4: the time must grow"),
+        (HEADER + "0,0\n1,1\n0.5,2\n", "line 4: the time must increase"),
+        (HEADER + "0,0\n1,1\n1,2\n", "line 4: the time must increase"),
         ("time,displacement [um]\n0,0\n1,1\n", "column 'time' has no unit"),
         ("time [s],displacement\n0,0\n1,1\n", "column 'displacement' has no unit"),
         ("time [s],displacement [furlongs]\n0,0\n1,1\n", None),

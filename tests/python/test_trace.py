@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, klein_tables
 from mesoslip.analysis.sampled_slips import estimated_period, find_slips, noise_level
-from mesoslip.configuration.columns import cells_of, places_of, values_of
+from mesoslip.configuration.columns import cells_of, find_columns, values_of
 from mesoslip.measured.table import COLUMNS
 
 HIDDEN = {
@@ -221,7 +221,7 @@ def test_rates_columns_and_gaps(tmp_path):
     rows = SINE.splitlines(keepends=True)
     rows[20] = "0.019,nan\n"
     holed = write(tmp_path / "holed.csv", "".join(rows[:30] + rows[33:]))
-    filled = mesoslip.read_trace(holed, largest_gap=5e-3)
+    filled = mesoslip.read_trace(holed, max_gap=5e-3)
     whole = mesoslip.read_trace(write(tmp_path / "whole.csv", SINE))
     np.testing.assert_allclose(filled["time"], whole["time"])
     np.testing.assert_allclose(filled["spring_force"], whole["spring_force"], atol=1e-9)
@@ -240,7 +240,7 @@ def test_rates_columns_and_gaps(tmp_path):
         (SINE.replace("0.010,", "nan,"), [], "line 12: the time, 'nan', is not a finite number"),
         (SINE.replace("0.010,", ""), [], "line 12: the force is missing"),
         (SINE.replace("0.049,", "0.074,"), [], "line 51: a gap of 0.026 s after 0.048 s"),
-        (SINE.replace("0.049,", "0.074,"), ["--largest-gap", "5 ms"], "line 51: a gap"),
+        (SINE.replace("0.049,", "0.074,"), ["--max-gap", "5 ms"], "line 51: a gap"),
         ("", [], "is empty"),
         ("1,2\n2,3\n", [], "line 1: has no header"),
         ("time [s],force [N]\n0,1\n", [], "1 samples"),
@@ -318,5 +318,5 @@ def test_numbers_are_read_in_one_way(tmp_path, command, delimiter, row, wanted):
 
 def test_decimal_commas_that_can_be_nothing_else():
     cells = cells_of("time [ms];force [uN]\n0,5;1,500\n2;-3,25\n", "table")
-    places = places_of(cells.first, COLUMNS, "table")
+    places = find_columns(cells.first, COLUMNS, "table")
     assert values_of(cells, cells.first, places)["force"] == pytest.approx([1.5e-6, -3.25e-6])

@@ -1,1 +1,1 @@
-"""Campaigns: many runs at once, and what they say together."""
+"""Sweeps: many runs, and the measures of each."""

@@ -24,7 +24,7 @@ MAX_FAILURES = 100
 
 
 class Assembly:
-    """The dataset of a sweep while points come in, each at its own place."""
+    """The dataset of a sweep, filled point by point."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
@@ -35,15 +35,15 @@ class Assembly:
     def put(
         self, combination: Combination, realization: int, measures: Mapping[str, float]
     ) -> None:
-        """A point that is done."""
-        where = (*combination.place, realization)
+        """Store the measures of a point."""
+        where = (*combination.index, realization)
         self._status[where] = OK
         for name, values in self._values.items():
             values[where] = measures[name]
 
     def fail(self, combination: Combination, realization: int) -> None:
-        """A point that has failed."""
-        self._status[(*combination.place, realization)] = FAILED
+        """Mark a point as failed."""
+        self._status[(*combination.index, realization)] = FAILED
 
     def dataset(self, ending: str, failures: Mapping[str, str]) -> xr.Dataset:
         """The dataset as it is now.
@@ -53,7 +53,7 @@ class Assembly:
         xarray.Dataset
             A dimension for each swept key, named like it, with its values in SI; one for keys that
             go together, named like the first of them; ``sample`` for a Latin hypercube; and
-            ``realization``. Variables: ``status`` and the measures, NaN where there are none.
+            ``realization``. Variables: ``status`` and the measures, NaN where points are missing.
         """
         import xarray as xr
 
@@ -77,7 +77,7 @@ class Assembly:
         }
         variables: dict[str, Any] = {"status": xr.Variable(dimensions, self._status, flags)}
         for one in plan.measures:
-            # Choices are numbers with none missing in memory, and small ones in a file.
+            # Flags are numbers with NaN in memory, and small integers in a file.
             encoding = {"dtype": "int8", "_FillValue": -1} if one.flags else {"_FillValue": np.nan}
             variables[one.name] = xr.Variable(
                 dimensions, self._values[one.name], one.attributes, encoding
@@ -98,7 +98,7 @@ class Assembly:
         }
 
     def manifest(self, names: Sequence[str]) -> dict[str, Any]:
-        """The names of the points of the sweep: all others in its folder can be deleted."""
+        """The names of the points of the sweep; others in its folder are not needed."""
         plan = self._plan
         return {
             "program": program(),

@@ -1,4 +1,4 @@
-"""Time, memory and disk of a sweep, before it is run."""
+"""Estimates of time, memory and disk of a sweep, for --dry-run."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from mesoslip.execution.store import Pieces
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.tables import COLUMNS
 
-# Combinations that are started to see how long they take, and time for all of them [s].
+# Maximum number of combinations that are tried, and time for all of them [s].
 MAX_TRIED = 12
 TRIAL_SECONDS = 3.0
-# Time of a point beside the kernel [s], and of the start of a worker; as measured.
+# Measured time of a point outside the kernel [s], and of the start of a worker.
 OVERHEAD_SECONDS = 0.01
 START_SECONDS = 1.5
-# Memory of a process with what it imports [bytes]; size of a stored point.
+# Memory of a process with its imports, and size of a stored point [bytes].
 PROCESS_BYTES = 150e6
 POINT_BYTES = 4096
-# Compressed traces take about half of what they hold.
+# Ratio of compression of traces.
 COMPRESSED = 0.5
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Time, memory and disk that a sweep will take.
+    """Expected time, memory and disk of a sweep.
 
     Attributes
     ----------
     points, stored
-        All points, and those that are there already.
+        Number of all points, and of those in the store.
     seconds
-        Wall time of those that are missing.
+        Wall time of the missing points.
     memory_bytes
-        Of all processes.
+        Memory of all processes.
     disk_bytes
-        Of the points and the dataset.
+        Disk space of the points and the dataset.
     """
 
     points: int
@@ -50,14 +50,14 @@ class Estimate:
 
 
 def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
-    """Estimate what a sweep will take, from starting some of its combinations for a moment.
+    """Estimate time, memory and disk of a sweep from the first moments of some combinations.
 
     Raises
     ------
     ConfigError
         If a combination cannot be run.
     RunError
-        If one of those that are started fails.
+        If one of the tried combinations fails.
     """
     there = store.names()
     missing: list[Combination] = []
@@ -78,7 +78,7 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     longest = max(seconds, default=0.0)
     wall = max(mean * missing_count / workers, longest) + START_SECONDS if missing else 0.0
     trace_bytes = max((_trace_bytes(one) for one in plan.combinations), default=0.0)
-    # In the tables of the kernel, in the tree, and in measures.
+    # Three copies: in the tables of the kernel, in the tree, and in measures.
     memory = (workers + 1) * PROCESS_BYTES + 3 * workers * trace_bytes
     disk: float = plan.count * (POINT_BYTES + 8 * (1 + len(plan.measures)))
     if plan.sweep.traces:
@@ -99,7 +99,7 @@ def _seconds(combination: Combination, max_seconds: float) -> float:
 
 
 def _trace_bytes(combination: Combination) -> float:
-    """Size of the trace of a run, without the finer ones around slips."""
+    """Size of the trace of a run, without the finer traces around slips."""
     config = combination.config
     samples = config.expected_duration / config.output_interval + 1
     return 8.0 * samples * (len(COLUMNS["trace"]) + config.slider.layers_recorded(config))

@@ -1,8 +1,8 @@
-"""Measures: what a sweep keeps of each run, a number each.
+"""Measures: the numbers that a sweep keeps of each run.
 
-Adding one is adding a function of a run's tree and a line in `MEASURES`. Users add theirs as
-"file.py:function" in the file of the sweep; the attributes ``units`` and ``long_name`` of the
-function, if it has them, go into the dataset.
+Adding one is adding a function of a `RunView` and a line in `MEASURES`. Users add
+functions of the tree of a run as "file.py:function" in the file of the sweep; the attributes
+``units`` and ``long_name`` of a function, if it has them, go into the dataset.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class RunView:
     start: float
 
     def trace(self, name: str) -> Array:
-        """A trace from the start of the measures on."""
+        """A trace after the start of the measures."""
         root = self.tree.to_dataset()
         wanted = root["time"].values >= self.start
         values: Array = root[name].values[0, wanted]
@@ -58,11 +58,11 @@ class RunView:
         return {name: float(data[name].values[0]) for name in REGIME}
 
     def total(self, name: str) -> float:
-        """A number of the whole run."""
+        """A scalar of the whole run."""
         return float(self.tree.to_dataset()[name].values[0])
 
     def catalogue(self, group: str, name: str) -> Array:
-        """A column of a catalogue, of what starts after the start of the measures."""
+        """A column of a catalogue, of entries that begin after the start of the measures."""
         if group not in self.tree.children:
             return np.empty(0)
         rows = self.tree.children[group].to_dataset()
@@ -83,14 +83,14 @@ class Measure:
     name
         Name of its variable in the dataset.
     function
-        What is measured.
+        The function that computes it.
     units, long_name
-        As CF has them.
+        Attributes by the CF conventions.
     flags
-        Meanings of the numbers 0, 1, 2, ... if it is a choice among them.
+        Meanings of the values 0, 1, 2, ... if it is a category.
     source
-        Text of the user's file; empty for those of mesoslip. The function is made anew of it in
-        another process, or on another machine.
+        Text of the user's file; empty for measures of mesoslip. Other processes and machines
+        compile the function from it.
     path
         Name of the user's file.
     """
@@ -105,7 +105,7 @@ class Measure:
 
     @property
     def identity(self) -> str:
-        """What tells it from others, as part of the name under which a point is stored."""
+        """Its part in the hash under which a point is stored."""
         if not self.source:
             return self.name
         return f"{self.name}:{hashlib.sha256(self.source.encode()).hexdigest()}"
@@ -130,7 +130,7 @@ def _mean_force(run: RunView) -> float:
     return _mean(run.trace("spring_force"))
 
 
-def _largest_force(run: RunView) -> float:
+def _max_force(run: RunView) -> float:
     forces = run.trace("spring_force")
     return float(np.max(forces)) if forces.size else np.nan
 
@@ -159,12 +159,14 @@ def _peak_velocity(run: RunView) -> float:
 
 
 def _smooth_time_share(run: RunView) -> float:
-    """Of the trace: steps in which the slider goes between half of the drive's way and twice it."""
-    way, drive = (np.diff(run.trace(name)) for name in ("displacement", "drive_displacement"))
+    """Fraction of steps in which the slider moves between 1/2 and 2 times as far as the drive."""
+    displacement, drive = (
+        np.diff(run.trace(name)) for name in ("displacement", "drive_displacement")
+    )
     moves = drive != 0
     if not np.any(moves):
         return np.nan
-    ratio = way[moves] / drive[moves]
+    ratio = displacement[moves] / drive[moves]
     return float(np.mean((ratio > 0.5) & (ratio < 2.0)))
 
 
@@ -184,7 +186,7 @@ def _mean_avalanche_size(run: RunView) -> float:
     return _mean(run.catalogue("avalanches", "size"))
 
 
-def _largest_avalanche(run: RunView) -> float:
+def _max_avalanche_size(run: RunView) -> float:
     sizes = run.catalogue("avalanches", "size")
     return float(np.max(sizes)) if sizes.size else np.nan
 
@@ -200,7 +202,7 @@ def _regime(name: str) -> Function:
 
 
 def _predicted(function: Callable[[xr.DataTree], float]) -> Function:
-    """What theory says of the configuration of a run."""
+    """A theoretical prediction for the configuration of a run."""
     return lambda run: function(run.tree)
 
 
@@ -208,7 +210,7 @@ MEASURES: dict[str, Measure] = {
     one.name: one
     for one in (
         Measure("mean_force", _mean_force, "N", "mean spring force"),
-        Measure("largest_force", _largest_force, "N", "greatest spring force"),
+        Measure("max_force", _max_force, "N", "maximum spring force"),
         Measure("force_amplitude", _force_amplitude, "N", "half the range of the spring force"),
         Measure(
             "mean_peak_force",
@@ -220,23 +222,23 @@ MEASURES: dict[str, Measure] = {
         Measure("mean_waiting_time", _mean_waiting_time, "s", "mean time between starts of slips"),
         Measure("mean_slip_duration", _mean_slip_duration, "s", "mean duration of slips"),
         Measure("slip_count", _slip_count, "1", "number of slips"),
-        Measure("peak_velocity", _peak_velocity, "m s-1", "greatest velocity in slips"),
+        Measure("peak_velocity", _peak_velocity, "m s-1", "maximum velocity in slips"),
         Measure(
             "smooth_time_share",
             _smooth_time_share,
             "1",
-            "part of the time in which the slider goes between half as fast as the drive and twice",
+            "fraction of time with a slider velocity between 1/2 and 2 times that of the drive",
         ),
         Measure("breaks", _breaks, "1", "breaks of contacts in the whole run"),
         Measure(
             "energy_residual",
             _energy_residual,
             "1",
-            "what the energy balance of the whole run lacks, relative to the work of the drive",
+            "residual of the energy balance of the whole run, relative to the work of the drive",
         ),
         Measure("avalanche_count", _avalanche_count, "1", "number of avalanches"),
         Measure("mean_avalanche_size", _mean_avalanche_size, "1", "mean size of avalanches"),
-        Measure("largest_avalanche", _largest_avalanche, "1", "size of the greatest avalanche"),
+        Measure("max_avalanche_size", _max_avalanche_size, "1", "size of the largest avalanche"),
         Measure(
             "growth_rate",
             _predicted(predictions.growth_rate),
@@ -247,7 +249,7 @@ MEASURES: dict[str, Measure] = {
             "stable_out_of_step",
             _predicted(predictions.stable_out_of_step),
             "1",
-            "whether steady sliding is stable, also for contacts that do not break in step",
+            "whether steady sliding is stable, including perturbations that desynchronize contacts",
         ),
         Measure(
             "critical_stiffness_ratio",
@@ -285,31 +287,31 @@ def find_measures(names: Sequence[str], source: str, folder: Path) -> tuple[Meas
     source
         Where the names are from, for messages.
     folder
-        What names of files are relative to.
+        Folder to which names of files are relative.
 
     Raises
     ------
     ConfigError
-        If there is no such measure, a file cannot be read or raises, or two have one name.
+        If there is no such measure, a file cannot be read or raises, or two have the same name.
     """
     found: list[Problem] = []
     measures: dict[str, Measure] = {}
     for number, name in enumerate(names):
-        place = f"sweep.measures[{number}]"
+        key = f"sweep.measures[{number}]"
         try:
             measure = _of_user(name, folder) if ":" in name else MEASURES.get(name)
         except RunError as error:
-            found.append(Problem(source, place, str(error), name))
+            found.append(Problem(source, key, str(error), name))
             continue
         if measure is None:
             near = difflib.get_close_matches(name, MEASURES, 1)
             meant = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(MEASURES)}"
             message = f"unknown measure; {meant} One of your own is 'file.py:function'"
-            found.append(Problem(source, place, message, name))
+            found.append(Problem(source, key, message, name))
         elif measure.name in measures:
-            found.append(Problem(source, place, "is named twice", name))
+            found.append(Problem(source, key, "is named twice", name))
         elif measure.name in {"status", "realization", "sample"}:
-            found.append(Problem(source, place, "is a name that the dataset needs itself", name))
+            found.append(Problem(source, key, "is a name that the dataset uses itself", name))
         else:
             measures[measure.name] = measure
     if found:
@@ -330,7 +332,7 @@ def _of_user(name: str, folder: Path) -> Measure:
 
 
 def measure_of(name: str, source: str = "", path: str = "") -> Measure:
-    """A measure from what another process tells of it: its name, and a user's file.
+    """A measure from its name, and the text and path of a user's file.
 
     Raises
     ------
@@ -353,7 +355,7 @@ def measure_of(name: str, source: str = "", path: str = "") -> Measure:
 
 @cache
 def _user_function(source: str, path: str, entry: str) -> Callable[[xr.DataTree], Any]:
-    """A function of a Python file, which is run once in each process.
+    """A function of a user's file, which is run once in each process.
 
     Raises
     ------
@@ -375,7 +377,7 @@ def _user_function(source: str, path: str, entry: str) -> Callable[[xr.DataTree]
 
 
 def _line(error: BaseException, path: str) -> str:
-    """Where in a user's file an error comes from."""
+    """Line of a user's file that an error comes from, as part of a message."""
     line = getattr(error, "lineno", None) if isinstance(error, SyntaxError) else None
     trace = error.__traceback__
     while trace is not None:
@@ -402,8 +404,8 @@ def measured(run: RunView, measure: Measure) -> float:
     except MemoryError:
         raise
     except Exception as error:
-        place = f" ({measure.path}{_line(error, measure.path)})" if measure.path else ""
-        raise RunError(f"measure {measure.name}{place}: {type(error).__name__}: {error}") from error
+        where = f" ({measure.path}{_line(error, measure.path)})" if measure.path else ""
+        raise RunError(f"measure {measure.name}{where}: {type(error).__name__}: {error}") from error
     if not isinstance(value, Real):
-        raise RunError(f"measure {measure.name}: gave {value!r:.60}, not a number")
+        raise RunError(f"measure {measure.name}: returned {value!r:.60}, not a number")
     return float(value)

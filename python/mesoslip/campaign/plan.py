@@ -1,9 +1,9 @@
-"""The file of a sweep, and its points.
+"""The file of a sweep, its axes and its combinations.
 
 A sweep varies keys of a configuration along axes. The keys of ``[sweep.grid]`` are an axis each,
 those of a ``[[sweep.together]]`` table one axis together, those of ``[sweep.latin_hypercube]`` too.
-Axes multiply, and each combination is run for so many realizations. A *point* is one realization of
-one combination.
+Axes multiply, and each combination is run for a number of realizations. A *point* is one
+realization of one combination.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pydantic import Field, StrictBool, StrictStr, ValidationError, model_valida
 
 from mesoslip.campaign.measures import Measure, find_measures
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import Change, Laid, on_base, override, read_toml
+from mesoslip.configuration.files import Change, Merged, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
@@ -33,45 +33,45 @@ from mesoslip.errors import ConfigError, Problem
 
 Value = float | int | str | bool
 
-# Combinations that cannot be run and are listed.
+# Maximum number of wrong combinations that are listed.
 MAX_REPORTED = 5
-# Points of a sweep.
+# Maximum number of points of a sweep.
 MAX_POINTS = 10_000_000
 
 
 class Range(Table):
-    """Values from one to another."""
+    """Values between two ends."""
 
     from_: Annotated[Any, Field(alias="from")]
     """First value."""
     to: Any
     """Last value."""
     points: Annotated[Whole, Field(ge=1, le=MAX_POINTS)]
-    """Number of values, both ends among them."""
+    """Number of values, including both ends."""
     spacing: Literal["linear", "logarithmic"] = "linear"
-    """How values are spaced."""
+    """Spacing of the values."""
 
 
 class Extent(Table):
-    """Where a Latin hypercube takes the values of a key from."""
+    """Range of a key in a Latin hypercube."""
 
     from_: Annotated[Any, Field(alias="from")]
     """Minimum."""
     to: Any
     """Maximum."""
     spacing: Literal["linear", "logarithmic"] = "linear"
-    """How values are spread."""
+    """Distribution of the values."""
 
 
 class SweepTable(Table):
-    """What a sweep varies, and what is measured of each run."""
+    """The keys that a sweep varies, and the measures of each run."""
 
     realizations: Annotated[Whole, Field(ge=1, lt=2**31)] | None = None
-    """Runs of each combination; those of the run by default."""
+    """Realizations of each combination; by default run.realizations."""
     measures: tuple[StrictStr, ...]
-    """Names of measures, and functions of one's own as "file.py:function"."""
+    """Names of measures; your own functions as "file.py:function"."""
     discard: Annotated[Number, Field(ge=0, lt=1)] = 0.5
-    """Part of each run, from its start, that measures leave out."""
+    """Fraction of each run, from its start, that measures leave out."""
     traces: StrictBool = False
     """Whether the output of each point is kept."""
     grid: dict[str, Any] = Field(default_factory=dict)
@@ -79,7 +79,7 @@ class SweepTable(Table):
     together: tuple[dict[str, Any], ...] = ()
     """Tables of keys that go together as one axis."""
     latin_hypercube: dict[str, Any] | None = None
-    """Ranges of keys from which `points` combinations are taken, spread evenly."""
+    """Ranges of keys, sampled by `points` combinations."""
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:
@@ -95,7 +95,7 @@ class SweepTable(Table):
 
 
 class SweepFile(Table):
-    """What a sweep's file has beside the configuration."""
+    """The tables of a sweep's file besides the configuration."""
 
     sweep: SweepTable
 
@@ -111,7 +111,7 @@ class Axis:
     keys
         Dotted names.
     rows
-        The values of the keys at each place of the axis, in SI.
+        The values of the keys at each index of the axis, in SI.
     """
 
     dimension: str
@@ -125,15 +125,15 @@ class Combination:
 
     Attributes
     ----------
-    place
-        Its place along each axis.
+    index
+        Its index along each axis.
     values
         The value of each swept key, in SI.
     config
-        What is run.
+        The configuration.
     """
 
-    place: tuple[int, ...]
+    index: tuple[int, ...]
     values: Mapping[str, Value]
     config: Config
 
@@ -142,7 +142,7 @@ class Combination:
 
 
 def described(values: Mapping[str, Value]) -> str:
-    """Values of keys, as in messages."""
+    """Values of keys, for messages."""
     parts = []
     for key, value in values.items():
         kind = key_kind(key)
@@ -158,21 +158,21 @@ class Plan:
     Attributes
     ----------
     tables
-        The configuration that is varied.
+        The configuration that is varied, as tables.
     sweep
         The table ``[sweep]``.
     axes
         In the order of the dimensions of the dataset.
     realizations
-        Of each combination.
+        Number of realizations of each combination.
     measures
-        What is measured of each point.
+        The measures of each point.
     """
 
     def __init__(self, tables: Mapping[str, Any], source: str, folder: Path) -> None:
         tables = dict(tables)
         if "sweep" not in tables:
-            message = "missing; this table says what is varied and what is measured"
+            message = "missing; this table names the keys to vary and the measures"
             raise ConfigError([Problem(source, "sweep", message)])
         try:
             self.sweep = SweepFile.model_validate({"sweep": tables.pop("sweep")}).sweep
@@ -196,7 +196,7 @@ class Plan:
 
     @classmethod
     def load(cls, path: PathLike, overrides: Iterable[Change] = ()) -> Plan:
-        """Read the file of a sweep and what it is based on, lay changes over it, and check it.
+        """Read the file of a sweep and its base, apply changes, and check the result.
 
         Raises
         ------
@@ -210,12 +210,12 @@ class Plan:
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "sweep") -> Plan:
-        """Check a sweep given as nested tables; ``base`` and measures are files under them."""
+        """Check a sweep given as nested tables; their ``base`` and measures may name files."""
         return cls(on_base(tables, source, Path()).tables, source, Path())
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of places along each axis."""
+        """Length of each axis."""
         return tuple(len(axis.rows) for axis in self.axes)
 
     @cached_property
@@ -225,19 +225,19 @@ class Plan:
         Raises
         ------
         ConfigError
-            If some of them cannot be run; it says which, and why.
+            If some of them are wrong; it says which, and why.
         """
         combinations, found, wrong = [], list[Problem](), 0
-        for place in itertools.product(*map(range, self.shape)):
+        for index in itertools.product(*map(range, self.shape)):
             values = {
                 key: value
-                for axis, number in zip(self.axes, place, strict=True)
+                for axis, number in zip(self.axes, index, strict=True)
                 for key, value in zip(axis.keys, axis.rows[number], strict=True)
             }
             changes = {**values, "run.realizations": 1}
             try:
                 config = Config.from_dict(
-                    override(Laid(self.tables), [changes]).tables, self._source
+                    override(Merged(self.tables), [changes]).tables, self._source
                 )
             except ConfigError as error:
                 wrong += 1
@@ -247,9 +247,9 @@ class Plan:
                         Problem(source, one.key, one.message, one.value) for one in error.problems
                     ]
                 continue
-            combinations.append(Combination(place, values, config))
+            combinations.append(Combination(index, values, config))
         if wrong > MAX_REPORTED:
-            message = f"{wrong} of {math.prod(self.shape)} combinations cannot be run"
+            message = f"{wrong} of {math.prod(self.shape)} combinations are wrong"
             found.append(Problem(self._source, "sweep", message))
         if found:
             raise ConfigError(found)
@@ -279,7 +279,7 @@ def as_plan(plan: PathLike | Mapping[str, Any] | Plan) -> Plan:
 
 
 def _axes(sweep: SweepTable, source: str, found: list[Problem]) -> Iterator[Axis]:
-    """The axes of a sweep; what is wrong with them is added to a list."""
+    """The axes of a sweep; their errors are added to a list."""
     for key, given in sweep.grid.items():
         place = f'sweep.grid."{key}"'
         values = _values(key, given, place, source, found)
@@ -297,7 +297,11 @@ def _axes(sweep: SweepTable, source: str, found: list[Problem]) -> Iterator[Axis
         elif len(set(lengths.values())) > 1:
             lengths_text = ", ".join(f"{key} has {length}" for key, length in lengths.items())
             found.append(
-                Problem(source, name, f"keys that go together need equally many: {lengths_text}")
+                Problem(
+                    source,
+                    name,
+                    f"keys that vary together need lists of one length: {lengths_text}",
+                )
             )
         elif len(lengths) == len(columns):
             yield Axis(
@@ -308,7 +312,7 @@ def _axes(sweep: SweepTable, source: str, found: list[Problem]) -> Iterator[Axis
 
 
 def _kind(key: str, place: str, source: str, found: list[Problem]) -> KeyKind | None:
-    """What a swept key takes; None, and a problem, if it cannot be swept."""
+    """The kind of value of a swept key; None, and a problem, if it cannot be swept."""
     kind = key_kind(key)
     if kind is None:
         near = nearest_keys(key)
@@ -319,7 +323,7 @@ def _kind(key: str, place: str, source: str, found: list[Problem]) -> KeyKind | 
         found.append(Problem(source, place, "cannot be varied; set sweep.realizations"))
         return None
     if not kind.is_single:
-        message = "takes a list or a table; only keys with one value can be varied"
+        message = "is a list or a table; only keys with one value can be varied"
         found.append(Problem(source, place, message))
         return None
     return kind
@@ -396,7 +400,7 @@ def _ends(
 ) -> tuple[float, float] | None:
     """Both ends of a range, in SI; None, and a problem, if they are wrong."""
     if kind.unit is None and not kind.is_whole:
-        found.append(Problem(source, place, "takes names, which have no range; give a list"))
+        found.append(Problem(source, place, "is a name, which has no range; give a list"))
         return None
     before = len(found)
     first, last = (
@@ -408,7 +412,7 @@ def _ends(
     assert not isinstance(first, str)
     assert not isinstance(last, str)
     if wanted.spacing == "logarithmic" and not (min(first, last) > 0 or max(first, last) < 0):
-        message = "a logarithmic range needs both ends greater than 0, or both less"
+        message = "a logarithmic range needs both ends positive, or both negative"
         found.append(Problem(source, place, message))
         return None
     if first == last and getattr(wanted, "points", 2) > 1:
@@ -418,7 +422,7 @@ def _ends(
 
 
 def _between(first: float, last: float, part: float) -> float:
-    """A value of a logarithmic range, at a part of the distance from one end to the other."""
+    """A value of a logarithmic range, at a fraction of it."""
     ratio = last / first
     if 0 < ratio < math.inf:
         return float(first * ratio**part)
@@ -431,7 +435,7 @@ def _spread(
 ) -> tuple[Value, ...]:
     """Values at fractions of a range, whose ends are kept exactly.
 
-    Whole numbers are not rounded to doubles on the way.
+    Whole numbers are not rounded to doubles.
     """
     first, last = ends
     values: list[Value] = []
@@ -453,10 +457,10 @@ def _latin_hypercube(given: Mapping[str, Any], source: str, found: list[Problem]
     """The axis of a Latin hypercube."""
     name = "sweep.latin_hypercube"
     numbers: dict[str, int] = {}
-    for key, default, least in (("points", 0, 1), ("seed", 1, 0)):
+    for key, default, minimum in (("points", 0, 1), ("seed", 1, 0)):
         number = given.get(key, default)
-        if isinstance(number, bool) or not isinstance(number, int) or number < least:
-            message = f"must be a whole number of at least {least}"
+        if isinstance(number, bool) or not isinstance(number, int) or number < minimum:
+            message = f"must be a whole number of at least {minimum}"
             found.append(Problem(source, f"{name}.{key}", message, given.get(key)))
         else:
             numbers[key] = number
@@ -497,7 +501,7 @@ def _repeated(axes: Sequence[Axis], source: str) -> Iterator[Problem]:
     """Keys that are varied twice, and values that are given twice."""
     for key, count in Counter(key for axis in axes for key in axis.keys).items():
         if count > 1:
-            yield Problem(source, "sweep", f"{key} is varied in two places")
+            yield Problem(source, "sweep", f"{key} is varied twice")
     for axis in axes:
         for row, count in Counter(axis.rows).items():
             if count > 1:

@@ -1,4 +1,4 @@
-"""A point: one realization of one combination, the same to the bit wherever it is computed."""
+"""A point: one realization of one combination, identical wherever it is computed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from mesoslip.campaign.measures import Measure
 
-# Changes when the numbers of measures do, so that points of earlier ones are not taken.
+# Incremented when values of measures change, so that older points are not used.
 FORMAT = 1
 
 # One thread of a process uses HDF5 at a time.
@@ -35,22 +35,22 @@ _HDF5 = threading.Lock()
 
 @dataclass(frozen=True)
 class Task:
-    """A point for a worker, in plain values that can be sent anywhere.
+    """A point for a worker, in plain values that can be sent to any process.
 
     Attributes
     ----------
     name
-        Under which the point is stored, see `point_name`.
+        Name under which the point is stored, see `point_name`.
     config
         The configuration as nested tables.
     realization
         Number of the realization.
     measures
-        Name, text and name of the user's file of each measure.
+        Name, source text and file name of each measure.
     discard
-        Part of the run that measures leave out.
+        Fraction of the run that measures leave out.
     trace
-        Whether the output of the run is kept too.
+        Whether the output of the run is kept.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a point: its measures, or why there are none.
+    """Result of a point: its measures, or the reason of its failure.
 
     Attributes
     ----------
@@ -74,9 +74,9 @@ class Outcome:
     trace
         The content of its output file, if it is kept.
     failure
-        Why it failed; empty if it did not.
+        Why it failed; empty if it succeeded.
     is_complete
-        Whether the point came to its end; not so if it was stopped.
+        Whether the point was finished, not stopped.
     """
 
     measures: dict[str, float]
@@ -87,9 +87,9 @@ class Outcome:
 
 
 def combination_key(config: Config, measures: Sequence[Measure], discard: float) -> str:
-    """A hash of everything that the measures of a combination follow from, but the realization.
+    """A hash of everything that determines the measures of a combination, except the realization.
 
-    Neither the title of a run nor its number of realizations makes a difference.
+    Title and number of realizations do not count.
     """
     tables = config.to_dict()
     tables.pop("title", None)
@@ -105,12 +105,12 @@ def combination_key(config: Config, measures: Sequence[Measure], discard: float)
 
 
 def point_name(key: str, realization: int) -> str:
-    """The name of a point: a hash of everything that its measures follow from."""
+    """The name of a point: a hash of everything that determines its measures."""
     return hashlib.sha256(f"{key} {realization}".encode()).hexdigest()[:32]
 
 
 def compute(task: Task, stop: Stop) -> Outcome:
-    """Run a point and measure it. Whatever goes wrong is reported in the outcome."""
+    """Run a point and measure it. Errors are reported in the outcome."""
     start = time.perf_counter()
     try:
         outcome = _compute(task, stop)
@@ -118,7 +118,7 @@ def compute(task: Task, stop: Stop) -> Outcome:
         outcome = Outcome({}, failure=str(error))
     except MemoryError:
         outcome = Outcome({}, failure=NO_MEMORY)
-    # An error that was not foreseen ends this point, not those beside it.
+    # An unexpected error ends this point, not the others.
     except Exception as error:
         outcome = Outcome({}, failure=f"{type(error).__name__}: {error}")
     return Outcome(

@@ -1,4 +1,4 @@
-"""Measures of what theory says of a configuration, to be drawn beside what its runs did."""
+"""Measures that theory predicts from a configuration, to compare with its runs."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from mesoslip.theory.steady_sliding import steady_sliding
 if TYPE_CHECKING:
     import xarray as xr
 
-# Length of the force curve in mean breaking stretches: its steepest fall is the first one.
+# Length of the force curve in mean breaking stretches; its steepest descent is the first one.
 CURVE_LENGTH = 3.0
-# Work that the stability of steady sliding may take, some tenths of a second.
-MOST_WORK = 10**6
+# Maximum work for the stability of steady sliding, some tenths of a second.
+MAX_WORK = 10**6
 
 
 def _configuration(tree: xr.DataTree) -> Config:
@@ -29,13 +29,13 @@ def _configuration(tree: xr.DataTree) -> Config:
 
 def growth_rate(tree: xr.DataTree) -> float:
     """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
-    sliding = steady_sliding(_configuration(tree), MOST_WORK)
+    sliding = steady_sliding(_configuration(tree), MAX_WORK)
     return math.nan if sliding is None else sliding.growth_rate
 
 
 def stable_out_of_step(tree: xr.DataTree) -> float:
     """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
-    sliding = steady_sliding(_configuration(tree), MOST_WORK)
+    sliding = steady_sliding(_configuration(tree), MAX_WORK)
     try:
         return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
     except RunError:
@@ -48,7 +48,7 @@ def critical_stiffness_ratio(tree: xr.DataTree) -> float:
 
 
 def waiting_over_damping(tree: xr.DataTree) -> float:
-    """Mean time between slips times the rate at which the setup's ringing is damped."""
+    """Mean time between slips times the damping rate of the setup."""
     from mesoslip.analysis.slips import slips
 
     oscillator = _configuration(tree).slider.oscillator

@@ -1,4 +1,4 @@
-"""A sweep from its plan to its dataset: stored points are read, missing ones computed."""
+"""Run a sweep: stored points are read, missing ones computed."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from mesoslip.execution.store import Pieces, Store
 if TYPE_CHECKING:
     import xarray as xr
 
-# What ends a sweep that somebody has stopped.
+# Ending of a sweep that was stopped.
 INTERRUPTED = "interrupted"
-# Longest time to wait at the end for a user's measure that ignores the stop [s].
+# Maximum time to wait for a user's measure that ignores a stop [s].
 MAX_WAIT = 5.0
 
 
@@ -49,11 +49,11 @@ class Sweep:
     dataset
         See `mesoslip.campaign.assembly`.
     failures
-        Which points failed, and why.
+        Failed points, and the reasons.
     stored, computed, missing
-        Points that were in the store, that were computed, and that are neither.
+        Numbers of points that were in the store, that were computed, and that are neither.
     ending
-        What ended the sweep before it was complete; empty if nothing did.
+        Why the sweep ended before it was complete; empty if it is complete.
     """
 
     dataset: xr.Dataset
@@ -71,12 +71,12 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Group:
-    """Combinations whose points are the same, as of runs that differ by their titles.
+    """Combinations with the same points, such as those that differ only in their titles.
 
     Attributes
     ----------
     key
-        Hash of everything that their measures follow from.
+        Hash of everything that determines their measures.
     combinations
         At least one.
     """
@@ -105,12 +105,12 @@ def groups(plan: Plan) -> list[Group]:
 
 
 def output_path(store: Pieces, name: str) -> Path:
-    """Where the output of a point is, if it is kept."""
+    """Path of the output of a point, if it is kept."""
     return store.path / f"{name}.nc"
 
 
 def stored_measures(store: Pieces, plan: Plan, name: str) -> dict[str, float] | None:
-    """Measures of a stored point; None if not everything that the sweep asks for is there."""
+    """Measures of a stored point; None if anything that the sweep needs is missing."""
     if plan.sweep.traces and not output_path(store, name).exists():
         return None
     body = store.read(name)
@@ -121,13 +121,13 @@ def stored_measures(store: Pieces, plan: Plan, name: str) -> dict[str, float] | 
 
 
 def stored_body(task: Task, outcome: Outcome, combination: Combination) -> dict[str, Any]:
-    """A point as the store keeps it."""
+    """Content of a point in the store."""
     return {
         "format": FORMAT,
         "program": program(),
         "point": dict(combination.values),
         "realization": task.realization,
-        # Numbers as Python writes them are read to the bit.
+        # Python reads its own representation of numbers exactly.
         "measures": {name: repr(value) for name, value in outcome.measures.items()},
         "seconds": outcome.seconds,
     }
@@ -160,7 +160,7 @@ def run_sweep(
     plan
         The sweep.
     store
-        Where points are kept, and read if they are there; nowhere by default.
+        Where points are stored, and read if they exist; nowhere by default.
     executor
         Where points are computed, or on how many workers; on as many as there are processors by
         default: threads at first, and processes in a sweep that takes long.
@@ -190,7 +190,7 @@ def run_sweep(
 
 
 class _Run:
-    """A sweep under way."""
+    """A running sweep."""
 
     def __init__(
         self, plan: Plan, store: Store | None, progress: Callable[[float], None] | None

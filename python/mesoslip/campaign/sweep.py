@@ -31,14 +31,14 @@ def sweep(
     plan
         The file of a sweep, nested tables, or a `mesoslip.campaign.plan.Plan`.
     store
-        Folder where each point is kept as soon as it is done, and read from when the sweep is
-        called again; nowhere by default.
+        Folder in which each finished point is stored, and from which it is read when the sweep is
+        called again; by default points are not stored.
     executor
-        Where points are computed: `Threads`, `Processes` or `Dask`, or a number of workers, by
-        default as many as there are processors: threads at first, and processes in a sweep that
-        takes long. The result does not depend on it.
+        Where points are computed: `Threads`, `Processes` or `Dask`, or a number of workers. By
+        default as many workers as processors: threads at first, and processes if the sweep takes
+        long. The result does not depend on it.
     progress
-        Called now and then with the fraction of the points that are done, 0 to 1.
+        Called repeatedly with the fraction of finished points, 0 to 1.
 
     Returns
     -------
@@ -49,9 +49,9 @@ def sweep(
     Raises
     ------
     FileError, ConfigError
-        If the sweep cannot be read or is wrong, or a combination cannot be run.
+        If the sweep cannot be read, or it or one of its combinations is wrong.
     RunError
-        If the scheduler is gone, or workers cannot be started, before every point was computed.
+        If the scheduler is lost, or workers cannot be started.
     """
     checked = as_plan(plan)
     kept = None if store is None else Store(as_path(store), "points")

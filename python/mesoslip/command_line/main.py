@@ -106,13 +106,13 @@ def main() -> None:
         typer.echo("mesoslip: there is not enough memory for this", err=True)
         status = 1
     except OSError as error:
-        status = _told_in_vain(error)
+        status = _output_failed(error)
     finally:
         COMMAND_LINE.reset(token)
     try:
         sys.stdout.flush()
     except OSError as error:
-        status = _told_in_vain(error)
+        status = _output_failed(error)
     sys.exit(status)  # type: ignore[arg-type]
 
 
@@ -127,7 +127,7 @@ def _open_streams() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-def _told_in_vain(error: OSError) -> int:
+def _output_failed(error: OSError) -> int:
     """Say that the standard output cannot be written to, and do not try again at the end."""
     typer.echo(f"mesoslip: the output cannot be written: {error.strerror or error}", err=True)
     with suppress(OSError):

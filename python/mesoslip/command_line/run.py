@@ -112,7 +112,7 @@ def run(
                 ) from error
             raise
         if not quiet:
-            _tell_results(results, checked, path)
+            _report_results(results, checked, path)
         files.remove_partial(_partial(path))
         checkpoint.remove()
 
@@ -142,7 +142,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     return stop.exit_status
 
 
-def _tell_results(results: Results, config: Config, path: Path) -> None:
+def _report_results(results: Results, config: Config, path: Path) -> None:
     from mesoslip.analysis import regime
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mesoslip.campaign.runner import Sweep
 
 # Failures of which each is told on the terminal.
-MOST_TOLD = 20
+MAX_REPORTED = 20
 # Exit status of a sweep that is not whole.
 FAILED = 1
 
@@ -57,7 +57,7 @@ def sweep(
     folder = path.with_name(f"{path.stem}.points")
     executor = executor_of(workers, scheduler, pool)
     if dry_run:
-        _tell_estimate(plan, folder, workers)
+        _print_estimate(plan, folder, workers)
         return
     # All of them are checked before anything is made.
     _ = plan.combinations
@@ -78,7 +78,7 @@ def sweep(
                 f"{error}; {kept} points are kept: the same command goes on"
             ) from error
         status = _write(done, path, stop)
-    _tell(done, path, quiet)
+    _report(done, path, quiet)
     if status:
         raise typer.Exit(status)
 
@@ -101,17 +101,17 @@ def _write(done: Sweep, path: Path, stop: Stop) -> int:
     return stop.exit_status if stop.is_set() else FAILED
 
 
-def _tell(done: Sweep, path: Path, quiet: bool) -> None:
-    for point, reason in list(done.failures.items())[:MOST_TOLD]:
+def _report(done: Sweep, path: Path, quiet: bool) -> None:
+    for point, reason in list(done.failures.items())[:MAX_REPORTED]:
         say(f"{path}: failed: {point}: {reason}")
-    if len(done.failures) > MOST_TOLD:
-        say(f"{path}: {len(done.failures) - MOST_TOLD} more failed; see the attribute failures")
+    if len(done.failures) > MAX_REPORTED:
+        say(f"{path}: {len(done.failures) - MAX_REPORTED} more failed; see the attribute failures")
     if not quiet and done.complete:
         failed = f", {len(done.failures)} failed" if done.failures else ""
         say(f"{path}: {done.computed} points computed, {done.stored} were there{failed}")
 
 
-def _tell_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
+def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from mesoslip.campaign.estimate import estimate
     from mesoslip.execution.executors import checked_workers
     from mesoslip.execution.store import Pieces

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
 # Work that the stability of steady sliding may take after a force curve, some seconds.
-MOST_WORK = 400_000
+MAX_WORK = 400_000
 
 
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
@@ -56,7 +56,7 @@ def curve(
     checked = load(config, changes)
     if output is not None:
         targets.check_output(output, [config])
-    _tell_without_interaction(checked)
+    _warn_of_interaction(checked)
     force_curve = ForceCurve(checked)
     if output is not None:
         writing.write(force_curve.to_tree(), output)
@@ -67,10 +67,10 @@ def curve(
         for name, value in summary.items():
             show(name, value, *SUMMARY[name])
         typer.echo(force_curve.verdict)
-        sliding = steady_sliding(checked, MOST_WORK)
+        sliding = steady_sliding(checked, MAX_WORK)
         for told in (
             None if sliding is None else sliding.summary,
-            stiffness_summary(checked, MOST_WORK),
+            stiffness_summary(checked, MAX_WORK),
         ):
             if told is not None:
                 typer.echo(told)
@@ -98,7 +98,7 @@ def onset(
     checked = load(config, changes)
     if output is not None:
         targets.check_output(output, [config])
-    _tell_without_interaction(checked)
+    _warn_of_interaction(checked)
     tree = slip_onset.onset(checked)
     if output is not None:
         writing.write(tree, output)
@@ -112,7 +112,7 @@ def onset(
     typer.echo(tree.attrs["comment"])
 
 
-def _tell_without_interaction(config: Config) -> None:
+def _warn_of_interaction(config: Config) -> None:
     """The master equation has no neighbours: say so to who asks for some."""
     if config.interaction is not None and config.interaction.strength > 0:
         typer.echo("this is without [interaction], which the master equation cannot have", err=True)

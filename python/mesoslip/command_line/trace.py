@@ -61,7 +61,7 @@ def trace(
             help="Period of the setup; from --config, or else estimated", metavar="'25 ms'"
         ),
     ] = None,
-    largest_gap: Annotated[
+    max_gap: Annotated[
         str | None,
         typer.Option(help="Gaps up to this are filled by straight lines", metavar="'10 ms'"),
     ] = None,
@@ -77,7 +77,7 @@ def trace(
         table,
         columns=columns,
         rate=quantity_or_none(rate, "--rate", "1/s", "1 kHz", positive=True),
-        largest_gap=quantity_or_none(largest_gap, "--largest-gap", "s", "10 ms", positive=True),
+        max_gap=quantity_or_none(max_gap, "--max-gap", "s", "10 ms", positive=True),
         drive_velocity=quantity_or_none(velocity, "--velocity", "m/s", "0.1 um/s"),
         stiffness=quantity_or_none(stiffness, "--stiffness", "N/m", "97 N/m", positive=True),
         config=config,

@@ -38,36 +38,36 @@ def drive_problems(config: Setting) -> Complaints:
         named = _named(kind for kind, table in SLIDERS.items() if table.driven_by_force)
         yield Complaint("drive.force_rate", f"is for {named} only", drive.force_rate)
     if run.drive_displacement is not None:
-        way = run.drive_displacement
+        distance = run.drive_displacement
         if run.duration is not None:
-            yield Complaint("run.drive_displacement", "give either this or run.duration", way)
-        elif not drive.last_velocity and not any(part.way for part in drive.parts):
+            yield Complaint("run.drive_displacement", "give either this or run.duration", distance)
+        elif not drive.last_velocity and not any(part.path_length for part in drive.parts):
             yield Complaint(
                 "run.drive_displacement",
                 "needs a drive.velocity that is not 0, or stages that move",
-                way,
+                distance,
             )
         elif math.isinf(config.duration):
-            reach = math.fsum(part.way for part in drive.parts)
+            reach = math.fsum(part.path_length for part in drive.parts)
             yield Complaint(
                 "run.drive_displacement",
                 f"is never reached: the stages move the drive by {reach:g} m, and the last one "
-                f"{'stands still' if drive.goes_on else 'ends'}"
+                f"{'stands still' if drive.continues else 'ends'}"
                 if drive.parts
                 else f"takes for ever at {drive.velocity:g} m/s",
-                way,
+                distance,
             )
     yield from _stop_problems(config)
     if run.avalanches is not None:
         if not config.has_avalanches:
             yield Complaint(
                 "run.avalanches",
-                f"needs [interaction] or {_named_jumping()}: otherwise contacts break one by one",
+                f"needs [interaction] or {_named_jumping()}: otherwise there are no avalanches",
                 run.avalanches,
             )
         elif drive.velocity == 0:
             yield Complaint(
-                "drive.velocity", "must not be 0 for a run that avalanches end", drive.velocity
+                "drive.velocity", "must not be 0 if run.avalanches ends the run", drive.velocity
             )
     if run.avalanches is None and config.duration == math.inf and run.drive_displacement is None:
         if drive.force_rate is not None and not config.contacts.reattach:
@@ -78,7 +78,7 @@ def drive_problems(config: Setting) -> Complaints:
 
 
 def _stop_problems(config: Setting) -> Complaints:
-    """What is wrong with what ends the run before its time."""
+    """What is wrong with the conditions that end a run early."""
     stop = config.run.stops
     if stop.slips is not None and config.slider.slip_velocity(config) == 0:
         yield Complaint(
@@ -89,18 +89,22 @@ def _stop_problems(config: Setting) -> Complaints:
     if stop.steady is not None:
         parts = config.drive_parts
         last = parts[-1]
-        if not config.drive.goes_on or last.start_velocity != last.end_velocity or not last.way:
+        if (
+            not config.drive.continues
+            or last.start_velocity != last.end_velocity
+            or not last.path_length
+        ):
             yield Complaint(
-                "run.stop.steady", "needs a drive that comes to a constant velocity, not 0"
+                "run.stop.steady", "needs a drive that ends at a constant velocity other than 0"
             )
         elif config.drive.force_rate is not None:
-            yield Complaint("run.stop.steady", "has no meaning for a force that grows")
+            yield Complaint("run.stop.steady", "is not for a force that grows")
 
 
 def output_problems(config: Setting) -> Complaints:
-    """What is wrong with what is recorded, of a run whose drive is right."""
+    """What is wrong with [output], if the drive is right."""
     if not (config.expected_duration > 0 and math.isfinite(config.expected_duration)):
-        yield Complaint("drive", "so slow or so fast that the run has no finite duration")
+        yield Complaint("drive", "too slow or too fast for a finite duration of the run")
         return
     output, interval = config.output, config.output_interval
     if interval > config.duration:
@@ -122,10 +126,12 @@ def output_problems(config: Setting) -> Complaints:
     if not config.contact_kind.on_lattice:
         for key in ("snapshots", "snapshot_size"):
             if getattr(output, key):
-                yield Complaint(f"output.{key}", "needs [interaction], for the places of contacts")
+                yield Complaint(
+                    f"output.{key}", "needs [interaction], which gives contacts their sites"
+                )
     times = list(output.snapshots)
     if times != sorted(set(times)) or (times and times[-1] > config.duration):
-        yield Complaint("output.snapshots", "must grow, up to the duration of the run", times)
+        yield Complaint("output.snapshots", "must increase, up to the duration of the run", times)
     if output.avalanche_size is not None and not config.has_avalanches:
         yield Complaint(
             "output.avalanche_size",
@@ -140,14 +146,13 @@ def curve_problems(config: Setting) -> Complaints:
     if width > 0.25 * stretch:
         yield Complaint(
             "curve.newborn_width",
-            "must be a narrow spread, at most a quarter of the mean breaking stretch, "
-            f"{0.25 * stretch:.3g} m",
+            f"must be at most a quarter of the mean breaking stretch, {0.25 * stretch:.3g} m",
             width,
         )
     if width > 0 and config.contacts.initial == "steady":
         yield Complaint(
             "curve.newborn_width",
-            'must be 0 with contacts.initial = "steady", the state of contacts without a spread',
+            'must be 0 with contacts.initial = "steady", where all contacts attach at one stretch',
             width,
         )
 

@@ -1,6 +1,6 @@
 """Tables with units: columns of numbers under headers such as ``time [s]``, read strictly.
 
-Whatever can be read in two ways is refused, with the line and with what would be right.
+Ambiguous numbers are refused; the message names the line and the fix.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ DELIMITERS = ",;\t"
 
 
 class Quantity(NamedTuple):
-    """What a column may hold: its name in messages, its SI unit, and what a good header is."""
+    """A quantity of a column: its name in messages, its SI unit, and an example of a header."""
 
     name: str
     unit: str
     header: str
 
 
-class Place(NamedTuple):
-    """Where a column is, and the size of its unit in SI."""
+class FoundColumn(NamedTuple):
+    """Index of a column in a table, and the size of its unit in SI."""
 
     column: int
     size: float
@@ -45,7 +45,7 @@ class Cells:
     source
         Name of the file, for messages.
     delimiter
-        Separator of columns; a blank stands for any number of blanks.
+        Separator of columns; a space stands for any number of spaces.
     first
         Cells of the first row.
     has_header
@@ -62,7 +62,7 @@ class Cells:
 
 
 def cells_of(text: str, source: str) -> Cells:
-    """A table as text: comma, semicolon, tab or blanks between columns.
+    """A table as text: columns separated by comma, semicolon, tab or spaces.
 
     Lines that are empty or start with ``#`` are skipped.
 
@@ -109,26 +109,26 @@ def _is_number(cell: str, delimiter: str) -> bool:
         return False
 
 
-def places_of(
+def find_columns(
     headers: Sequence[str], known: Mapping[str, Quantity], source: str
-) -> dict[str, Place]:
-    """Where the known columns are, by the name of their quantity; others are not read.
+) -> dict[str, FoundColumn]:
+    """Find the known columns, by the name of their quantity; others are not read.
 
     Parameters
     ----------
     headers
         Headers such as "time [s]".
     known
-        Quantities by the names that headers may have, in lower case, with underscores for blanks.
+        Quantities by the names that headers may have, in lower case, with underscores for spaces.
     source
         Name of the file, for messages.
 
     Raises
     ------
     FileError
-        If a column is there twice, or has no unit or a wrong one.
+        If a column occurs twice, or has no unit or a wrong one.
     """
-    places: dict[str, Place] = {}
+    places: dict[str, FoundColumn] = {}
     for column, header in enumerate(headers):
         match = HEADER.fullmatch(header)
         name = "" if match is None else match["name"].strip().lower().replace(" ", "_")
@@ -147,12 +147,16 @@ def places_of(
                 f"{source}: column {shown(header)} has the unit {shown(match['unit'])}, which is "
                 f"not a unit of {quantity.name}; {right}"
             ) from None
-        places[quantity.name] = Place(column, size)
+        places[quantity.name] = FoundColumn(column, size)
     return places
 
 
 def values_of(
-    cells: Cells, headers: Sequence[str], places: Mapping[str, Place], *, keep_missing: bool = False
+    cells: Cells,
+    headers: Sequence[str],
+    places: Mapping[str, FoundColumn],
+    *,
+    keep_missing: bool = False,
 ) -> dict[str, list[float]]:
     """Values of columns in SI.
 
@@ -163,7 +167,7 @@ def values_of(
     headers
         Headers of all its columns.
     places
-        The columns to read, see `places_of`.
+        The columns to read, see `find_columns`.
     keep_missing
         Whether empty cells, and those that are not a number (NaN), are kept as NaN.
 
@@ -171,7 +175,7 @@ def values_of(
     ------
     FileError
         If a row has more cells than there are headers or lacks one that is read, or a cell is not
-        one finite number that can be read in one way only.
+        one unambiguous finite number.
     """
     values: dict[str, list[float]] = {name: [] for name in places}
     decimal = "." if cells.delimiter == "," else _decimal_of(cells, places.values())
@@ -194,15 +198,15 @@ def values_of(
     return values
 
 
-# What is said of commas where they separate columns.
+# Hint for tables whose columns are separated by commas.
 POINT = "; numbers have a decimal point, and a comma would begin another cell"
 
 
-def _decimal_of(cells: Cells, places: Iterable[Place]) -> str:
+def _decimal_of(cells: Cells, places: Iterable[FoundColumn]) -> str:
     """The decimal sign of a table in which commas separate no columns.
 
-    A comma is one if there is a number in which it cannot group thousands, and no number has a
-    point. `number_of` refuses what is not in accordance with it.
+    It is a comma if some number has a comma that cannot group thousands, and no number has a point.
+    `number_of` refuses numbers that contradict it.
     """
     columns = [place.column for place in places]
     comma = False

@@ -1,7 +1,4 @@
-"""The configuration of a run: checked, in SI units.
-
-Everything that is wrong with a configuration is reported at once.
-"""
+"""The configuration of a run: checked, in SI units. All its errors are reported at once."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
     Change,
-    Laid,
+    Merged,
     base_of,
     check_no_files,
     on_base,
@@ -43,7 +40,7 @@ class Config(Table):
     """A whole configuration."""
 
     title: Text | None = None
-    """What the run is, for pictures and reports."""
+    """Title of the run, for pictures and reports."""
     run: Run
     drive: Drive
     slider: Slider
@@ -52,9 +49,9 @@ class Config(Table):
     output: Output = Output()
     curve: Curve = Curve()
 
-    # The tables that the configuration was laid over, for those who ask what it changes.
+    # The tables that the configuration changes, if it is based on others.
     _base: Mapping[str, Any] | None = PrivateAttr(default=None)
-    # Keys that were dropped on the way, as another kind of slider does not have them.
+    # Keys that were dropped because the new kind of slider does not have them.
     _dropped: tuple[str, ...] = PrivateAttr(default=())
 
     def __init__(self, **tables: Any) -> None:
@@ -88,15 +85,14 @@ class Config(Table):
             raise ConfigError(problems(error, "configuration", cls)) from None
 
     def __eq__(self, other: object) -> bool:
-        """Whether another configuration is of the same run, whatever they were laid over."""
+        """Whether another configuration describes the same run, whatever both are based on."""
         return isinstance(other, Config) and self.__dict__ == other.__dict__
 
     @property
     def base(self) -> Config | None:
-        """What the configuration was laid over, if that can be run by itself.
+        """The configuration that this one changes, if it can be run by itself.
 
-        The file under its own, or without such a file that without the changes, or the
-        configuration that it replaces.
+        It is the file named by ``base``; without one, the configuration before changes were made.
         """
         if self._base is None:
             return None
@@ -112,7 +108,7 @@ class Config(Table):
 
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
-        """Whether all tables together can be run, after each of them was found right."""
+        """Check the tables together, after each of them alone."""
         complaints = self._complaints()
         if complaints:
             raise PydanticCustomError(
@@ -132,7 +128,7 @@ class Config(Table):
             *self.contact_kind.problems(self),
             *checks.curve_problems(self),
         ]
-        # Without a drive there is no length of the run, to which what is recorded is compared.
+        # Output intervals are compared with the duration, which a wrong drive does not have.
         return complaints or [*checks.output_problems(self)]
 
     @property
@@ -142,16 +138,16 @@ class Config(Table):
 
     @property
     def curve_length(self) -> float:
-        """Length of the force curve [m]; twenty mean breaking stretches unless given."""
+        """Length of the force curve [m]; 20 mean breaking stretches unless given."""
         return self.curve.length or 20 * self.contacts.break_stretch
 
     @cached_property
     def duration(self) -> float:
         """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
-            # What does not go on ends the run.
-            most = math.inf if self.drive.goes_on else self.drive.length
-            return min(self.run.duration, most)
+            # A cycle or a history ends the run.
+            limit = math.inf if self.drive.continues else self.drive.length
+            return min(self.run.duration, limit)
         if self.run.drive_displacement is not None:
             return self.drive.time_for(self.run.drive_displacement)
         return self.drive.length
@@ -174,8 +170,11 @@ class Config(Table):
 
     @property
     def steady_block(self) -> float:
-        """Way of the drive whose mean force tells whether the state is steady [m]: unless given,
-        that which loads spring and contacts to the static force; 0 if it is not asked for."""
+        """Distance that the drive moves in a block of the criterion for a steady state [m].
+
+        By default the one that loads spring and contacts to the static force; 0 without the
+        criterion.
+        """
         steady = self.run.stops.steady
         if steady is None:
             return 0.0
@@ -189,23 +188,25 @@ class Config(Table):
 
     @property
     def spring_stiffness(self) -> float:
-        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
+        """K [N/m]; infinite for a prescribed slider, 0 for one driven by a force."""
         return self.slider.spring_stiffness
 
     @property
     def has_avalanches(self) -> bool:
-        """Whether avalanches are recorded: breaks may bring about others at once."""
+        """Whether avalanches are recorded: a break may trigger others at once."""
         return self.interaction is not None or self.slider.jumps
 
     @property
     def drive_speed(self) -> float:
-        """Speed of the first stage of the drive that moves, the greatest of a ramp, the mean of a
-        measured history [m/s]; 0 if none moves."""
+        """Speed of the first moving stage of the drive [m/s]; 0 if none moves.
+
+        For a ramp the maximum, for a measured history the mean.
+        """
         if self.drive.force_rate is not None:
             return 0.0
         if self.drive.history is not None:
-            return math.fsum(part.way for part in self.drive_parts) / self.duration
-        return next((part.greatest_speed for part in self.drive_parts if part.way > 0), 0.0)
+            return math.fsum(part.path_length for part in self.drive_parts) / self.duration
+        return next((part.max_speed for part in self.drive_parts if part.path_length > 0), 0.0)
 
     @cached_property
     def drive_parts(self) -> tuple[DrivePart, ...]:
@@ -214,10 +215,10 @@ class Config(Table):
 
     @property
     def unreached_drive(self) -> str | None:
-        """What of a drive with an end the run does not come to, in words; None if it comes to all
-        of it."""
+        """A message about the part of a finite drive that the run does not reach; None if it
+        reaches all of it."""
         length = self.drive.length
-        # But for rounding of the sum of the stages.
+        # Allow for rounding in the sum of the stages.
         if not self.duration < (1 - 1e-9) * length < math.inf:
             return None
         stages, reached = self.drive.parts[-1].stage + 1, self.drive_parts[-1].stage + 1
@@ -235,7 +236,7 @@ class Config(Table):
 
     @classmethod
     def load(cls, path: PathLike, overrides: Iterable[Change] = ()) -> Config:
-        """Read a TOML file and what it is based on, lay overrides over it, and check it.
+        """Read a TOML file and its base, apply changes, and check the result.
 
         Parameters
         ----------
@@ -252,9 +253,9 @@ class Config(Table):
             If anything in it is wrong.
         """
         path, overrides = as_path(path), tuple(overrides)
-        laid = read_toml(path)
-        base = base_of(path) or (laid.tables if overrides else None)
-        return cls._checked(override(laid, overrides), str(path), base)
+        merged = read_toml(path)
+        base = base_of(path) or (merged.tables if overrides else None)
+        return cls._checked(override(merged, overrides), str(path), base)
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
@@ -277,25 +278,25 @@ class Config(Table):
         overrides: Iterable[Change] = (),
         base: str | None = None,
     ) -> Config:
-        """Check a configuration given as the text of a TOML file, with changes laid over it.
+        """Check a configuration given as the text of a TOML file, with changes applied.
 
-        Without changes, it is taken to have been laid over ``base``, if that is given. Both are
+        Without changes, ``base`` is the text of the configuration that it is based on. Both come
         from an output and name no files; changes may.
         """
         tables, overrides = parse_toml(text, source), tuple(overrides)
         below = None if base is None else parse_toml(base, source)
         for one in (tables, below or {}):
             check_no_files(one, source)
-        laid = override(Laid(tables), overrides)
-        return cls._checked(laid, source, tables if overrides else below)
+        merged = override(Merged(tables), overrides)
+        return cls._checked(merged, source, tables if overrides else below)
 
     @classmethod
-    def _checked(cls, laid: Laid, source: str, base: Mapping[str, Any] | None = None) -> Config:
+    def _checked(cls, merged: Merged, source: str, base: Mapping[str, Any] | None = None) -> Config:
         try:
-            config = super().model_validate(laid.tables)
+            config = super().model_validate(merged.tables)
         except ValidationError as error:
             raise ConfigError(problems(error, source, cls)) from None
-        config._base, config._dropped = base, tuple(laid.dropped)
+        config._base, config._dropped = base, tuple(merged.dropped)
         return config
 
     def replace(self, *changes: Change, **tables: Any) -> Config:
@@ -306,7 +307,7 @@ class Config(Table):
         changes
             Texts such as "contacts.delay=1ms", or tables such as {"contacts.delay": 1e-3}.
         tables
-            Keys of tables, such as ``contacts={"delay": "1 ms"}``; what is not named stays.
+            Keys of tables, such as ``contacts={"delay": "1 ms"}``; other keys stay.
 
         Raises
         ------
@@ -314,10 +315,10 @@ class Config(Table):
             If anything in it is wrong.
         """
         old = self.to_dict()
-        return self._checked(override(Laid(old), (*changes, tables)), "configuration", old)
+        return self._checked(override(Merged(old), (*changes, tables)), "configuration", old)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy; with other tables, if they can be run.
+        """A copy, with other tables if given.
 
         Raises
         ------
@@ -330,7 +331,7 @@ class Config(Table):
             raise ConfigError(problems(error, "configuration", type(self))) from None
 
     def _repr_html_(self) -> str:
-        """A short table of what is set, for notebooks."""
+        """A short table of the keys that are set, for notebooks."""
         rows = "".join(
             f"<tr><th>{html.escape(name)}</th>"
             f"<td style='text-align: left'>{html.escape(_summary(table))}</td></tr>"
@@ -350,11 +351,11 @@ class Config(Table):
 
 
 def _summary(table: object) -> str:
-    """A table, or a list of them, on a line."""
+    """A table, or a list of them, on one line."""
     if isinstance(table, dict):
         inner = (f"{key} = {_summary(value)}" for key, value in table.items())
         return ", ".join(inner)
     if isinstance(table, list | tuple):
         shown = [f"({_summary(one)})" for one in table[:4]]
-        return ", ".join(shown) + (f", ... ({len(table)} in all)" if len(table) > 4 else "")
+        return ", ".join(shown) + (f", ... ({len(table)} in total)" if len(table) > 4 else "")
     return f"{table:g}" if isinstance(table, float) else str(table)

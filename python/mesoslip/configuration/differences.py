@@ -1,4 +1,4 @@
-"""What differs between configurations, key by key, with values as people write them."""
+"""Differences between configurations, key by key, with values in suitable units."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.quantities import with_unit
 
-# Characters of the longest value that is shown.
-LONGEST = 60
+# Maximum number of characters of a value.
+MAX_LENGTH = 60
 MISSING = "not given"
 BOOKKEEPING = ("run.", "output.", "curve.")
 
 
 def is_bookkeeping(key: str) -> bool:
-    """Whether a key says how much is computed and kept, not what moves how."""
+    """Whether a key affects only how much is computed and recorded, not the motion."""
     return key.startswith(BOOKKEEPING) and key != "run.engine"
 
 
 class Difference(NamedTuple):
-    """A key, and its value in each of the configurations that are compared, as text."""
+    """A key, and its values in the compared configurations, as text."""
 
     key: str
     values: tuple[str, ...]
 
 
 def differences(configs: Sequence[Config]) -> list[Difference]:
-    """The keys that configurations do not share, in the order of the file; titles do not count.
+    """The keys whose values differ, in the order of the file; titles do not count.
 
-    Keys of tables that some of them lack are compared with what is missing.
+    A key that some of the configurations do not have counts as a difference.
     """
     tables = [flat(config) for config in configs]
     keys = dict.fromkeys(key for table in tables for key in table if key != "title")
@@ -44,7 +44,7 @@ def differences(configs: Sequence[Config]) -> list[Difference]:
 
 
 def flat(config: Config) -> dict[str, Any]:
-    """Values of a configuration by dotted key, those of defaults too; lists stay whole."""
+    """Values of a configuration by dotted key, including defaults; lists are not split."""
     return dict(_flat(config.to_dict(), ""))
 
 
@@ -59,13 +59,17 @@ def _flat(table: Mapping[str, Any], outer: str) -> list[tuple[str, Any]]:
 
 
 def text_of(key: str, value: Any) -> str:
-    """A value of a key in SI as a text with the unit that suits it, such as "0.5 ms"."""
+    """A value of a key in SI as text with a suitable unit, such as "0.5 ms"."""
     if value is None:
         return MISSING
     if isinstance(value, list | tuple):
         inner = ", ".join(_text_in_list(key, one) for one in value)
         text = f"[{inner}]"
-        return text if len(text) <= LONGEST else f"{text[: LONGEST - 10]} … ({len(value)} in all)"
+        return (
+            text
+            if len(text) <= MAX_LENGTH
+            else f"{text[: MAX_LENGTH - 10]} … ({len(value)} in total)"
+        )
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and math.isfinite(value):
@@ -81,11 +85,11 @@ def _text_in_list(key: str, value: Any) -> str:
     return text_of(key, value)
 
 
-def told(config: Config, base: Config) -> list[str]:
-    """What a configuration changes of another one, a text for each key.
+def changes(config: Config, base: Config) -> list[str]:
+    """Changes of a configuration relative to another one, a text for each key.
 
-    What is computed and kept comes last. Keys that are gone, as with another kind of slider, and
-    defaults of new ones are not named.
+    Keys of [run], [output] and [curve] come last. Keys that only the other one has, and defaults
+    that only this one has, are left out.
     """
     own = dict(_flat(config.model_dump(exclude_none=True, exclude_defaults=True), ""))
     texts: list[str] = []
@@ -99,17 +103,17 @@ def told(config: Config, base: Config) -> list[str]:
 
 
 def labels(configs: Sequence[Config], names: Sequence[str]) -> list[str]:
-    """A label for each configuration that says how it differs from the others.
+    """A label for each configuration, from the keys in which it differs from the others.
 
-    What is computed and kept counts only where nothing else differs. Names stand for
-    configurations that are all alike, and beside values that several of them share.
+    Keys of [run], [output] and [curve] count only if no others differ. The name is the label of
+    configurations that are all alike, and is added to labels that several of them share.
     """
     all_found = differences(configs)
     found = [one for one in all_found if not is_bookkeeping(one.key)] or all_found
     texts = []
-    for place, name in enumerate(names):
-        given = [one for one in found if one.values[place] != MISSING] or found
-        parts = [f"{one.key} = {one.values[place]}" for one in given[:3]]
+    for index, name in enumerate(names):
+        given = [one for one in found if one.values[index] != MISSING] or found
+        parts = [f"{one.key} = {one.values[index]}" for one in given[:3]]
         parts += [f"and {len(given) - 3} more"] if len(given) > 3 else []
         texts.append(", ".join(parts) if parts else name)
     return [

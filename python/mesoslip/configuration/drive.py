@@ -1,7 +1,7 @@
-"""How the drive moves: the tables of the file, and the parts of it that the kernel is told.
+"""The drive: its tables in a file, and the parts of constant acceleration that the kernel is given.
 
-However a drive is given, it is run as parts one after another, in each of which the velocity
-changes linearly with time. Parts of one stage have its number.
+Every drive is a sequence of parts, in each of which the velocity changes linearly with time. Each
+part carries the number of its stage.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import Field, StrictBool, model_validator
 
-from mesoslip.configuration.columns import Quantity, cells_of, places_of, values_of
+from mesoslip.configuration.columns import Quantity, cells_of, find_columns, values_of
 from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.table import (
     ForceRate,
@@ -32,8 +32,8 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.errors import FileError
 
-# Parts of the longest drive.
-MOST_PARTS = 1_000_000
+# Upper limit for the parts of a drive.
+MAX_PARTS = 1_000_000
 
 # The columns of a measured history that are read.
 COLUMNS = {
@@ -43,9 +43,17 @@ COLUMNS = {
 
 
 class DrivePart(NamedTuple):
-    """A part of the drive: its duration [s], the velocities at its start and end [m/s], between
-    which it changes linearly, or, for a drive by force, the rate of the force [N/s], and the number
-    of the stage that it is of, from 0."""
+    """A part of the drive with constant acceleration.
+
+    Attributes
+    ----------
+    duration
+        Duration [s].
+    start_velocity, end_velocity
+        Velocities at its start and end [m/s]; for a drive by force, the rate of the force [N/s].
+    stage
+        Number of its stage, from 0.
+    """
 
     duration: float
     start_velocity: float
@@ -53,23 +61,23 @@ class DrivePart(NamedTuple):
     stage: int
 
     @property
-    def greatest_speed(self) -> float:
-        """Greatest speed in it [m/s]."""
+    def max_speed(self) -> float:
+        """Maximum speed [m/s]."""
         return max(abs(self.start_velocity), abs(self.end_velocity))
 
     @property
-    def way(self) -> float:
-        """Way of the drive in it, there and back both counted [m]."""
-        return self.way_in(self.duration)
+    def path_length(self) -> float:
+        """Path length of the drive: distances in both directions add up [m]."""
+        return self.path_length_in(self.duration)
 
     @property
     def directions(self) -> set[float]:
-        """Signs of the velocities in it that are not 0."""
+        """Signs of its velocities other than 0."""
         velocities = (self.start_velocity, self.end_velocity)
         return {math.copysign(1, one) for one in velocities if one}
 
-    def way_in(self, time: float) -> float:
-        """Way of the drive in its first so many seconds, there and back both counted [m]."""
+    def path_length_in(self, time: float) -> float:
+        """Path length of the drive in the first ``time`` seconds [m]."""
         if self.start_velocity == self.end_velocity:
             return abs(self.start_velocity) * time
         start, end = self.start_velocity, self._velocity_at(time)
@@ -77,22 +85,23 @@ class DrivePart(NamedTuple):
             return 0.5 * abs(start + end) * time
         return 0.5 * time * (start**2 + end**2) / (abs(start) + abs(end))
 
-    def time_for(self, way: float) -> float:
-        """Time in which the drive goes a way, not longer than that of the part [s]."""
+    def time_for(self, path_length: float) -> float:
+        """Time that a path length takes, at most the duration of the part [s]."""
         if self.start_velocity == self.end_velocity:
-            return way / abs(self.start_velocity)
+            return path_length / abs(self.start_velocity)
         acceleration = (self.end_velocity - self.start_velocity) / self.duration
         turn = -self.start_velocity / acceleration
-        before = self.way_in(min(max(turn, 0.0), self.duration))
-        if turn > 0 and way > before:
-            return min(turn + math.sqrt(2 * (way - before) / abs(acceleration)), self.duration)
+        before = self.path_length_in(min(max(turn, 0.0), self.duration))
+        if turn > 0 and path_length > before:
+            after = math.sqrt(2 * (path_length - before) / abs(acceleration))
+            return min(turn + after, self.duration)
         start = abs(self.start_velocity)
         change = -abs(acceleration) if turn > 0 else abs(acceleration)
-        root = start + math.sqrt(max(0.0, start**2 + 2 * change * way))
-        return min(2 * way / root, self.duration) if root > 0 else 0.0
+        root = start + math.sqrt(max(0.0, start**2 + 2 * change * path_length))
+        return min(2 * path_length / root, self.duration) if root > 0 else 0.0
 
     def cut(self, duration: float) -> DrivePart:
-        """The first so many seconds of it."""
+        """Its first ``duration`` seconds."""
         if duration >= self.duration:
             return self
         return self._replace(duration=duration, end_velocity=self._velocity_at(duration))
@@ -105,13 +114,13 @@ class DrivePart(NamedTuple):
 
 
 class Stage(Table):
-    """A stage of the drive, for a time or until the drive has gone a way: a constant velocity, of
-    either sign or zero; a ramp from one velocity to another; or a hold."""
+    """A stage of the drive, which ends after a duration or a displacement: a constant velocity of
+    either sign, a ramp from one velocity to another, or a hold."""
 
     duration: Annotated[Time, Field(gt=0)] | None = None
-    """How long the stage is."""
+    """Duration of the stage."""
     displacement: Annotated[Length, Field(gt=0)] | None = None
-    """Way of the drive after which the stage is over, instead of a duration."""
+    """Distance that the drive moves in the stage, instead of a duration."""
     velocity: Velocity | None = None
     """Velocity of the drive, of either sign."""
     start_velocity: Velocity | None = None
@@ -119,7 +128,7 @@ class Stage(Table):
     end_velocity: Velocity | None = None
     """Velocity at the end of a ramp."""
     hold: StrictBool | None = None
-    """Whether the drive stands."""
+    """Whether the drive stands still."""
 
     @model_validator(mode="after")
     def _is_one_motion(self) -> Self:
@@ -156,7 +165,7 @@ class Stage(Table):
         return self.start_velocity or 0.0, self.end_velocity or 0.0
 
     def part(self, number: int) -> DrivePart:
-        """It as a part of the drive."""
+        """The stage as a part of the drive."""
         start, end = self._velocities
         duration = self.duration
         if duration is None:
@@ -167,18 +176,18 @@ class Stage(Table):
 
 
 class Cycle(Table):
-    """A drive that goes forth and back: from the start to the amplitude, to minus the amplitude and
-    back, so many times. Each stroke is a stage."""
+    """An oscillating drive: from 0 to plus the amplitude, to minus the amplitude, and so on, back
+    to 0 at the end. Each stroke is a stage."""
 
     shape: Literal["triangle"] = "triangle"
-    """Straight strokes."""
+    """`triangle`: constant speed in each stroke."""
     amplitude: Annotated[Length, Field(gt=0)]
-    """Greatest displacement of the drive to either side."""
+    """Maximum displacement of the drive in either direction."""
     velocity: Annotated[Velocity, Field(gt=0)] | None = None
     """Speed of the drive."""
     frequency: Annotated[Rate, Field(gt=0)] | None = None
-    """Cycles in a second, instead of a velocity."""
-    cycles: Annotated[Whole, Field(ge=1, lt=MOST_PARTS // 2)]
+    """Cycles per second, instead of a velocity."""
+    cycles: Annotated[Whole, Field(ge=1, lt=MAX_PARTS // 2)]
     """Number of cycles, after which the run ends."""
 
     @model_validator(mode="after")
@@ -199,17 +208,17 @@ class Cycle(Table):
         """The strokes."""
         last = 2 * self.cycles
         for number in range(last + 1):
-            way = self.amplitude if number in {0, last} else 2 * self.amplitude
+            distance = self.amplitude if number in {0, last} else 2 * self.amplitude
             velocity = self.speed if number % 2 == 0 else -self.speed
-            yield DrivePart(way / self.speed, velocity, velocity, number)
+            yield DrivePart(distance / self.speed, velocity, velocity, number)
 
 
 class History(Table):
-    """A measured history: displacements of the drive at times, from the first on, and straight
-    lines between them. A file is read once; what is kept are its points."""
+    """A measured history of the drive: its displacement at given times, with straight lines between
+    them. Outputs keep the points, not the name of the file."""
 
     file: Text | None = None
-    """A CSV file with the columns time and displacement, beside the configuration."""
+    """A CSV file with the columns time and displacement, relative to the configuration."""
     time: tuple[MeasuredTime, ...] | None = None
     """Times of the points, instead of a file."""
     displacement: tuple[MeasuredLength, ...] | None = None
@@ -235,22 +244,22 @@ class History(Table):
         if len(self.time) != len(self.displacement):
             raise problem("displacement", "must have as many values as time")
         if len(self.time) < 2:
-            raise problem("time", "must have two values at least")
-        if len(self.time) > MOST_PARTS:
-            raise problem("time", f"has more than {MOST_PARTS} values")
+            raise problem("time", "must have at least two values")
+        if len(self.time) > MAX_PARTS:
+            raise problem("time", f"has more than {MAX_PARTS} values")
         for before, after in itertools.pairwise(self.time):
             if not after > before:
-                raise problem("time", f"must grow; {after:g} s comes after {before:g} s")
+                raise problem("time", f"must increase; {after:g} s comes after {before:g} s")
         for part in self.parts():
-            if part.greatest_speed > 3e8:
-                raise problem("displacement", f"moves at {part.greatest_speed:g} m/s")
+            if part.max_speed > 3e8:
+                raise problem("displacement", f"moves at {part.max_speed:g} m/s")
         return self
 
     def parts(self) -> Iterator[DrivePart]:
-        """The lines between the points, all of one stage."""
+        """The straight lines between the points, all in one stage."""
         points = zip(self.time or (), self.displacement or (), strict=True)
-        for (time, place), (next_time, next_place) in itertools.pairwise(points):
-            velocity = (next_place - place) / (next_time - time)
+        for (time, position), (next_time, next_position) in itertools.pairwise(points):
+            velocity = (next_position - position) / (next_time - time)
             yield DrivePart(next_time - time, velocity, velocity, 0)
 
 
@@ -266,47 +275,47 @@ def read_history(path: Path) -> dict[str, list[float]]:
     Raises
     ------
     FileError
-        If the file cannot be read, or is not such a table: which line, and what would be right.
+        If the file cannot be read or is not such a table; the message names the line and the fix.
     """
     cells = cells_of(text_of(path, "a history of the drive"), str(path))
     wanted = "the header must name the columns with units, such as time [s],displacement [um]"
-    places = places_of(cells.first, COLUMNS, str(path)) if cells.has_header else {}
+    places = find_columns(cells.first, COLUMNS, str(path)) if cells.has_header else {}
     for name in COLUMNS:
         if name not in places:
             raise FileError(f"{path}: there is no column {name}; {wanted}")
     if places["time"].column != 0:
         raise FileError(f"{path}: the first column must be the time")
     if len(cells.lines) < 2:
-        raise FileError(f"{path}: must have two rows of numbers at least")
+        raise FileError(f"{path}: must have at least two rows of numbers")
     points = values_of(cells, cells.first, places)
     times = itertools.pairwise(points["time"])
     for (line, _), (before, after) in zip(cells.lines[1:], times, strict=True):
         if not after > before:
-            raise FileError(f"{path}: line {line}: the time must grow from row to row")
+            raise FileError(f"{path}: line {line}: the time must increase from row to row")
     return points
 
 
 class Drive(Table):
-    """How the drive moves: at one velocity; in stages, which may be repeated; forth and back; along
-    a measured history; or as a force that grows."""
+    """The drive: one velocity, stages (which may be repeated), oscillation, a measured history, or
+    a force that grows."""
 
     velocity: Velocity | None = None
     """One velocity for the whole run."""
     stage: tuple[Stage, ...] | None = None
     """Stages one after another, as `[[drive.stage]]` tables."""
-    repeat: Annotated[Whole, Field(ge=1, le=MOST_PARTS)] | None = None
-    """How often the list of stages is gone through."""
+    repeat: Annotated[Whole, Field(ge=1, le=MAX_PARTS)] | None = None
+    """Number of passes through the list of stages."""
     cycle: Cycle | None = None
-    """A drive that goes forth and back."""
+    """An oscillating drive."""
     history: History | None = None
     """A measured motion of the drive."""
     force_rate: ForceRate | None = None
-    """Rate of a force that pulls a quasi-static slider instead of a spring."""
+    """Rate of a force that acts on a quasi-static slider without a spring."""
 
     @model_validator(mode="after")
     def _one_of_them(self) -> Self:
-        ways = [self.velocity, self.stage, self.cycle, self.history, self.force_rate]
-        if ways.count(None) != len(ways) - 1:
+        given = [self.velocity, self.stage, self.cycle, self.history, self.force_rate]
+        if given.count(None) != len(given) - 1:
             raise problem(
                 "velocity",
                 "give either a velocity, [[drive.stage]] tables, [drive.cycle], [drive.history], "
@@ -319,13 +328,13 @@ class Drive(Table):
         if self.repeat is not None:
             if self.stage is None:
                 raise problem("repeat", "needs [[drive.stage]] tables, which it repeats")
-            if self.repeat * len(self.stage) > MOST_PARTS:
-                raise problem("repeat", f"makes more than {MOST_PARTS} stages")
+            if self.repeat * len(self.stage) > MAX_PARTS:
+                raise problem("repeat", f"makes more than {MAX_PARTS} stages")
         return self
 
     @cached_property
     def parts(self) -> tuple[DrivePart, ...]:
-        """What is given of it; none if it has one velocity or rate without end."""
+        """Its given parts; none for one velocity or rate without end."""
         if self.stage is not None:
             once = [one.part(0) for one in self.stage]
             times = range(self.repeat or 1)
@@ -338,35 +347,35 @@ class Drive(Table):
         return () if given is None else tuple(given.parts())
 
     @property
-    def goes_on(self) -> bool:
-        """Whether it may go on, at its last velocity, when what is given of it is over."""
+    def continues(self) -> bool:
+        """Whether it continues at its last velocity after its given parts."""
         return self.cycle is None and self.history is None
 
     @cached_property
     def length(self) -> float:
-        """How long it lasts [s]; infinite if it has one velocity or rate without end."""
+        """Total duration of its parts [s]; infinite for one velocity or rate without end."""
         return math.fsum(part.duration for part in self.parts) if self.parts else math.inf
 
     @property
     def last_velocity(self) -> float:
-        """Velocity at which it goes on [m/s], or the rate of the force [N/s]."""
+        """Velocity after its parts [m/s], or the rate of the force [N/s]."""
         if self.parts:
             return self.parts[-1].end_velocity
         return (self.velocity if self.force_rate is None else self.force_rate) or 0.0
 
-    def time_for(self, way: float) -> float:
-        """Time in which it goes a way, there and back both counted [s]; infinite if it does not."""
+    def time_for(self, path_length: float) -> float:
+        """Time that a path length takes [s]; infinite if the drive does not get so far."""
         time = 0.0
         for part in self.parts:
-            if part.way >= way:
-                return time + part.time_for(way)
+            if part.path_length >= path_length:
+                return time + part.time_for(path_length)
             time += part.duration
-            way -= part.way
-        speed = abs(self.last_velocity) if self.goes_on else 0.0
-        return time + way / speed if speed > 0 else math.inf
+            path_length -= part.path_length
+        speed = abs(self.last_velocity) if self.continues else 0.0
+        return time + path_length / speed if speed > 0 else math.inf
 
     def until(self, duration: float) -> tuple[DrivePart, ...]:
-        """Its parts until a time [s]: the last of several goes on at its last velocity."""
+        """Its parts until a time [s], continued at the last velocity if they are shorter."""
         parts: list[DrivePart] = []
         left = duration
         for part in self.parts:
@@ -380,6 +389,6 @@ class Drive(Table):
             if last.start_velocity == velocity and last.end_velocity == velocity:
                 parts[-1:] = [last._replace(duration=last.duration + left)]
             elif left > 1e-12 * duration:
-                # A ramp that is over.
+                # After a ramp.
                 parts.append(DrivePart(left, velocity, velocity, last.stage + 1))
         return tuple(parts)

@@ -1,4 +1,4 @@
-"""Configuration files: TOML, laid over the base that they name, with changes laid over both."""
+"""Configuration files: TOML, merged with the base that they name, then with changes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.sliders import DEFAULT, SLIDERS
 from mesoslip.errors import ConfigError, FileError, Problem
 
-# Keys that exclude each other: laid over a base, one replaces the other.
+# Keys that exclude each other: one replaces another one of the base.
 EXCLUSIVE = {
     "run": ("duration", "drive_displacement"),
     "drive": ("velocity", "stage", "cycle", "history", "force_rate"),
@@ -29,30 +29,30 @@ Change = str | Mapping[str, Any]
 
 
 @dataclass
-class Laid:
-    """Tables laid over others.
+class Merged:
+    """Merged tables.
 
     Attributes
     ----------
     tables
-        All of them together.
+        The result.
     dropped
-        Dotted keys that a new kind of slider does not have.
+        Dotted keys that were dropped because the new kind of slider does not have them.
     """
 
     tables: dict[str, Any]
     dropped: list[str] = field(default_factory=list)
 
 
-def read_toml(path: Path) -> Laid:
-    """Tables of a file, laid over those of its base.
+def read_toml(path: Path) -> Merged:
+    """Tables of a file, merged with those of its base.
 
     Raises
     ------
     FileError
         If a file cannot be read.
     ConfigError
-        If it is not valid TOML, or files are based on each other.
+        If it is not valid TOML, or files are based on each other in a circle.
     """
     return _read(path, ())
 
@@ -63,8 +63,8 @@ def base_of(path: Path) -> dict[str, Any] | None:
     return None if base is None else _read(path.parent / base, (path,)).tables
 
 
-def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> Laid:
-    """Tables laid over those of the file that their key ``base`` names, relative to a folder.
+def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> Merged:
+    """Tables merged with those of the file that their key ``base`` names, relative to a folder.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> Laid:
     return _on_base(dict(tables), source, folder, ())
 
 
-def _read(path: Path, outer: tuple[Path, ...]) -> Laid:
+def _read(path: Path, outer: tuple[Path, ...]) -> Merged:
     return _on_base(
         parse_toml(text_of(path, "a configuration file"), str(path)),
         str(path),
@@ -83,35 +83,35 @@ def _read(path: Path, outer: tuple[Path, ...]) -> Laid:
     )
 
 
-def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]) -> Laid:
+def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]) -> Merged:
     base = tables.pop("base", None)
-    _place_history(tables, folder)
+    _resolve_history(tables, folder)
     if base is None:
-        return Laid(tables)
+        return Merged(tables)
     if not isinstance(base, str) or not base or "\0" in base:
         raise ConfigError([Problem(source, "base", "must be the name of a file", base)])
     path = folder / base
     if any(_are_the_same(path, one) for one in outer):
         raise ConfigError([Problem(source, "base", "files are based on each other", base)])
     _check_base(path, source, base)
-    return _lay(_read(path, outer), tables)
+    return _merge_over(_read(path, outer), tables)
 
 
 def _check_base(path: Path, source: str, base: str) -> None:
-    """Make sure that a base exists; other errors of it are found when it is read."""
+    """Check that a base exists; its other errors are found when it is read."""
     try:
         path.stat()
     except FileNotFoundError:
         raise FileError(
-            f"{source}: base = {base!r}: there is no such file beside it; mesoslip example writes "
-            "an example and its base"
+            f"{source}: base = {base!r}: there is no such file; mesoslip example "
+            "writes an example and its base"
         ) from None
     except (OSError, ValueError):
         return
 
 
-def _place_history(tables: dict[str, Any], folder: Path) -> None:
-    """The file of a history of the drive is beside the file that names it."""
+def _resolve_history(tables: dict[str, Any], folder: Path) -> None:
+    """Make the file of a history of the drive relative to the folder of the file that names it."""
     match tables:
         case {"drive": {"history": {"file": str(name)} as history} as drive} if name:
             placed = {**history, "file": str(folder / name)}
@@ -119,10 +119,10 @@ def _place_history(tables: dict[str, Any], folder: Path) -> None:
 
 
 def _are_the_same(path: Path, other: Path) -> bool:
-    """Whether two names are of one file, whatever links lead to it."""
+    """Whether two paths lead to the same file."""
     try:
         return path.samefile(other)
-    # A file that is missing or cannot be read is an error when it is read.
+    # Errors of the file are reported when it is read.
     except OSError:
         return False
 
@@ -139,41 +139,41 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ConfigError([Problem(source, "", "is nested too deeply")]) from None
-    # The parser's own error is one of these, and so is that of a number with too many digits.
+    # This includes the parser's own error, and that of numbers with too many digits.
     except ValueError as error:
         message = f'not valid TOML: {error}; quantities have quotes, as in "97 N/m"'
         raise ConfigError([Problem(source, "", message)]) from None
 
 
-def check_no_files(tables: Mapping[str, Any], source: str, place: str = "") -> None:
-    """Make sure that tables of an output name no files: they hold what was read.
+def check_no_files(tables: Mapping[str, Any], source: str, prefix: str = "") -> None:
+    """Check that tables of an output name no files: they contain what was read.
 
     Raises
     ------
     ConfigError
-        If a key ``file`` stands in a table.
+        If a table has a key ``file``.
     """
     for key, value in tables.items():
-        where = f"{place}{key}"
+        where = f"{prefix}{key}"
         if isinstance(value, Mapping):
             check_no_files(value, source, f"{where}.")
         elif key == "file":
-            raise ConfigError([Problem(source, where, "is not read from an output", value)])
+            raise ConfigError([Problem(source, where, "an output must not name a file", value)])
 
 
-def _lay(base: Laid, over: Mapping[str, Any]) -> Laid:
-    """Lay tables over those of a base; a slider of another kind keeps the keys that it has too."""
+def _merge_over(base: Merged, over: Mapping[str, Any]) -> Merged:
+    """Merge tables into those of a base; a new kind of slider keeps the keys that it also has."""
     tables, dropped = base.tables, []
     slider, change = tables.get("slider"), over.get("slider")
     if isinstance(slider, Mapping) and isinstance(change, Mapping) and "kind" in change:
         kept = _of_kind(slider, change["kind"])
         dropped = [f"slider.{key}" for key in slider if key not in kept and key not in change]
         tables = {**tables, "slider": kept}
-    return Laid(_merge(tables, over), base.dropped + dropped)
+    return Merged(_merge(tables, over), base.dropped + dropped)
 
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
-    """Merge tables; of keys that exclude each other the later one stays, and None removes a key."""
+    """Merge tables; of keys that exclude each other the new one stays, and None removes a key."""
     merged = dict(base)
     exclusive = EXCLUSIVE.get(table, ())
     if any(over.get(key) is not None for key in exclusive):
@@ -193,7 +193,7 @@ def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") ->
 
 
 def _of_kind(slider: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
-    """Keys of a slider, without those that its own kind has and another one has not."""
+    """Keys of a slider, without those that another kind does not have."""
     old, new = (
         SLIDERS.get(name) if isinstance(name, str) else None
         for name in (slider.get("kind", DEFAULT), kind)
@@ -204,8 +204,8 @@ def _of_kind(slider: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
     return {key: value for key, value in slider.items() if key not in dropped}
 
 
-def override(base: Laid, changes: Iterable[Change]) -> Laid:
-    """Lay changes over tables.
+def override(base: Merged, changes: Iterable[Change]) -> Merged:
+    """Apply changes to tables.
 
     Parameters
     ----------
@@ -218,18 +218,18 @@ def override(base: Laid, changes: Iterable[Change]) -> Laid:
     Raises
     ------
     ConfigError
-        If a string is not of that form.
+        If a string does not have that form.
     """
     # All changes at once: keys set together with a new kind are not dropped.
     together: dict[str, Any] = {}
     for change in changes:
         tables_of_it = _parse_change(change) if isinstance(change, str) else _undotted(change)
         together = _together(together, tables_of_it)
-    return _lay(base, together)
+    return _merge_over(base, together)
 
 
 def _together(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
-    """Two changes as one; None, which removes a key, stays."""
+    """Combine two changes; None, which removes a key, is kept."""
     merged = _merge(first, second)
     for key, value in second.items():
         if value is None:

@@ -1,4 +1,4 @@
-"""What the dotted keys of a configuration take: quantities and their unit, or whole numbers, ..."""
+"""Dotted keys of a configuration: the kind of their values, and their units."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from mesoslip.configuration.units import cf_units
 
 @dataclass(frozen=True)
 class KeyKind:
-    """What a key takes.
+    """The kind of value of a key.
 
     Attributes
     ----------
     unit
         Unit of a quantity, such as "N/m", "1" for a plain number; None for whole numbers and names.
     example
-        What a good quantity looks like.
+        A right value of a quantity.
     is_whole
-        Whether it takes a whole number.
+        Whether it is a whole number.
     is_single
-        Whether it takes one value, not a list or a table.
+        Whether it is one value, not a list or a table.
     """
 
     unit: str | None
@@ -47,7 +47,7 @@ class KeyKind:
 
 @cache
 def key_kind(key: str) -> KeyKind | None:
-    """What a dotted key takes, such as "contacts.delay"; None if there is no such key."""
+    """The kind of value of a dotted key such as "contacts.delay"; None if there is no such key."""
     *outer, last = key.split(".")
     tables: list[type[Table]] = [Config]
     for name in outer:
@@ -83,14 +83,14 @@ def key_kind(key: str) -> KeyKind | None:
 
 
 def _parts(annotation: Any) -> Iterator[Any]:
-    """Everything that an annotation is made of."""
+    """All parts of an annotation."""
     yield annotation
     for part in get_args(annotation):
         yield from _parts(part)
 
 
 def nearest_keys(key: str) -> list[str]:
-    """Known keys that a wrong one may stand for."""
+    """Known keys that a wrong one may be meant to be."""
     known = list(dict.fromkeys(all_keys(Config)))
     name = key.rpartition(".")[2]
     elsewhere = [one for one in known if one.rpartition(".")[2] == name]

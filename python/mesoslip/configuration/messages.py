@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in the words of the format."""
+"""Errors of a configuration, as messages that name keys of the file."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from mesoslip.errors import Problem
 
 
 def problems(error: ValidationError, source: str, whole: type[Table]) -> list[Problem]:
-    """Everything that is wrong with a configuration.
+    """All errors of a configuration.
 
     Parameters
     ----------
     error
-        What the library found.
+        The errors that pydantic found.
     source
-        Where the configuration is from.
+        Name of the configuration.
     whole
-        The table of all tables.
+        The outermost table.
     """
     found = []
     for details in error.errors():
@@ -36,20 +36,20 @@ def problems(error: ValidationError, source: str, whole: type[Table]) -> list[Pr
 
 
 def _problem(details: ErrorDetails, source: str, whole: type[Table]) -> Problem:
-    place, slider = list(details["loc"]), ""
-    if place[:1] == ["slider"] and len(place) > 1 and place[1] in SLIDERS:
-        slider = str(place.pop(1))
+    path, slider = list(details["loc"]), ""
+    if path[:1] == ["slider"] and len(path) > 1 and path[1] in SLIDERS:
+        slider = str(path.pop(1))
     context = details.get("ctx", {})
     kind, value, message = details["type"], details["input"], details["msg"]
     if kind == "table":
-        return Problem(source, _dotted([*place, context["key"]]), context["message"])
+        return Problem(source, _dotted([*path, context["key"]]), context["message"])
     if kind == "missing":
-        return Problem(source, _dotted(place), "missing; it has no default")
+        return Problem(source, _dotted(path), "missing; it has no default")
     if kind == "extra_forbidden":
-        return Problem(source, _dotted(place), _about_unknown(place, slider, whole))
+        return Problem(source, _dotted(path), _unknown_key(path, slider, whole))
     if kind in {"union_tag_invalid", "literal_error"}:
         if kind == "union_tag_invalid":
-            place, value = [*place, "kind"], context["tag"]
+            path, value = [*path, "kind"], context["tag"]
             expected = context["expected_tags"]
         else:
             expected = context["expected"]
@@ -60,39 +60,39 @@ def _problem(details: ErrorDetails, source: str, whole: type[Table]) -> Problem:
         message = "must be a table"
     else:
         message = message.replace("Input should", "must").replace("a valid tuple", "a list")
-    return Problem(source, _dotted(place), message, value)
+    return Problem(source, _dotted(path), message, value)
 
 
-def _dotted(place: Iterable[Any]) -> str:
+def _dotted(path: Iterable[Any]) -> str:
     text = ""
-    for part in place:
+    for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}"
     return text.lstrip(".")
 
 
-def _about_unknown(place: list[Any], slider: str, whole: type[Table]) -> str:
-    """What to say of a key that its table does not have."""
-    table, name = _dotted(place[:-1]), str(place[-1])
+def _unknown_key(path: list[Any], slider: str, whole: type[Table]) -> str:
+    """The message about a key that its table does not have."""
+    table, name = _dotted(path[:-1]), str(path[-1])
     if (table, name) == ("", "base"):
-        return "names the file under another one, and cannot be laid over it"
+        return "names the file that a file is based on, and cannot be changed"
     if (table, name) == ("", "sweep"):
-        return "is of many runs; the command for it is mesoslip sweep"
+        return "describes many runs; the command for it is mesoslip sweep"
     kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
     if table == "slider" and kinds:
         named = " or ".join(f'"{kind}"' for kind in kinds)
         return f"is for slider.kind = {named} only"
-    keys = _table_at(place[:-1], slider, whole).model_fields.keys()
+    keys = _table_at(path[:-1], slider, whole).model_fields.keys()
     near = difflib.get_close_matches(name, [*keys, *([] if table else ["base"])], 1)
-    # A good name in the wrong table is nearer than a name that is alike.
+    # A right name in the wrong table is more likely than a similar name.
     elsewhere = sorted({key for key in all_keys(whole) if key.rpartition(".")[2] == name})
     meant = " or ".join(repr(key) for key in elsewhere or near)
     return f"unknown key; did you mean {meant}?" if meant else "unknown key"
 
 
-def _table_at(place: list[Any], slider: str, whole: type[Table]) -> type[Table]:
-    """The table at a place of the file."""
+def _table_at(path: list[Any], slider: str, whole: type[Table]) -> type[Table]:
+    """The table at a path of keys."""
     table = whole
-    for name in place:
+    for name in path:
         if isinstance(name, str):
             inner = tables_in(table.model_fields[name].annotation)
             table = SLIDERS[slider] if name == "slider" else next(inner)

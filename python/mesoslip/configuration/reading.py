@@ -1,4 +1,4 @@
-"""Text files that a user names."""
+"""Text files named by a user."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mesoslip.errors import FileError, shown
 
 PathLike: TypeAlias = str | os.PathLike[str]
 
-# Size of the longest file that is read [bytes]; a million stages take less.
+# Maximum size of a file [bytes]; a million stages take less.
 MAX_BYTES = 2**26
 
 
@@ -36,14 +36,14 @@ def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
     path
         The file.
     kind
-        What it should be, such as "a configuration file".
+        Its kind, such as "a configuration file".
     max_bytes
-        Size of the longest file that is read.
+        Maximum size of the file.
 
     Raises
     ------
     FileError
-        If it cannot be read, is no regular file, which may have no end, or is too long.
+        If it cannot be read, is not a regular file, or is too long.
     """
     try:
         state = path.stat()
@@ -53,8 +53,8 @@ def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
             raise FileError(f"{path}: is not a regular file")
         if state.st_size > max_bytes:
             raise FileError(
-                f"{path}: {state.st_size / 2**20:.0f} MiB are too much for {kind}, "
-                f"which may have {max_bytes / 2**20:.0f} MiB"
+                f"{path}: {state.st_size / 2**20:.0f} MiB is too large for {kind}; "
+                f"the maximum is {max_bytes / 2**20:.0f} MiB"
             )
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:

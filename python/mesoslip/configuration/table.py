@@ -1,4 +1,4 @@
-"""What every table of a configuration file is made of: quantities in SI units, and choices."""
+"""Parts of the tables of a configuration file: quantities in SI units, and choices."""
 
 from __future__ import annotations
 
@@ -21,18 +21,20 @@ from pydantic_core import PydanticCustomError, PydanticKnownError
 from mesoslip.configuration.units import to_si
 
 
-def _within(value: object, unit: str, example: str, least: float, most: float) -> float:
-    """A quantity in an SI unit that is 0 or of a size that means something."""
+def _within(value: object, unit: str, example: str, minimum: float, maximum: float) -> float:
+    """A quantity in an SI unit: 0, or of a size within bounds."""
     number = to_si(value, unit, example)
-    if number != 0 and not least <= abs(number) <= most:
+    if number != 0 and not minimum <= abs(number) <= maximum:
         in_unit = "" if unit == "1" else f" {unit}"
-        raise ValueError(f"must be between {least:g} and {most:g}{in_unit} in size")
+        raise ValueError(f"must be between {minimum:g} and {maximum:g}{in_unit} in size")
     return number
 
 
-def _quantity(unit: str, example: str, least: float, most: float) -> Any:
-    """A quantity whose size is bounded, so that nothing that follows from it overflows."""
-    return BeforeValidator(partial(_within, unit=unit, example=example, least=least, most=most))
+def _quantity(unit: str, example: str, minimum: float, maximum: float) -> Any:
+    """A quantity whose size is bounded, so that derived quantities do not overflow."""
+    return BeforeValidator(
+        partial(_within, unit=unit, example=example, minimum=minimum, maximum=maximum)
+    )
 
 
 def _whole(value: object) -> object:
@@ -45,13 +47,13 @@ def _whole(value: object) -> object:
 
 
 def _writable(text: str) -> str:
-    """A text that every file can hold; what the system takes from a command line may be none."""
+    """A text that can be written to any file; arguments of a command line may not be."""
     try:
         text.encode()
     except UnicodeEncodeError as error:
-        raise ValueError("is not a text in UTF-8") from error
+        raise ValueError("has characters that UTF-8 cannot encode") from error
     if "\0" in text:
-        raise ValueError("has a character that ends texts")
+        raise ValueError("has a null character")
     return text
 
 
@@ -67,7 +69,7 @@ ForceRate = Annotated[float, _quantity("N/s", "1 uN/s", 1e-24, 1e18)]
 # From an atom's nucleus to the Earth.
 Area = Annotated[float, _quantity("m^2", "1e-10 m^2", 1e-24, 1e15)]
 Length = Annotated[float, _quantity("m", "3.5 nm", 1e-18, 1e9)]
-# What is measured may come as near to zero as it likes.
+# Measured values may be arbitrarily near to zero.
 MeasuredTime = Annotated[float, _quantity("s", "0.5 ms", 0.0, 1e18)]
 MeasuredLength = Annotated[float, _quantity("m", "3.5 nm", 0.0, 1e9)]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3", 1e-12, 1e18)]
@@ -78,7 +80,7 @@ Whole = Annotated[StrictInt, BeforeValidator(_whole)]
 
 
 class Complaint(NamedTuple):
-    """What is wrong between the tables of a configuration: at which key, and its value."""
+    """An error between the tables of a configuration: its key, the message, and the value."""
 
     key: str
     message: str
@@ -89,14 +91,14 @@ Complaints = Iterator[Complaint]
 
 
 class Table(BaseModel):
-    """A table of the file: unknown keys are errors, and nothing changes after checking."""
+    """A table of the file: unknown keys are errors, and it is immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     @model_validator(mode="before")
     @classmethod
     def _without_none(cls, values: Any) -> Any:
-        """A known key that is None is as if it were not given."""
+        """Drop known keys whose value is None."""
         if not isinstance(values, Mapping):
             return values
         return {
@@ -106,7 +108,7 @@ class Table(BaseModel):
         }
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy; with other values, checked like those of any table."""
+        """A copy, with other values if given, which are checked."""
         if not update:
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in self.model_fields_set}
@@ -114,7 +116,7 @@ class Table(BaseModel):
 
 
 def problem(key: str, message: str) -> PydanticCustomError:
-    """What a table's own validator raises: what is wrong with one of its keys."""
+    """The error that a validator of a table raises about one of its keys."""
     return PydanticCustomError("table", "{message}", {"key": key, "message": message})
 
 

@@ -1,5 +1,6 @@
-"""The tables of a configuration file that are nobody's kind; those of sliders and of contacts have
-rooms of their own, and so has the drive. Adding a key is adding a field.
+"""The tables [run], [output] and [curve] of a configuration file. Adding a key is adding a field.
+
+Sliders, contacts and the drive have their tables in files of their own.
 """
 
 from __future__ import annotations
@@ -20,33 +21,33 @@ from mesoslip.configuration.table import (
 
 
 def _or_flag(value: object) -> object:
-    """A table, or true for one of defaults and false for none."""
+    """A table; true is one with its defaults, false is none."""
     if isinstance(value, bool):
         return {} if value else None
     return value
 
 
 class Steady(Table):
-    """When a state is steady: the mean of the spring force over some blocks, and that over as many
-    before, agree within their standard error, or within a part of the static force, and the latter
-    do not scatter twice as much. Each block is a way of the drive."""
+    """Criterion for a steady state. The mean spring force over the last blocks and over as many
+    blocks before must agree within their standard error, or within ``tolerance``, and the earlier
+    blocks must not scatter twice as much. Each block is a distance that the drive moves."""
 
     displacement: Annotated[Length, Field(gt=0)] | None = None
-    """Way of the drive of one block; by default that which loads spring and contacts to the static
-    force."""
+    """Distance that the drive moves in one block; by default the one that loads spring and contacts
+    to the static force."""
     blocks: Annotated[Whole, Field(ge=2, le=10_000)] = 10
-    """Blocks that are averaged, and as many before them."""
+    """Number of blocks in each of the two means."""
     tolerance: Annotated[Number, Field(ge=0, lt=1)] = 1e-4
-    """Difference of the means over the static force that passes for none."""
+    """Difference of the means, relative to the static force, that counts as none."""
 
 
 class Stop(Table):
-    """What ends a run before its time."""
+    """Conditions that end a run early."""
 
     slips: Annotated[Whole, Field(ge=1, lt=2**62)] | None = None
-    """Slips after which the run ends, as soon as the last of them is over."""
+    """Number of slips after which the run ends."""
     displacement: Length | None = None
-    """Displacement of the slider at which the run ends; negative on the way back."""
+    """Displacement of the slider at which the run ends; may be negative."""
     steady: Annotated[Steady | None, BeforeValidator(_or_flag)] = None
     """Whether the run ends in a steady state: true, or a table."""
 
@@ -58,62 +59,62 @@ class Stop(Table):
 
 
 class Run(Table):
-    """What is computed, for how long, and with which random numbers.
+    """The engine, the length of a run, and its random numbers.
 
-    A run is over after its duration, or as soon as it has had as many avalanches as are wanted, or
-    what its table stop says has come.
+    A run ends after its duration, after the given number of avalanches, or when a condition of
+    [run.stop] holds, whichever comes first.
     """
 
     engine: Literal["eq", "me"] = "eq"
-    """`eq` follows each contact, `me` infinitely many by the master equation."""
+    """`eq` simulates each of N contacts; `me` solves the master equation, the limit N → ∞."""
     duration: Annotated[Time, Field(gt=0)] | None = None
-    """How long the run is; needed if nothing else ends it."""
+    """Duration of the run; needed unless something else ends it."""
     drive_displacement: Annotated[Length, Field(gt=0)] | None = None
-    """Way of the drive after which the run ends, instead of a duration."""
+    """Distance that the drive moves until the run ends, instead of a duration."""
     avalanches: Annotated[Whole, Field(ge=1, lt=2**62)] | None = None
-    """Avalanches after which the run ends; for sliders without inertia, and lattices."""
+    """Number of avalanches after which the run ends; for lattices and sliders without inertia."""
     stop: Stop | None = None
-    """What ends the run before its duration."""
+    """Conditions that end the run early."""
     realizations: Annotated[Whole, Field(ge=1, lt=2**31)] = 1
-    """Number of runs that differ in their random numbers alone."""
+    """Number of runs that differ only in their random numbers."""
     seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 1
-    """Key of the random numbers."""
+    """Seed of the random numbers."""
     resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
-    """With engine `me`: width of a population of contacts over the spread of the breaking
-    stretches."""
+    """With engine `me`: width of a population of contacts, relative to the standard deviation of
+    the breaking stretches; smaller is more precise."""
 
     @property
     def stops(self) -> Stop:
-        """What ends it before its time, if anything does."""
+        """The conditions that end the run early; without any of them by default."""
         return self.stop or Stop()
 
 
 class Output(Table):
-    """What is recorded; sliders without inertia have no slips, whatever ``slip_interval``."""
+    """What is recorded. Sliders without inertia have no slips, whatever ``slip_interval`` is."""
 
     interval: Annotated[Time, Field(gt=0)] | None = None
-    """Interval of the trace; by default a ten-thousandth of the run."""
+    """Sampling interval of the trace; by default 1/10000 of the run."""
     slip_interval: Annotated[Time, Field(gt=0)] | None = None
-    """Interval of the finer traces during slips; none by default."""
+    """Sampling interval of the finer traces around slips; by default there are none."""
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
-    """Velocity above the drive's that makes a slip; by default 0.02 Ω_S F_s/K."""
+    """Velocity relative to the drive above which a slip is recorded; by default 0.02 Ω_S F_s/K."""
     layers: StrictBool = False
     """Whether the displacement of each layer is recorded."""
     avalanche_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
-    """Least size of an avalanche in the catalogue; by default all."""
+    """Minimum size of recorded avalanches; by default all are recorded."""
     snapshots: tuple[Annotated[Time, Field(ge=0)], ...] = ()
-    """Times at which the lattice is recorded."""
+    """Times at which a snapshot of the lattice is recorded."""
     snapshot_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
-    """Least size of an avalanche after which the lattice is recorded."""
+    """Minimum size of avalanches after which a snapshot of the lattice is recorded."""
 
 
 class Curve(Table):
     """The force curve of the master equation, for ``mesoslip curve``."""
 
     length: Annotated[Length, Field(gt=0)] | None = None
-    """Displacement up to which the curve is computed; by default twenty mean breaking stretches."""
+    """Displacement up to which the curve is computed; by default 20 mean breaking stretches."""
     tolerance: Annotated[Number, Field(ge=1e-14, lt=1)] = 1e-10
-    """Error of the curve over the static force."""
+    """Error of the force, relative to the static force."""
     newborn_width: Annotated[Length, Field(ge=0)] = 0.0
     """Standard deviation of the stretch at which contacts attach."""
     drive_displacement: Length | None = None

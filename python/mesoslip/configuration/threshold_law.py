@@ -1,4 +1,4 @@
-"""Laws of the relative breaking thresholds, as the kernels use them."""
+"""Laws of the relative breaking thresholds, evaluated by the kernels."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class ThresholdLaw:
     """A law of the relative threshold u = f_si/f_s: mean 1, standard deviation ``relative_width``.
 
     Draws at or below ``minimum``, the back force over the mean threshold, are rejected. Mean and
-    width are those before that. Source: model section 2; the gaussian law is Braun's.
+    width are those before rejection. Source: model section 2; the gaussian law is Braun's.
     """
 
     law: str
@@ -26,7 +26,9 @@ class ThresholdLaw:
 
     def __post_init__(self) -> None:
         if self.law not in LAWS:
-            raise MesoslipError(f"there is no law {self.law!r}, but there are {', '.join(LAWS)}")
+            raise MesoslipError(
+                f"there is no threshold law {self.law!r}; there are {', '.join(LAWS)}"
+            )
 
     @property
     def acceptance(self) -> float:
@@ -34,7 +36,7 @@ class ThresholdLaw:
         return self._kernel("survival", np.empty(0))[1]
 
     def quantile(self, probability: ArrayLike) -> NDArray[np.float64]:
-        """Threshold that is exceeded with a given probability.
+        """Threshold that is exceeded with a probability.
 
         Raises
         ------

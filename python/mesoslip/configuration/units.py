@@ -1,8 +1,7 @@
-"""Quantities with units; everything inside mesoslip is a plain number in SI.
+"""Quantities with units, converted to plain numbers in SI.
 
-A quantity is one number and one unit. Both are read here, by patterns that leave nothing to guess.
-SI units are converted here too, exactly; for the names of others there is pint, which takes a while
-to load.
+A quantity is one number and one unit, read by strict patterns. SI units are converted here,
+exactly; other units by pint, which takes a while to load.
 """
 
 from __future__ import annotations
@@ -33,21 +32,21 @@ SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 PREFIXES = {"": 0, "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3}
 PREFIXES |= {"c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
 
-# Characters of the longest quantity.
-LONGEST = 200
+# Maximum number of characters of a quantity.
+MAX_LENGTH = 200
 
 # More digits than any conversion needs, and exponents of any size, which become 0 or infinity.
 EXACT = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN, traps=[])
 
 
 class Unit(NamedTuple):
-    """A unit: how much it is in SI, and its powers of metre, kilogram, second, and of others."""
+    """A unit: its size in SI, and its powers of metre, kilogram, second, and others."""
 
     factor: Decimal
     dimension: tuple[float, ...]
 
 
-# Names with which all prefixes go: how much of metre, kilogram and second.
+# Units that take any prefix.
 SI = {
     "m": Unit(Decimal(1), (1, 0, 0)),
     "g": Unit(Decimal("1e-3"), (0, 1, 0)),
@@ -62,12 +61,12 @@ NONE = Unit(Decimal(1), (0, 0, 0))
 
 
 def number_of(text: str, decimal: str = ".") -> float:
-    """The number that a text is: of the digits 0 to 9, with a decimal point or the sign given.
+    """A text as a number: digits 0 to 9, with a decimal point or the given decimal sign.
 
     Raises
     ------
     ValueError
-        If it is not one, with what would be right.
+        If it is not a number; the message says what would be right.
     """
     plain = text.replace(",", ".") if decimal == "," and text.count(",") <= 1 else text
     # Python reads digits of all scripts, and underscores between them.
@@ -80,7 +79,7 @@ def number_of(text: str, decimal: str = ".") -> float:
 
 
 def _with_comma(text: str, decimal: str) -> str:
-    """What a number with a comma may mean."""
+    """A hint for a number with a comma."""
     if decimal == "," and "." in text:
         return ": other numbers here have a decimal comma"
     pointed, joined = text.replace(",", "."), text.replace(",", "")
@@ -103,7 +102,7 @@ def to_si(value: object, unit: str, example: str) -> float:
     unit
         The SI unit, such as "N/m".
     example
-        What a good value looks like, for the message.
+        A right value, for the message.
 
     Raises
     ------
@@ -133,7 +132,7 @@ def _parse(text: str, unit: str, wanted: str) -> float:
     is_reciprocal = RECIPROCAL.match(name) and after != name
     if (
         number is None
-        or len(text) > LONGEST
+        or len(text) > MAX_LENGTH
         or (name and not (is_reciprocal or FACTOR.match(name)))
     ):
         raise ValueError(f"is not one number and one unit{_comma_in(text)}; {wanted}")
@@ -146,7 +145,7 @@ def _parse(text: str, unit: str, wanted: str) -> float:
 
 
 def _comma_in(text: str) -> str:
-    """What a comma in the number of a quantity may mean."""
+    """A hint for a quantity with a comma in its number."""
     meaning = _with_comma(text.partition(" ")[0], ".")
     return f" ({meaning.removeprefix('; ')})" if meaning else ""
 
@@ -159,7 +158,7 @@ def _known(unit: str) -> Unit:
 
 @cache
 def _unit(text: str) -> Unit | None:
-    """The unit that a product of factors is, as in "1/s", "N/m", "kg m^-3"; None if it is none."""
+    """The unit of a product of factors, as in "1/s", "N/m", "kg m^-3"; None if it is not a unit."""
     unit = NONE
     if text == "":
         return unit
@@ -201,33 +200,33 @@ def _named(name: str) -> Unit | None:
 
 @cache
 def registry() -> UnitRegistry[float]:
-    """pint's units; made at first use, as that takes a while, and kept in no file."""
+    """pint's units; created at first use, as that takes a while, without a cache file."""
     import pint
 
     return pint.UnitRegistry(cache_folder=None)
 
 
 def _named_by_pint(name: str) -> Unit | None:
-    """The unit of a name that is not of the SI."""
+    """A unit that is not of the SI, by its name."""
     import pint
 
     try:
         none, one = (registry().Quantity(count, name).to_base_units() for count in (0.0, 1.0))
-    # A number, such as "nan", is a ValueError.
+    # A number, such as "nan", raises ValueError.
     except (pint.PintError, ValueError):
         return None
-    # Degrees and decibels do not multiply.
+    # Degrees Celsius and decibels have an offset or are logarithmic.
     if none.magnitude != 0:
         return None
     powers: dict[str, Any] = dict(one.dimensionality)
     known = tuple(float(powers.pop(f"[{what}]", 0)) for what in ("length", "mass", "time"))
-    # Whatever else a unit measures, no key of a configuration does.
+    # No key of a configuration has other dimensions.
     dimension = known + ((1.0,) if powers else ())
     return Unit(Decimal(one.magnitude), dimension)
 
 
 def cf_units(unit: str) -> str:
-    """A unit as files have it, by the conventions of CF: "N m-1" for "N/m"."""
+    """A unit as CF writes it in files: "N m-1" for "N/m"."""
     above, _, below = unit.replace("^", "").partition("/")
     parts = [part for part in (above,) if part != "1"]
     if below:
@@ -237,7 +236,7 @@ def cf_units(unit: str) -> str:
 
 
 def from_cf_units(units: str) -> str:
-    """A unit of a file as configurations have it: "N/m" for "N m-1"."""
+    """A unit of a file as configurations write it: "N/m" for "N m-1"."""
     above: list[str] = []
     below: list[str] = []
     for part in units.split():

@@ -31,20 +31,22 @@ def fit(
     Parameters
     ----------
     output
-        Output with the trace, measured (see `read_trace`) or simulated; its first realization.
+        Output with the trace, measured (see `read_trace`) or simulated; the first realization is
+        fitted.
     config
-        What is known, and in a table ``[fit.free]`` what is not: a TOML file, nested tables, or a
-        `mesoslip.inference.plan.Plan`.
+        The known parameters, and the free ones in a table ``[fit.free]``: a TOML file, nested
+        tables, or a `mesoslip.inference.plan.Plan`.
     store
-        Folder where each simulation is kept as soon as it is done, and read from when the fit is
-        called again; nowhere by default.
+        Folder in which each finished simulation is stored, and from which it is read when the fit
+        is called again; by default simulations are not stored.
     executor
-        Where simulations are computed: `Threads`, `Processes` or `Dask`, or a number of threads; by
-        default as many as there are processors. The result does not depend on it.
+        Where simulations are computed: `Threads`, `Processes` or `Dask`, or a number of threads, by
+        default the number of processors. The result does not depend on it.
     progress
-        Called now and then with the fraction of the simulations that is done.
+        Called repeatedly with the fraction of finished simulations, 0 to 1.
     stop
-        A request to stop, which raises `mesoslip.execution.stop.StoppedError`; Ctrl-C is one too.
+        A request to stop, after which `mesoslip.execution.stop.StoppedError` is raised; Ctrl-C is
+        one too.
 
     Returns
     -------
@@ -55,9 +57,9 @@ def fit(
     Raises
     ------
     FileError, ConfigError
-        If the trace cannot be fitted, or the configuration is wrong or contradicts it.
+        If the trace cannot be fitted, or the configuration is wrong or contradicts the trace.
     RunError
-        If no simulation is like the trace.
+        If no simulation resembles the trace.
     """
     fitted = fits.fit(
         as_run(output),

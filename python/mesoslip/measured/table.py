@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.configuration.columns import IGNORED, Quantity, cells_of, places_of, values_of
+from mesoslip.configuration.columns import IGNORED, Quantity, cells_of, find_columns, values_of
 from mesoslip.configuration.reading import text_of
 from mesoslip.errors import FileError, shown
 
@@ -54,7 +54,7 @@ def read_table(
     *,
     columns: str | None = None,
     rate: float | None = None,
-    largest_gap: float | None = None,
+    max_gap: float | None = None,
 ) -> Measurements:
     """Read a table of measurements, see `mesoslip.configuration.columns`.
 
@@ -68,7 +68,7 @@ def read_table(
         Headers, such as "time [s], force [uN], -", in the place of those of the file.
     rate
         Samples in a second [1/s], if the file has no times.
-    largest_gap
+    max_gap
         Longest time without values [s] that is filled by straight lines; none by default.
 
     Raises
@@ -88,7 +88,7 @@ def read_table(
             f"{path}: --columns names {len(headers)} columns, the file has {len(cells.first)}; "
             f"'{IGNORED}' stands for one that is not read"
         )
-    places = places_of(headers, COLUMNS, str(path))
+    places = find_columns(headers, COLUMNS, str(path))
     there = ", ".join(shown(header) for header in headers)
     if "force" not in places:
         raise FileError(
@@ -107,13 +107,13 @@ def read_table(
     values = {
         name: np.array(column)
         for name, column in values_of(
-            cells, headers, places, keep_missing=largest_gap is not None
+            cells, headers, places, keep_missing=max_gap is not None
         ).items()
     }
     numbers = np.array([number for number, _ in cells.lines])
     if rate is not None:
         values["time"] = np.arange(len(numbers)) / rate
-    return _checked(path, values, numbers, largest_gap)
+    return _checked(path, values, numbers, max_gap)
 
 
 def _text(path: Path) -> str:
@@ -127,7 +127,7 @@ def _text(path: Path) -> str:
 
 
 def _checked(
-    path: Path, values: dict[str, Array], numbers: NDArray[np.int_], largest_gap: float | None
+    path: Path, values: dict[str, Array], numbers: NDArray[np.int_], max_gap: float | None
 ) -> Measurements:
     """Measurements whose times increase without gaps."""
     whole = np.isfinite(list(values.values())).all(axis=0)
@@ -147,11 +147,11 @@ def _checked(
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * usual)
     for at in gaps:
-        if largest_gap is None or steps[at] > largest_gap:
+        if max_gap is None or steps[at] > max_gap:
             raise FileError(
                 f"{path}: line {numbers[at + 1]}: a gap of {steps[at]:g} s after {time[at]:g} s, "
                 f"where samples are {usual:g} s apart; cut the file there, or fill it with "
-                "--largest-gap"
+                "--max-gap"
             )
     if gaps.size:
         counts = [round(steps[at] / usual) for at in gaps]

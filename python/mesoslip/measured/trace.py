@@ -52,7 +52,7 @@ def read_trace(
     *,
     columns: str | None = None,
     rate: float | None = None,
-    largest_gap: float | None = None,
+    max_gap: float | None = None,
     drive_velocity: float | None = None,
     stiffness: float | None = None,
     config: ConfigLike | None = None,
@@ -74,7 +74,7 @@ def read_trace(
         Headers instead of those of the file, such as "time [s], force [uN], -".
     rate
         Sampling rate [1/s], if the table has no times.
-    largest_gap
+    max_gap
         Longest time without values [s] that is filled by straight lines; none by default.
     drive_velocity
         Velocity of the drive [m/s].
@@ -104,7 +104,7 @@ def read_trace(
     path = as_path(file)
     if config is not None:
         config = as_config(config)
-    measured = read_table(path, columns=columns, rate=rate, largest_gap=largest_gap)
+    measured = read_table(path, columns=columns, rate=rate, max_gap=max_gap)
     if config is not None and (drive_velocity is not None or stiffness is not None):
         name = "drive_velocity" if drive_velocity is not None else "stiffness"
         message = "the configuration tells drive and spring; change them there"

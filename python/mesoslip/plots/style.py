@@ -59,7 +59,7 @@ def caption(tree: xr.DataTree) -> str:
     base = tree.attrs.get("base_configuration")
     if base is None:
         return ""
-    changes = differences.told(
+    changes = differences.changes(
         Config.from_toml(tree.attrs["configuration"]), Config.from_toml(base)
     )
     if len(changes) > MAX_KEYS:

@@ -120,5 +120,5 @@ def _breaks(config: Config) -> float:
     contacts = config.contacts
     if not contacts.reattach or config.drive.force_rate is not None:
         return contacts.count
-    path_length = math.fsum(part.way for part in config.drive_parts)
+    path_length = math.fsum(part.path_length for part in config.drive_parts)
     return contacts.count * path_length / contacts.break_stretch

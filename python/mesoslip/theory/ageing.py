@@ -120,7 +120,7 @@ def _thresholds(config: Config) -> tuple[Array, Array]:
     """Weights and points of a quadrature over the configured thresholds, relative to the mean."""
     contacts = config.contacts
     law = ThresholdLaw(
-        contacts.threshold.law, contacts.threshold.relative_width, contacts.least_threshold
+        contacts.threshold.law, contacts.threshold.relative_width, contacts.min_threshold
     )
     # Panels that a normal law would have of one width: narrow where a law is steep.
     edges = law.quantile(special.ndtr(np.linspace(MAX_DEVIATE, -MAX_DEVIATE, PANELS + 1)))

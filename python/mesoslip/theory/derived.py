@@ -58,7 +58,7 @@ def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
         return
     yield "drive_stages", float(parts[-1].stage + 1), "1", "stages of the drive in the run"
     yield "drive_duration", config.duration, "s", "duration of the run"
-    length = math.fsum(part.way for part in parts)
+    length = math.fsum(part.path_length for part in parts)
     yield "drive_path_length", length, "m", "path length of the drive, there and back both counted"
     yield (
         "drive_speed",
@@ -128,7 +128,7 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         yield "contact_radius", math.sqrt(area / math.pi), "m", "radius of a contact"
     yield (
         "threshold_acceptance",
-        contacts.threshold.probability_above(contacts.least_threshold),
+        contacts.threshold.probability_above(contacts.min_threshold),
         "1",
         "probability that a threshold drawn is above the back force"
         + (", young and old" if contacts.ageing is not None else ""),

@@ -162,7 +162,7 @@ class SteadySliding:
         Legendre polynomials for density, stiffness, force at breaking and mass."""
         contacts = self.config.contacts
         back = contacts.back_force_ratio
-        law = ThresholdLaw(contacts.threshold.law, self.relative_width, contacts.least_threshold)
+        law = ThresholdLaw(contacts.threshold.law, self.relative_width, contacts.min_threshold)
         is_scaled = contacts.coupling == "scaled"
         weakest, strongest = law.quantile([1 - LEFT_OUT, LEFT_OUT])
 

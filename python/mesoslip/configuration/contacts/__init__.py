@@ -1,4 +1,4 @@
-"""Kinds of contacts, each in a room of its own and named here once.
+"""Kinds of contacts, each in a file of its own and listed here.
 
 Adding a kind is adding a file with a `ContactKind` and naming it in `KINDS`.
 """

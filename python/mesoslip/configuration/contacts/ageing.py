@@ -1,4 +1,4 @@
-"""Contacts whose thresholds change with their age, one by one and in populations."""
+"""Contacts whose thresholds change with age, in both engines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def ageing_of(config: Setting) -> Ageing:
 
 
 def ageing_problems(config: Setting) -> Complaints:
-    """What contacts that age refuse, in both engines."""
+    """Combinations that ageing contacts refuse, in both engines."""
     contacts, ageing = config.contacts, ageing_of(config)
     if contacts.coupling != "equal":
         yield Complaint(
@@ -30,24 +30,24 @@ def ageing_problems(config: Setting) -> Complaints:
     if config.interaction is not None:
         yield Complaint(
             "interaction",
-            "is not for contacts that age: a break changes the forces of neighbours at once, and "
-            "where those break next is foreseen for thresholds that stay",
+            "is not for ageing contacts: the engine predicts the next breaks of neighbours from "
+            "thresholds that do not change",
         )
     if ageing.initial_age is not None and contacts.initial != "relaxed":
         yield Complaint(
             "contacts.ageing.initial_age",
-            'needs contacts.initial = "relaxed": the other states are those of contacts with the '
-            "configured thresholds, more than young contacts may bear",
+            'needs contacts.initial = "relaxed": in other states contacts bear forces up to the '
+            "configured thresholds, which may exceed those of young contacts",
             ageing.initial_age,
         )
 
 
 class AgeingContacts(ContactKind):
-    """Contacts one by one that know nothing of each other."""
+    """Independent ageing contacts, simulated one by one."""
 
     kernel_kind: ClassVar[str] = "ageing"
     bytes_per_contact: ClassVar[int] = 190
-    # Where a contact breaks is foreseen; the kernel tells how late it came, should it be so.
+    # Breaks are predicted; the kernel reports the error of the force if one comes late.
     force_error_bound: ClassVar[float] = 1e-9
 
     @classmethod
@@ -66,7 +66,7 @@ class AgeingContacts(ContactKind):
 
 
 class AgeingPopulations(PopulationContacts):
-    """Infinitely many contacts that age."""
+    """Infinitely many ageing contacts."""
 
     kernel_kind: ClassVar[str] = "ageing populations"
 
@@ -79,5 +79,5 @@ class AgeingPopulations(PopulationContacts):
 
     def problems(self, config: Setting) -> Complaints:
         yield from super().problems(config)
-        # The master equation has no neighbours whether or not its contacts age.
+        # PopulationContacts refuses interaction already.
         yield from (one for one in ageing_problems(config) if one.key != "interaction")

@@ -1,4 +1,4 @@
-"""What every kind of contacts answers."""
+"""The interface of all kinds of contacts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mesoslip.configuration.tables import Run
 
 
 class Block(Protocol):
-    """What contacts know of the slider."""
+    """The properties of the slider that contacts use."""
 
     @property
     def ignores_delay(self) -> bool: ...
@@ -21,7 +21,7 @@ class Block(Protocol):
 
 
 class Setting(Protocol):
-    """What contacts know of the configuration that they are in."""
+    """The parts of the configuration that contacts use."""
 
     @property
     def run(self) -> Run: ...
@@ -35,31 +35,31 @@ class Setting(Protocol):
 
 @dataclass(frozen=True)
 class ContactKind(ABC):
-    """A kind of contacts: what the kernel is told of them, what they take, and what they refuse.
+    """A kind of contacts: its parameters in the kernel, its limits, the combinations it refuses.
 
     Attributes
     ----------
     kernel_kind
         The kernel's name of the kind.
     is_discrete
-        Whether numbers of contacts are whole.
+        Whether contacts are counted in whole numbers.
     on_lattice
-        Whether contacts have places.
+        Whether contacts have sites on a lattice.
     bytes_per_contact
-        Memory that a realization takes for each contact.
-    most_realizations
-        How many realizations differ from each other.
+        Memory of a realization per contact.
+    max_realizations
+        Maximum number of realizations that differ from each other.
     residual_bound
-        What the energy balance may lack, relative to the work of the drive.
+        Maximum residual of the energy balance, relative to the work of the drive.
     force_error_bound
-        What the contact force may be off by over the static force; 0 if it is exact.
+        Maximum error of the contact force, relative to the static force; 0 if it is exact.
     remedy
-        What makes a run keep these promises better.
+        Advice for a run that exceeds these bounds.
     """
 
     kernel_kind: ClassVar[str]
     is_discrete: ClassVar[bool] = True
-    most_realizations: ClassVar[int] = 2**31 - 1
+    max_realizations: ClassVar[int] = 2**31 - 1
     residual_bound: ClassVar[float] = 1e-9
     force_error_bound: ClassVar[float] = 0.0
     remedy: ClassVar[str] = ""
@@ -81,7 +81,7 @@ class ContactKind(ABC):
 
     @abstractmethod
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
-        """What the kernel is told of the contacts, in SI; forces and stiffness of one contact."""
+        """Parameters of the contacts in the kernel, in SI; forces and stiffness of one contact."""
 
     @abstractmethod
     def problems(self, config: Setting) -> Complaints:
@@ -89,7 +89,7 @@ class ContactKind(ABC):
 
 
 def common_parameters(config: Setting) -> dict[str, float | str]:
-    """What the kernel is told of contacts of every kind."""
+    """Parameters that contacts of all kinds have in the kernel."""
     contacts = config.contacts
     ignores_delay = config.slider.ignores_delay
     return {

@@ -1,4 +1,4 @@
-"""N contacts that know nothing of each other, the earthquake-like model."""
+"""N independent contacts: the earthquake-like model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mesoslip.configuration.tables import Run
 
 
 class EnsembleContacts(ContactKind):
-    """Contacts one by one; they have places if [interaction] says so, with a strength of 0."""
+    """Independent contacts; with [interaction] of strength 0 they have sites on a lattice."""
 
     kernel_kind: ClassVar[str] = "ensemble"
 

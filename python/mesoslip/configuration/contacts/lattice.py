@@ -1,4 +1,4 @@
-"""N contacts on a lattice, whose neighbours pull at each other."""
+"""N contacts on a lattice with forces between neighbours."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mesoslip.configuration.tables import Run
 
 
 class LatticeContacts(ContactKind):
-    """Contacts one by one, with bonds between neighbours (S25 to S27)."""
+    """Contacts with bonds between neighbours (S25 to S27)."""
 
     kernel_kind: ClassVar[str] = "lattice"
     bytes_per_contact: ClassVar[int] = 260

@@ -1,4 +1,4 @@
-"""Infinitely many contacts, the master equation."""
+"""Infinitely many contacts: the master equation."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
 
-# Step of the master equation over the mean breaking stretch that can be followed.
-FINEST = 2e-5
+# Minimum step of the master equation, relative to the mean breaking stretch.
+MIN_STEP = 2e-5
 
 
 class PopulationContacts(ContactKind):
-    """Populations of contacts that attached at the same place, for N to infinity."""
+    """Populations of contacts that attached at the same displacement, for N → ∞."""
 
     kernel_kind: ClassVar[str] = "populations"
     is_discrete: ClassVar[bool] = False
     on_lattice: ClassVar[bool] = False
     bytes_per_contact: ClassVar[int] = 0
-    most_realizations: ClassVar[int] = 1
+    max_realizations: ClassVar[int] = 1
     residual_bound: ClassVar[float] = 1e-3
     force_error_bound: ClassVar[float] = 0.02
     remedy: ClassVar[str] = "a smaller run.resolution helps: the error falls with its square"
@@ -37,20 +37,19 @@ class PopulationContacts(ContactKind):
         if self.interaction is not None:
             yield Complaint(
                 "interaction",
-                'needs engine "eq": the master equation has no neighbours; in the mean, '
-                "interaction acts like a narrower law of thresholds "
-                "(contacts.threshold.relative_width)",
+                'needs engine "eq": the master equation has no neighbours; on average, '
+                "interaction acts like a smaller contacts.threshold.relative_width",
             )
-        if run.realizations > self.most_realizations:
+        if run.realizations > self.max_realizations:
             yield Complaint(
                 "run.realizations",
-                'must be 1 with engine "me", which leaves nothing to chance',
+                'must be 1 with engine "me", which has no random numbers',
                 run.realizations,
             )
-        if run.resolution * config.contacts.threshold.relative_width < FINEST:
+        if run.resolution * config.contacts.threshold.relative_width < MIN_STEP:
             yield Complaint(
                 "run.resolution",
-                f"times the relative width of the thresholds must be at least {FINEST:g}, or there "
-                "are more populations than can be followed",
+                f"times contacts.threshold.relative_width must be at least {MIN_STEP:g}: with less "
+                "there are too many populations",
                 run.resolution,
             )

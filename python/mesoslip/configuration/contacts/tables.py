@@ -40,26 +40,26 @@ LATTICES = ("triangular", "square")
 # Neighbours of a contact on each lattice.
 NEIGHBOURS = {"triangular": 6, "square": 4}
 
-# Part of the thresholds that must be above the back force, or drawing them takes too long.
-LEAST_ACCEPTED = 0.5
+# Minimum fraction of thresholds above the back force; with less, drawing them takes too long.
+MIN_ACCEPTED = 0.5
 
 # Keys of [contacts.ageing] that belong to one law each.
 AGEING_KEYS = {"relax": ("young_force_ratio", "young_relative_width"), "log": ("growth",)}
-# Age of contacts that have always been there [s].
-ALWAYS = 1e300
+# Age of contacts that are fully aged [s].
+INFINITE_AGE = 1e300
 
-# Stiffness of all bonds of a contact over its own, beyond which the force that breaks it, the
-# difference of what it and what its neighbours pull, has fewer than ten digits.
-STRONGEST_BONDS = 1e6
+# Maximum stiffness of all bonds of a contact, relative to its own: beyond it the breaking force, a
+# difference of its own force and its neighbours', has fewer than ten digits.
+MAX_BOND_RATIO = 1e6
 
 
 class Threshold(Table):
-    """Law of the relative thresholds: mean 1, and a standard deviation."""
+    """Law of the relative thresholds, f_si/f_s: its mean is 1."""
 
     law: Annotated[str, choice(LAWS)] = "gaussian"
     """Law of the relative thresholds, whose mean is 1."""
     relative_width: Annotated[Number, Field(gt=0)]
-    """Their standard deviation, Δf_s/f_s."""
+    """Standard deviation of the relative thresholds, Δf_s/f_s."""
 
     @model_validator(mode="after")
     def _width_that_is_possible(self) -> Self:
@@ -70,17 +70,17 @@ class Threshold(Table):
 
     @property
     def kind(self) -> ThresholdLawKind:
-        """What there is to know of the law."""
+        """The limits of the law."""
         return LAWS[self.law]
 
     @property
     def kernel_parameters(self) -> dict[str, float | str]:
-        """What the kernel is told of the law."""
+        """Parameters of the law in the kernel."""
         return {"threshold_law": self.law, **self.kind.kernel_parameters(self)}
 
     def probability_above(self, threshold: float) -> float:
-        """Probability that a draw of the law is above a relative threshold."""
-        # A law cut off there would not exist if there were none.
+        """Probability that a draw is above a relative threshold."""
+        # Not a law cut off there, which does not exist if the probability is 0.
         law = ThresholdLaw(self.law, self.relative_width)
         return law.acceptance * float(law.survival(threshold))
 
@@ -88,23 +88,23 @@ class Threshold(Table):
 class Ageing(Table):
     """How the threshold of a contact changes with its age (model section 9).
 
-    With the law `relax` the static force and the relative width of [contacts] are those of the old,
-    with `log` they are those at birth. Contacts of the start of a run have just these thresholds,
-    unless ``initial_age`` says how old they are.
+    The static force and the relative width of [contacts] are those of old contacts with the law
+    `relax`, and of new contacts with the law `log`. Contacts start a run with these thresholds,
+    unless ``initial_age`` gives another age.
     """
 
     law: Annotated[str, choice(AGEING_LAWS)] = "relax"
-    """`relax`: from young to old exponentially; `log`: growth with the logarithm of the age."""
+    """`relax`: exponential approach to the old thresholds; `log`: logarithmic growth with age."""
     time: Annotated[Time, Field(gt=0)]
     """Time scale of ageing, τ_a."""
     young_force_ratio: Annotated[Number, Field(gt=0)] | None = None
-    """With `relax`: mean threshold of the young over that of the old."""
+    """With `relax`: mean threshold of young contacts, relative to that of old ones."""
     young_relative_width: Annotated[Number, Field(gt=0)] | None = None
-    """With `relax`: standard deviation of the thresholds of the young over their mean."""
+    """With `relax`: relative standard deviation of the thresholds of young contacts."""
     growth: Annotated[Number, Field(ge=0)] | None = None
-    """With `log`: β of the mean threshold f_s [1 + β ln(1 + age/time)]."""
+    """With `log`: growth β per e-fold of age, in f_s [1 + β ln(1 + age/time)]."""
     initial_age: Annotated[Time, Field(ge=0)] | None = None
-    """Age of the contacts at the start; by default old with `relax`, just born with `log`."""
+    """Age of the contacts at the start; by default fully aged with `relax`, 0 with `log`."""
 
     @model_validator(mode="after")
     def _keys_of_the_law(self) -> Self:
@@ -122,10 +122,10 @@ class Ageing(Table):
         """Age of the contacts at the start of a run [s]."""
         if self.initial_age is not None:
             return self.initial_age
-        return ALWAYS if self.law == "relax" else 0.0
+        return INFINITE_AGE if self.law == "relax" else 0.0
 
     def kernel_parameters(self) -> dict[str, float | str]:
-        """What the kernel is told of the law."""
+        """Parameters of the law in the kernel."""
         return {
             "ageing": self.law,
             "ageing_time": self.time,
@@ -134,8 +134,10 @@ class Ageing(Table):
         }
 
     def threshold(self, configured: ArrayLike, width: float, age: ArrayLike) -> Array:
-        """Thresholds at an age [s] of contacts with configured ones, both over the static force;
-        ``width`` is the relative width of the configured ones."""
+        """Thresholds at an age [s], from the configured ones; both relative to the static force.
+
+        ``width`` is the relative width of the configured thresholds.
+        """
         old, relative_age = np.asarray(configured), np.asarray(age) / self.time
         if self.law == "log":
             return np.asarray(old * (1 + (self.growth or 0.0) * np.log1p(relative_age)))
@@ -144,48 +146,48 @@ class Ageing(Table):
         return np.asarray(old + (young - old) * np.exp(-relative_age))
 
     def configured(self, threshold: float, width: float, age: float) -> float:
-        """Configured threshold of the contact that has a threshold at an age."""
+        """Configured threshold of a contact, from its threshold at an age."""
         at_zero, at_one = self.threshold([0.0, 1.0], width, age)
         return float((threshold - at_zero) / (at_one - at_zero))
 
 
 class Contacts(Table):
-    """The contacts of the interface; forces, stiffness and area are those of all together."""
+    """The contacts of the interface; forces, stiffness and area are totals of all contacts."""
 
     count: Annotated[Whole, Field(ge=1, lt=2**31)]
     """Number of contacts, N."""
     static_force: Annotated[Force, Field(gt=0)]
-    """Mean static threshold of all contacts together, F_s = N f_s. They do not break at once, so
-    that a run comes to less: `F_peak` of `mesoslip curve`."""
+    """Sum of the mean static thresholds, F_s = N f_s. Contacts do not all break at once, so the
+    maximum force of a run is less: `F_peak` of `mesoslip curve`."""
     stiffness: Annotated[Stiffness, Field(gt=0)]
-    """Stiffness of all contacts together, Nk."""
+    """Total stiffness of the contacts, N k."""
     area: Annotated[Area, Field(gt=0)] | None = None
     """Real area of contact, A, which the contacts fill: each has A/N. It enters the mass of a
     contact, ρ (A/N) h, with that its drag, and the distance between neighbours, (A/N)^(1/2)."""
     film_thickness: Annotated[Length, Field(gt=0)] | None = None
-    """Thickness of the film between the surfaces, h; with area and density the mass of the
-    contacts."""
+    """Thickness of the film between the surfaces, h; with area and density it gives the mass of
+    the contacts."""
     film_density: Annotated[Density, Field(gt=0)] | None = None
     """Density of the film, ρ."""
     drag_rate: Annotated[Rate, Field(ge=0)] = 0.0
-    """Rate η of the drag m η V of a detached contact; needs area, thickness and density of the
-    film."""
+    """Rate η of the drag m η V of a detached contact; needs area, film_thickness and
+    film_density."""
     delay: Annotated[Time, Field(ge=0)] = 0.0
-    """Time between letting go and attaching again, τ_d."""
+    """Time between detaching and attaching again, τ_d."""
     back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
-    """Force at which a contact attaches over the mean threshold, f_b/f_s."""
+    """Force at which a contact attaches, relative to the mean threshold, f_b/f_s."""
     coupling: Annotated[str, choice(COUPLINGS)] = "scaled"
-    """`scaled`: stiffness goes with the root of the threshold, mass with the threshold; `equal`:
-    all contacts have the same."""
+    """`scaled`: stiffness is proportional to the square root of the threshold, mass to the
+    threshold; `equal`: all contacts have the same stiffness and mass."""
     initial: Annotated[str, choice(INITIAL_STATES)] = "relaxed"
-    """`relaxed`: no contact bears force; `steady`: as in slow sliding; `uniform`: stretches uniform
-    up to breaking."""
+    """State at the start. `relaxed`: no contact bears force; `steady`: as in slow sliding;
+    `uniform`: stretches uniformly distributed up to breaking."""
     reattach: StrictBool = True
-    """Whether a broken contact attaches again; false makes a bundle of fibres."""
+    """Whether broken contacts attach again; false gives a fibre bundle."""
     threshold: Threshold
     """Law of the thresholds."""
     ageing: Ageing | None = None
-    """How thresholds change with age; by default they do not."""
+    """Change of the thresholds with age; none by default."""
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:
@@ -197,25 +199,25 @@ class Contacts(Table):
 
     @model_validator(mode="after")
     def _contacts_attach(self) -> Self:
-        above = self.threshold.probability_above(self.least_threshold)
-        if above < LEAST_ACCEPTED:
+        above = self.threshold.probability_above(self.min_threshold)
+        if above < MIN_ACCEPTED:
             raise problem(
                 "back_force_ratio",
                 f"only {above:.3g} of the thresholds{self._of_the_young} are above the back force, "
-                f"at least {LEAST_ACCEPTED} must be: choose a lower back_force_ratio or a narrower "
+                f"at least {MIN_ACCEPTED} must be: choose a lower back_force_ratio or a narrower "
                 f"threshold law{', or stronger young contacts' if self._of_the_young else ''}",
             )
         return self
 
     @property
     def _of_the_young(self) -> str:
-        """Whose thresholds those are that contacts attach with, if they are not all the same."""
-        return " of young contacts" if self.least_threshold > self.back_force_ratio else ""
+        """Part of a message: thresholds of young contacts, if those are what is too low."""
+        return " of young contacts" if self.min_threshold > self.back_force_ratio else ""
 
     @property
-    def least_threshold(self) -> float:
-        """Configured threshold over the mean at or below which a contact cannot attach, or would
-        let go of itself."""
+    def min_threshold(self) -> float:
+        """Configured relative threshold at or below which a contact cannot attach, or would detach
+        by itself."""
         if self.ageing is None:
             return self.back_force_ratio
         young = self.ageing.configured(self.back_force_ratio, self.threshold.relative_width, 0.0)
@@ -233,7 +235,7 @@ class Contacts(Table):
 
     @property
     def contact_mass(self) -> float:
-        """m = ρ (A/N) h [kg]; 0 where the film is not described."""
+        """m = ρ (A/N) h [kg]; 0 without a described film."""
         if self.area is None or self.film_thickness is None or self.film_density is None:
             return 0.0
         return self.film_density * self.area / self.count * self.film_thickness
@@ -250,26 +252,25 @@ class Contacts(Table):
 
 
 class Interaction(Table):
-    """Forces between contacts that are neighbours on a lattice without edges (S25 to S27)."""
+    """Forces between neighbouring contacts on a lattice with periodic boundaries (S25 to S27)."""
 
     strength: Number
-    """Dimensionless strength ξ = g/(f_s a⁴) of the repulsion g/r³ between neighbours at the
-    distance a."""
+    """Dimensionless strength ξ = g/(f_s a⁴) of the repulsion g/r³ between neighbours at distance
+    a."""
     lattice: Annotated[str, choice(LATTICES)] = "triangular"
-    """Lattice of the contacts, without edges."""
+    """Lattice of the contacts, with periodic boundaries."""
     columns: Annotated[Whole, Field(ge=2)]
-    """Contacts in a row."""
+    """Number of contacts in a row."""
     rows: Annotated[Whole, Field(ge=2)]
-    """Rows; columns times rows is the number of contacts. Even on a triangular lattice."""
+    """Number of rows, even on a triangular lattice; columns × rows = contacts.count."""
 
     @model_validator(mode="after")
     def _contacts_attach(self) -> Self:
         if self.strength < 0:
             raise problem(
                 "strength",
-                "must not be negative, as neighbours repel each other: where they attract, "
-                "k + G z may be negative, and no stretch has the force at which a contact attaches "
-                f"(is {self.strength:g})",
+                "must not be negative: with attracting neighbours k + G z may be negative, and no "
+                f"stretch has the force at which a contact attaches (is {self.strength:g})",
             )
         return self
 
@@ -278,8 +279,8 @@ class Interaction(Table):
         if self.lattice == "triangular" and self.rows % 2:
             raise problem(
                 "rows",
-                "must be even on a triangular lattice without edges, whose odd rows are half a "
-                f"place aside (is {self.rows})",
+                "must be even on a periodic triangular lattice, whose odd rows are shifted by half "
+                f"a site (is {self.rows})",
             )
         return self
 
@@ -296,13 +297,13 @@ class Interaction(Table):
         return 3 * self.strength * contacts.contact_static_force / spacing
 
     def problems(self, contacts: Contacts) -> Complaints:
-        """What is wrong between the lattice and the contacts that it is to hold."""
-        places = self.columns * self.rows
-        if places != contacts.count:
+        """What is wrong between the lattice and its contacts."""
+        sites = self.columns * self.rows
+        if sites != contacts.count:
             yield Complaint(
                 "interaction.columns",
                 f"times rows must be contacts.count: {self.columns} x {self.rows} = "
-                f"{places}, not {contacts.count}",
+                f"{sites}, not {contacts.count}",
                 self.columns,
             )
         if contacts.area is None:
@@ -310,12 +311,12 @@ class Interaction(Table):
                 "contacts.area", "needed for the distance between neighbours, a = (A/N)^(1/2)"
             )
         relative = self.neighbours * self.bond_stiffness(contacts) / contacts.contact_stiffness
-        if relative > STRONGEST_BONDS:
-            strongest = self.strength * (STRONGEST_BONDS / relative)
+        if relative > MAX_BOND_RATIO:
+            max_strength = self.strength * (MAX_BOND_RATIO / relative)
             yield Complaint(
                 "interaction.strength",
-                "so strong that a contact cannot attach: the force at which it does, (k + G z) x "
-                "less the pull of its neighbours, is a difference of terms "
-                f"{relative:.1g} times as large, without digits enough; at most {strongest:.3g}",
+                f"must be at most {max_strength:.3g}: the force at which a contact attaches is a "
+                f"difference of forces {relative:.1g} times as large, which double precision does "
+                "not resolve",
                 self.strength,
             )

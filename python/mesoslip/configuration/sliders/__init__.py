@@ -1,4 +1,4 @@
-"""Kinds of sliders, each in a room of its own and named here once.
+"""Kinds of sliders, each in a file of its own and listed here.
 
 Adding a kind is adding a file with a `SliderTable` and naming it in `KINDS`.
 """
@@ -25,19 +25,19 @@ KINDS: tuple[type[SliderTable], ...] = (
     QuasistaticSlider,
 )
 
-# The first one is meant where the file does not say.
+# The first one is the default.
 SLIDERS: dict[str, type[SliderTable]] = {kind.model_fields["kind"].default: kind for kind in KINDS}
 DEFAULT = next(iter(SLIDERS))
 
 
 def _kind_of(table: Any) -> Any:
-    """Name of the kind that a table of a file, or a slider, is of."""
+    """Name of the kind of a table of a file, or of a slider."""
     if isinstance(table, Mapping):
         return table.get("kind", DEFAULT)
     return getattr(table, "kind", DEFAULT)
 
 
-# For the type checker a slider is what all kinds have in common, which is what others may ask.
+# For the type checker a slider is what all kinds have in common.
 if TYPE_CHECKING:
     Slider: TypeAlias = SliderTable
 else:

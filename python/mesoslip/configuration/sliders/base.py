@@ -1,4 +1,4 @@
-"""What every kind of slider answers."""
+"""The interface of all kinds of sliders."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Oscillator(NamedTuple):
 
 
 class Setting(Protocol):
-    """What a slider knows of the configuration that it is in."""
+    """The parts of the configuration that a slider uses."""
 
     @property
     def drive(self) -> Drive: ...
@@ -44,14 +44,14 @@ class Setting(Protocol):
 
 
 class SliderTable(Table):
-    """A kind of slider: its keys in the file, what the kernel is told, what it takes and refuses.
+    """A kind of slider: its keys, its parameters in the kernel, and the combinations it refuses.
 
-    What is defined here holds of a slider without inertia, slips, or layers.
+    The defaults are those of a slider without inertia, slips or layers.
 
     Attributes
     ----------
     jumps
-        Whether the slider has no inertia: contacts break in avalanches while the drive stands.
+        Whether it has no inertia: contacts break in avalanches while the drive stands still.
     ignores_delay
         Whether contacts attach at once and bear no drag, whatever their delay and film.
     driven_by_force
@@ -72,12 +72,12 @@ class SliderTable(Table):
 
     @abstractmethod
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
-        """What the kernel is told of the slider, in SI."""
+        """Parameters of the slider in the kernel, in SI."""
 
     @property
     @abstractmethod
     def spring_stiffness(self) -> float:
-        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
+        """K [N/m]; infinite for a prescribed slider, 0 for one driven by a force."""
 
     @property
     def quiet_time(self) -> float:
@@ -85,7 +85,7 @@ class SliderTable(Table):
         return 1.0
 
     def slip_velocity(self, config: Setting) -> float:  # noqa: ARG002
-        """Velocity above the drive's that makes a slip [m/s]; 0 where there are no slips."""
+        """Velocity relative to the drive above which it slips [m/s]; 0 if there are no slips."""
         return 0.0
 
     @property
@@ -95,12 +95,12 @@ class SliderTable(Table):
 
     @property
     def layer_count(self) -> int:
-        """Number of layers that the slider is made of."""
+        """Number of layers of the slider."""
         return 1
 
     @property
     def extra_traces(self) -> tuple[str, ...]:
-        """Names of what is traced besides what all sliders have."""
+        """Names of traces that only this kind has."""
         return ()
 
     def layers_recorded(self, config: Setting) -> int:  # noqa: ARG002
@@ -108,16 +108,16 @@ class SliderTable(Table):
         return 0
 
     def solver_name(self, config: Setting) -> str | None:  # noqa: ARG002
-        """How the motion is integrated, where there is a choice."""
+        """Method of integration, if there is a choice."""
         return None
 
     def residual_bound(self, config: Setting) -> float:  # noqa: ARG002
-        """What the energy balance may lack, relative to the work of the drive."""
+        """Maximum residual of the energy balance, relative to the work of the drive."""
         return 0.0
 
     @property
     def remedy(self) -> str:
-        """What makes a run keep that promise better."""
+        """Advice for a run that exceeds that bound."""
         return ""
 
     def problems(self, config: Setting) -> Complaints:  # noqa: ARG002

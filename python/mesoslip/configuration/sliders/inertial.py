@@ -10,12 +10,12 @@ from pydantic import Field
 from mesoslip.configuration.sliders.base import Setting, SliderTable
 from mesoslip.configuration.table import Mass, Stiffness
 
-# In a slip the slider exceeds the drive's velocity by this part of the scale Omega_S F_s/K.
+# Velocity relative to the drive above which the slider slips, in units of Omega_S F_s/K.
 SLIP_VELOCITY_RATIO = 0.02
 
 
 class InertialSlider(SliderTable):
-    """A slider with a mass on a spring: it has slips, and a frequency of its own."""
+    """A slider with a mass on a spring: it slips, and has a natural frequency."""
 
     mass: Annotated[Mass, Field(gt=0)]
     """Mass of the slider, M."""

@@ -31,40 +31,40 @@ from mesoslip.configuration.table import (
     choice,
 )
 
-# Methods of integration, and their codes in the kernel.
+# Methods of integration.
 SOLVERS = ("series", "adams", "bdf")
 AUTOMATIC = "auto"
 
-# Work of a run by series, steps times layers, beyond which stiff formulas take over.
-MOST_SERIES_WORK = 1e11
+# Work of a run by series, steps times layers, above which BDF is chosen.
+MAX_SERIES_WORK = 1e11
 
-# Displacements below this part of the spring's extension under F_s do not matter to CVODE.
+# Absolute tolerance of CVODE, relative to the extension of the spring under F_s.
 TINY_STRETCH = 1e-6
 
 
 class Base(Table):
-    """The lower body: a mass on a spring to the ground, which damping holds back."""
+    """The lower body: a damped mass on a spring to the ground."""
 
     mass: Annotated[Mass, Field(gt=0)]
     """Mass of the lower body, M_B."""
     stiffness: Annotated[Stiffness, Field(gt=0)]
     """Stiffness of its spring to the ground, K_B."""
     damping: Annotated[Rate, Field(ge=0)] = 0.0
-    """Damping of its motion."""
+    """Damping rate of its motion."""
 
 
 class Solver(Table):
-    """How layers are integrated: by series, exact to rounding, or by CVODE's formulas."""
+    """Method of integration of the layers: series, exact to rounding, or CVODE."""
 
     method: Annotated[str, choice((AUTOMATIC, *SOLVERS))] = AUTOMATIC
-    """`series` is exact to rounding; `adams` and `bdf` are formulas of CVODE; `auto` takes the
-    series unless that would take hours."""
+    """`series` is exact to rounding; `adams` and `bdf` are methods of CVODE; `auto` chooses
+    `series` unless it would take hours."""
     relative_tolerance: Annotated[Number, Field(ge=1e-13, le=1e-2)] = 1e-8
-    """Tolerance of CVODE's formulas."""
+    """Relative tolerance of CVODE."""
 
 
 class Cantilever(Table):
-    """A round rod that is held at one end, pulled at the other."""
+    """A round rod, clamped at one end and pulled at the other."""
 
     length: Annotated[Length, Field(gt=0)]
     """Length, L."""
@@ -93,16 +93,16 @@ class Cantilever(Table):
         return (lowest / self.length) ** 2 * math.sqrt(stiffness_over_mass)
 
 
-# Energy that CVODE may lose in a run over the work of the drive, in units of its tolerance: its
-# errors add up over very many steps.
+# Maximum residual of the energy balance with CVODE, in units of its tolerance: errors add up over
+# very many steps.
 RESIDUAL_OVER_TOLERANCE = 1e4
 
 
 class LayeredSlider(InertialSlider):
-    """An elastic block: layers joined by springs, of which the first bears the contacts.
+    """An elastic block of layers joined by springs; the first layer carries the contacts.
 
-    ``layer_damping`` γ [1/s] acts between neighbours, γ M/N_l times their relative velocity, and
-    not on the spring to the drive, which joins no two layers: one layer is the rigid slider
+    ``layer_damping`` γ [1/s] gives the force γ M/N_l times the relative velocity of neighbouring
+    layers. It does not act on the spring to the drive: with one layer the block is a rigid slider
     without damping (model section 8).
     """
 
@@ -117,7 +117,7 @@ class LayeredSlider(InertialSlider):
     solver: Solver = Solver()
     """How the layers are integrated."""
     cantilever: Cantilever | None = None
-    """A rod whose mass and stiffness are those of the slider."""
+    """A rod that gives mass and stiffness of the slider."""
 
     @model_validator(mode="before")
     @classmethod
@@ -134,7 +134,7 @@ class LayeredSlider(InertialSlider):
 
     @model_serializer(mode="wrap")
     def _without_what_follows(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out mass and stiffness of the cantilever, which follow it if it is changed."""
+        """Leave out mass and stiffness that follow from the cantilever."""
         table: dict[str, Any] = handler(self)
         for name in ("mass", "stiffness"):
             if self.cantilever is not None and getattr(self.cantilever, name) == table.get(name):
@@ -191,8 +191,8 @@ class LayeredSlider(InertialSlider):
     def solver_name(self, config: Setting) -> str:
         """The method, chosen for a run if it is "auto".
 
-        Series need a few steps for each period of the fastest rate, however little it matters to
-        the motion: where that would take too long, BDF steps over it.
+        Series need a few steps per period of the fastest rate, even if it does not affect the
+        motion. BDF does not, and is chosen where series would take too long.
         """
         if self.solver.method != AUTOMATIC:
             return self.solver.method
@@ -207,7 +207,7 @@ class LayeredSlider(InertialSlider):
             rate += math.sqrt(stiffness / self.base.mass) + drag / self.base.mass
             rate += self.base.damping
         work = config.expected_duration * rate * (self.layers + 10)
-        return "series" if work < MOST_SERIES_WORK else "bdf"
+        return "series" if work < MAX_SERIES_WORK else "bdf"
 
     def residual_bound(self, config: Setting) -> float:
         if self.solver_name(config) == "series":
@@ -225,6 +225,6 @@ class LayeredSlider(InertialSlider):
         if not config.contact_kind.is_discrete and self.solver.method not in {AUTOMATIC, "series"}:
             yield Complaint(
                 "slider.solver.method",
-                'must be "series" with engine "me", whose contacts change their law at every step',
+                'must be "series" with engine "me", where the force law changes at every step',
                 self.solver.method,
             )

@@ -1,4 +1,4 @@
-"""A block that goes where the drive goes."""
+"""A block that moves with the drive."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from mesoslip.configuration.sliders.base import Setting, SliderTable
 
 
 class PrescribedSlider(SliderTable):
-    """A block that goes where the drive goes, K = ∞."""
+    """A block that moves with the drive, K = ∞."""
 
     kind: Literal["prescribed"] = "prescribed"
-    """A block that goes where the drive goes."""
+    """A block that moves with the drive."""
 
     @property
     def spring_stiffness(self) -> float:

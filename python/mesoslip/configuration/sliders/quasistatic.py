@@ -13,8 +13,8 @@ from mesoslip.configuration.table import Complaint, Complaints, Stiffness
 class QuasistaticSlider(SliderTable):
     """A block without inertia that follows the stable equilibrium of spring and contacts.
 
-    Its contacts attach at once and bear no drag, whatever their delay and film. A drive by force
-    needs no spring.
+    Its contacts attach at once and have no drag, whatever their delay and film. A force may drive
+    it without a spring.
     """
 
     jumps: ClassVar[bool] = True
@@ -24,7 +24,7 @@ class QuasistaticSlider(SliderTable):
     kind: Literal["quasistatic"] = "quasistatic"
     """A block without inertia."""
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
-    """Stiffness of the drive's spring, K; none if a force drives."""
+    """Stiffness of the drive's spring, K; none with drive.force_rate."""
 
     @property
     def spring_stiffness(self) -> float:
@@ -40,17 +40,19 @@ class QuasistaticSlider(SliderTable):
     def problems(self, config: Setting) -> Complaints:
         by_force = config.drive.force_rate is not None
         if not by_force and self.stiffness is None:
-            yield Complaint("slider.stiffness", "missing; only a drive by force needs no spring")
+            yield Complaint(
+                "slider.stiffness", "missing; only with drive.force_rate there is no spring"
+            )
         elif by_force and self.stiffness is not None:
             yield Complaint(
                 "slider.stiffness",
-                "has no meaning with drive.force_rate, which acts on the slider without a spring",
+                "is not for drive.force_rate, which acts on the slider without a spring",
                 self.stiffness,
             )
         if not config.contact_kind.is_discrete:
             yield Complaint(
                 "slider.kind",
-                'needs engine "eq"; the force of infinitely many contacts over the displacement '
-                "of a slider without inertia is that of mesoslip curve",
+                'needs engine "eq"; mesoslip curve computes the force of infinitely many contacts '
+                "over the displacement of a slider without inertia",
                 self.kind,
             )

@@ -17,9 +17,9 @@ class RigidSlider(InertialSlider):
     kind: Literal["rigid"] = "rigid"
     """A rigid block on a spring."""
     damping_ratio: Annotated[Number, Field(ge=0)] | None = None
-    """Damping of the setup over its frequency, η_S/Ω_S."""
+    """Damping rate of the setup, relative to its frequency, η_S/Ω_S."""
     damping: Annotated[Rate, Field(ge=0)] | None = None
-    """Damping of the setup, η_S, instead of its ratio."""
+    """Damping rate of the setup, η_S, instead of damping_ratio."""
 
     @model_validator(mode="after")
     def _one_damping(self) -> Self:

@@ -1,4 +1,4 @@
-"""Threshold laws, each in a file of its own and named here once.
+"""Threshold laws, each in a file of its own and listed here.
 
 Adding a law is adding a file with a `ThresholdLawKind` and naming it in `LAWS`, and the same in the
 kernels (`fortran/contacts/threshold_laws`).

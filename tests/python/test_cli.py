@@ -253,7 +253,7 @@ def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
     output = tmp_path / "me.nc"
     status, _, told = command("run", short, "-o", output, "--set", "run.engine=me")
     assert status == 0
-    assert "1 slip, " in told
+    assert "1 slip; " in told
     assert command("slips", output)[0] == 0
     assert command("plot", output)[0] == 0
     detached = mesoslip.open_output(output)["detached_contacts"].values
@@ -285,7 +285,7 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     assert "is an output already" in command("trace", output, "-o", tmp_path / "other.nc")[2]
     # Whose result is lost is told.
     told = command("run", short, "-o", output, "--set", "run.seed=7")[2]
-    assert "replaces the output of another configuration" in told
+    assert "the output of another configuration will be replaced" in told
     assert "replaces" not in command("run", short, "-o", output, "--set", "run.seed=7")[2]
     for name in ("out.csv", "out.png"):
         status, _, told = command("run", short, "-o", tmp_path / name)

@@ -1002,7 +1002,7 @@ def test_a_new_kind_names_the_keys_that_it_drops(command):
     )
     changes = ["--set", "slider.kind=layered", "--set", "slider.layers=4"]
     _, _, told = command("info", KLEIN, *changes)
-    assert told == 'dropped with slider.kind = "layered": slider.damping_ratio\n'
+    assert told == 'not used with slider.kind = "layered": slider.damping_ratio\n'
 
 
 def test_none_removes_a_key():

@@ -276,7 +276,7 @@ def test_replacing_another_output_is_reported_before(tmp_path, run_file, command
     (tmp_path / "out.checkpoint" / "theirs").write_text("theirs")
     status, _, message = command("run", run_file, "-o", output, "--set", "run.seed=5")
     assert status == 2
-    assert "replaces the output of another configuration" in message
+    assert "the output of another configuration will be replaced" in message
     assert output.read_bytes() == before
 
 

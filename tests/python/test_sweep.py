@@ -528,7 +528,7 @@ def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
     np.testing.assert_array_equal(np.isnan(data["mean_force"].values), failed)
     assert data.attrs["failures"].count("too much") == 2
     status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
-    assert (status, "0 points computed, 2 were there, 2 failed" in told) == (1, True)
+    assert (status, "0 points computed, 2 read from the store, 2 failed" in told) == (1, True)
     status, _, told = command("sweep", sweep_file(SIMPLE.replace("mean_force", "own.py:text")))
     assert status == 1
     assert "returned 'much', not a number" in told

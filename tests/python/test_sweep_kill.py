@@ -103,7 +103,7 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in told
-    assert "the same command does them" in told
+    assert "the same command computes them" in told
     assert not any(map(is_alive, children))
     kept = len(points_of(output))
     partial = xr.load_dataset(tmp_path / "out" / "sweep.partial.nc")
@@ -113,7 +113,7 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     (tmp_path / "slow").unlink()
     process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
     _, told = process.communicate(timeout=60)
-    assert f"{40 - kept} points computed, {kept} were there" in told
+    assert f"{40 - kept} points computed, {kept} read from the store" in told
     assert not (tmp_path / "out" / "sweep.partial.nc").exists()
 
 
@@ -168,14 +168,14 @@ def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
     assert "no space left on the disk" in told
     kept = points_of(output)
     assert 5 < len(kept) < 60
-    assert f"{len(kept)} points are kept: the same command goes on" in told
+    assert f"{len(kept)} points are stored: the same command continues" in told
     assert not output.exists()
     assert not list(small_disk.rglob(".*"))
     remount = ["mount", "-o", "remount,size=4m", str(small_disk)]
     subprocess.run(remount, check=True)
     status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
     assert status == 0
-    assert f"{100 - len(kept)} points computed, {len(kept)} were there" in told
+    assert f"{100 - len(kept)} points computed, {len(kept)} read from the store" in told
 
 
 def test_a_folder_that_vanishes_keeps_no_result_from_the_dataset(tmp_path):

@@ -159,7 +159,7 @@ def test_a_table_becomes_an_output(tmp_path, command):
     mesoslip.plot(bare, tmp_path / "bare.png")
     both = mesoslip.plot([bare, tree])
     assert len(both.axes) == 2
-    with pytest.raises(mesoslip.FileError, match="does not tell the displacement"):
+    with pytest.raises(mesoslip.FileError, match="has no displacement"):
         mesoslip.plot(bare, x="displacement")
 
 

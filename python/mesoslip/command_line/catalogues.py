@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, OutputArgument, print_json, show, time_of
+from mesoslip.command_line.options import (
+    JsonOption,
+    OutputArgument,
+    counted,
+    print_json,
+    print_table,
+    show,
+    show_all,
+    time_of,
+)
 from mesoslip.quantities import column, number, with_error
 
 # Columns of the catalogue of slips: header, and unit in SI.
@@ -52,10 +60,8 @@ def slips(
         [str(row["realization_index"]), *(columns[name].text(row[name]) for name in COLUMNS)]
         for row in rows
     ]
-    widths = [max(map(len, cells)) for cells in zip(*table_rows, strict=True)]
-    for cells in table_rows:
-        typer.echo("  ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True)))
-    typer.echo(f"{len(rows)} slip{'s' if len(rows) != 1 else ''}")
+    print_table(table_rows)
+    typer.echo(counted(len(rows), "slip"))
     for name, (header, _) in COLUMNS.items():
         if name in statistics:
             mean, deviation, low, high = (
@@ -80,18 +86,20 @@ def avalanches(
     as_json: JsonOption = False,
     min_size: Annotated[
         int | None,
-        typer.Option(min=1, help="Smallest size in the fit; chosen by default", metavar="SIZE"),
+        typer.Option(
+            min=1, help="Minimum size in the fit; chosen from the data by default", metavar="SIZE"
+        ),
     ] = None,
     after: Annotated[
-        str, typer.Option(help="Only those after a time, such as '2 s'", metavar="TIME")
+        str, typer.Option(help="Only avalanches after this time, such as '2 s'", metavar="TIME")
     ] = "0 s",
     min_force_ratio: Annotated[
         float | None,
         typer.Option(
             min=0,
             max=1,
-            help="Only avalanches before the maximum of the contact force, above this fraction of "
-            "it",
+            help="Only avalanches at more than this fraction of the maximum contact force, and "
+            "before that maximum",
             metavar="RATIO",
         ),
     ] = None,
@@ -125,14 +133,21 @@ def avalanches(
         answer = {"statistics": statistics, "distribution": distribution, "ccdf": cumulative}
         print_json(answer)
         return
-    typer.echo("       from         to      count        P(s)       error")
-    for one in distribution:
-        typer.echo(
-            f"{one['from']:11d}{one['to']:11d}{one['count']:11d}{one['density']:12.4g}"
-            f"{one['error']:12.2g}"
-        )
-    for name, value in statistics.items():
-        show(name, value, *avalanche_catalogue.SUMMARY[name])
+    print_table(
+        [
+            ["size from", "to", "count", "probability P(s)"],
+            *(
+                [
+                    str(one["from"]),
+                    str(one["to"]),
+                    str(one["count"]),
+                    with_error(one["density"], one["error"]),
+                ]
+                for one in distribution
+            ),
+        ]
+    )
+    show_all(statistics, avalanche_catalogue.SUMMARY)
     warning = avalanche_catalogue.warning(statistics)
     if warning is not None:
         typer.echo(f"warning: {warning}")
@@ -157,9 +172,8 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         for name, meaning in REGIME.items():
             if name == "regime" or name.endswith("_error"):
                 continue
-            error = getattr(one, f"{name}_error", math.nan)
-            value = with_error(getattr(one, name), error, meaning.units)
-            typer.echo(f"{name:22} {value:20} {meaning.long_name}")
+            error = getattr(one, f"{name}_error", None)
+            show(name, getattr(one, name), meaning.units, meaning.long_name, error)
         typer.echo(one.summary)
     if len(results) > 1:
         typer.echo(summary(results))

@@ -10,14 +10,17 @@ import typer
 
 def example(
     name: Annotated[
-        str | None, typer.Argument(help="Such as klein; a list by default", metavar="[NAME]")
+        str | None,
+        typer.Argument(
+            help="Name, such as klein; without it all examples are listed", metavar="[NAME]"
+        ),
     ] = None,
     file: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="File; NAME.toml here by default", metavar="FILE"),
     ] = None,
 ) -> None:
-    """List the runs that come with the program, or write one to start from."""
+    """List the example configurations, or write one to start from."""
     from mesoslip import examples
 
     if name is None:

@@ -14,7 +14,7 @@ from mesoslip.errors import FileError
 
 EXAMPLE = "klein"
 MISSING = (
-    "the page needs Bokeh, which is not there: install it with python -m pip install "
+    "the page needs Bokeh, which is not installed: python -m pip install "
     "'mesoslip[explore]', or python -m pip install bokeh"
 )
 
@@ -23,7 +23,7 @@ def explore(
     config: Annotated[
         str | None,
         typer.Argument(
-            help="TOML file, or an output, to start from; Klein's case by default",
+            help="TOML file or output to start from; the example klein by default",
             metavar="CONFIG",
         ),
     ] = None,
@@ -31,17 +31,20 @@ def explore(
     port: Annotated[
         int,
         typer.Option(
-            min=0, max=65535, help="Port, or the next one that is free; 0 for any", metavar="PORT"
+            min=0,
+            max=65535,
+            help="Port; if it is in use the next free one; 0: any free port",
+            metavar="PORT",
         ),
     ] = 5006,
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser")
     ] = True,
 ) -> None:
-    """Open a page on which to turn knobs and see the motion change; Ctrl-C ends it.
+    """Open an interactive page: change parameters and see the motion; Ctrl-C ends it.
 
-    The page is on the loopback address of this machine, loads nothing from elsewhere, and is
-    refused to other pages.
+    The page is served on the loopback address of this machine only, and loads nothing from
+    elsewhere.
     """
     from mesoslip.examples import example
 
@@ -60,8 +63,8 @@ def explore(
         source = config
     from mesoslip.explorer.server import serve
 
-    def tell(address: str) -> None:
+    def report(address: str) -> None:
         typer.echo(f"mesoslip explore: {address} (Ctrl-C ends it)")
 
     with suppress(KeyboardInterrupt):
-        serve(start, source, port=port, opens=browser, tell=tell)
+        serve(start, source, port=port, opens=browser, tell=report)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, OutputArgument, SetOption, print_json
+from mesoslip.command_line.options import (
+    JsonOption,
+    OutputArgument,
+    SetOption,
+    print_json,
+    print_table,
+)
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
-# Units in which parameters are shown, by their SI unit: scales from the greatest to the least.
-SCALES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
-# What prefixes go with.
-PREFIXED = {"N", "N/m", "s", "m", "m/s", "Pa"}
+if TYPE_CHECKING:
+    from mesoslip.inference.posterior import Row
 
 
 def fit(
@@ -24,7 +27,8 @@ def fit(
     config: Annotated[
         str,
         typer.Argument(
-            help="TOML file of what is known, with a table [fit.free]", metavar="CONFIG"
+            help="TOML file with the known parameters, and a table [fit.free] of free ones",
+            metavar="CONFIG",
         ),
     ],
     posterior: Annotated[
@@ -32,22 +36,22 @@ def fit(
         typer.Option(
             "-o",
             "--output",
-            help="Posterior; out/<stem>.posterior.nc by default",
+            help="Posterior file; out/<stem>.posterior.nc by default",
             metavar="POSTERIOR.nc",
         ),
     ] = None,
     changes: SetOption = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=1, help="Simulations at the same time; as many as processors by default"),
+        typer.Option(min=1, help="Parallel simulations; the number of processors by default"),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Fit parameters of the model to a trace, with their uncertainty.
 
-    Simulations are kept beside the posterior, in NAME.simulations, until the fit is done: the
-    same command goes on after it was stopped.
+    Simulations are stored beside the posterior, in NAME.simulations, until the fit is done. After
+    an interruption the same command continues.
     """
     from mesoslip.errors import FileError
     from mesoslip.execution.store import Store
@@ -70,7 +74,7 @@ def fit(
                     trace, plan, store=store, executor=workers, progress=progress, stop=stop
                 )
         except StoppedError:
-            say(f"{path}: interrupted; the same command goes on from {store}")
+            say(f"{path}: interrupted; the same command continues from {store}")
             raise typer.Exit(stop.exit_status) from None
     writing.write(tree, path)
     Store(store, "simulations").remove()
@@ -96,40 +100,47 @@ def fit(
             }
         )
         return
-    _show(rows, tree.attrs)
+    _print_rows(rows, tree.attrs)
     for one in notes:
         typer.echo(f"warning: {one}")
 
 
-def _show(rows: list[Any], told: Mapping[Any, Any]) -> None:
-    width = max(len("parameter"), *(len(row.key) for row in rows))
-    typer.echo(
-        f"{'parameter':{width}} {'value':>9}  {'50 % interval':>19}  {'90 % interval':>19} "
-        f"{'unit':6} {'verdict':15} shrinkage  told most by"
-    )
+def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:
+    """A line for each parameter, in a unit that suits its median."""
+    from mesoslip.quantities import scale_for, with_unit
+
+    cells = [
+        [
+            "parameter",
+            "median",
+            "50 % interval",
+            "90 % interval",
+            "unit",
+            "verdict",
+            "shrinkage",
+            "most informative feature",
+        ]
+    ]
     for row in rows:
-        scale, unit = _scale(row.percentiles[2], row.unit)
-        digits = row.digits
-        low, lower, middle, upper, high = (f"{one / scale:.{digits}g}" for one in row.percentiles)
-        typer.echo(
-            f"{row.key:{width}} {middle:>9}  {lower + ' - ' + upper:>19}  {low + ' - ' + high:>19} "
-            f"{unit:6} {row.verdict:15} {row.shrinkage:9.2f}  {row.informed_by}"
+        scale = scale_for(row.percentiles[2], row.unit)
+        low, lower, middle, upper, high = (
+            f"{one / scale.size:.{row.digits}g}" for one in row.percentiles
         )
+        cells.append(
+            [
+                row.key,
+                middle,
+                f"{lower} to {upper}",
+                f"{low} to {high}",
+                scale.name,
+                row.verdict,
+                f"{row.shrinkage:.2f}",
+                row.informed_by,
+            ]
+        )
+    print_table(cells)
     typer.echo(
-        f"noise {1e6 * told['noise']:.3g} uN; {told['simulation_count']} simulations; agreement of "
-        f"the model with the trace p = {told['agreement_probability']:.2g}"
+        f"noise {with_unit(attributes['noise'], 'N', 3)}; {attributes['simulation_count']} "
+        "simulations; agreement of model and trace: "
+        f"p = {attributes['agreement_probability']:.2g}"
     )
-
-
-def _scale(value: float, unit: str) -> tuple[float, str]:
-    """A factor, and the unit with the prefix of it, in which a value is easily read."""
-    if unit not in PREFIXED or value == 0:
-        return 1.0, "" if unit == "1" else unit
-    # Spring constants are given in N/m.
-    if unit == "N/m":
-        return 1.0, unit
-    for scale, prefix in SCALES:
-        if abs(value) >= scale:
-            return scale, prefix + unit
-    exponent = 3 * math.floor(math.log10(abs(value)) / 3)
-    return 10.0**exponent, f"1e{exponent} {unit}"

@@ -1,4 +1,4 @@
-"""The command line: its commands, and what becomes of errors."""
+"""The command line: its commands, and the reporting of errors."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ COMMANDS = (
     example.example,
 )
 
-# Where the libraries come from that the kernels are linked to.
+# How to install the libraries that the kernels are linked to.
 LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev libsundials-fortran-dev"
 
 app = typer.Typer(
@@ -84,7 +84,7 @@ def main() -> None:
     """Run the command line and exit."""
     _open_streams()
     typed = shlex.join(["mesoslip", *sys.argv[1:]])
-    # A name that is not UTF-8 must not keep an output from being written.
+    # Outputs contain the command line, and take UTF-8 only.
     token = COMMAND_LINE.set(typed.encode("utf-8", "backslashreplace").decode())
     status: object = 0
     try:
@@ -97,7 +97,7 @@ def main() -> None:
     except KeyboardInterrupt:
         status = run.INTERRUPTED
     except ImportError as error:
-        # What the kernels are linked to; whatever else is missing is a fault of the program.
+        # A shared library of the kernels; other missing modules are bugs.
         if "shared object" not in str(error) and "Library not loaded" not in str(error):
             raise
         typer.echo(f"mesoslip: a library is missing: {error}; {LIBRARIES}", err=True)
@@ -117,10 +117,10 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Give the program the streams that it was started without, and let them take any name."""
+    """Open standard streams that are closed, and let stdout print any file name."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
-            # The lowest free number is taken, which is that of the stream.
+            # The lowest free descriptor is used, which is that of the stream.
             os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -128,7 +128,7 @@ def _open_streams() -> None:
 
 
 def _output_failed(error: OSError) -> int:
-    """Say that the standard output cannot be written to, and do not try again at the end."""
+    """Report that stdout cannot be written to, and redirect it to nowhere."""
     typer.echo(f"mesoslip: the output cannot be written: {error.strerror or error}", err=True)
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

@@ -1,23 +1,21 @@
-"""Arguments and options that commands share, and lines that they print."""
+"""Arguments and options that commands share, and the lines and tables that they print."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-
-from mesoslip.quantities import with_unit
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
 
 ConfigArgument = Annotated[
-    str, typer.Argument(help="TOML file, or an output to run again", metavar="CONFIG")
+    str, typer.Argument(help="TOML file, or an output to repeat", metavar="CONFIG")
 ]
 OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metavar="OUT.nc")]
 OutputsArgument = Annotated[
@@ -27,7 +25,7 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="Change one key, as in contacts.delay=1ms; may be repeated",
+        help="Set a key, as in contacts.delay=1ms; KEY=none removes it; may be repeated",
         metavar="KEY=VALUE",
     ),
 ]
@@ -35,7 +33,7 @@ SchedulerOption = Annotated[
     str | None,
     typer.Option(
         "--scheduler",
-        help="Dask scheduler whose workers do the computing, or its --scheduler-file",
+        help="Address or scheduler file of a Dask scheduler, whose workers compute",
         metavar="ADDRESS",
     ),
 ]
@@ -43,16 +41,16 @@ PoolOption = Annotated[
     str | None,
     typer.Option(
         "--pool",
-        help="What computes: threads, processes, or both: threads at first, and processes if it "
-        "takes long",
+        help="Workers: threads, processes, or both (default): threads at first, processes if the "
+        "sweep takes long",
         metavar="POOL",
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with values in SI")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units")]
 
 
 def load(config: str, changes: Iterable[str] | None) -> Config:
-    """A configuration with changes; keys that a change of kind drops are named on stderr.
+    """A configuration with changes. Dropped keys of another kind of slider are reported on stderr.
 
     Raises
     ------
@@ -64,19 +62,19 @@ def load(config: str, changes: Iterable[str] | None) -> Config:
     checked = as_config(config, changes or ())
     if checked.dropped:
         kind = f'slider.kind = "{checked.slider.kind}"'
-        typer.echo(f"dropped with {kind}: {', '.join(checked.dropped)}", err=True)
+        typer.echo(f"not used with {kind}: {', '.join(checked.dropped)}", err=True)
     return checked
 
 
 def executor_of(
     workers: int | None, scheduler: str | None = None, pool: str | None = None
 ) -> ExecutorLike:
-    """The executor that options ask for; the default of the command without any.
+    """The executor that options name; the default of the command without them.
 
     Raises
     ------
     ConfigError
-        If there is no such pool, or what options ask for is contradictory.
+        If there is no such pool, or options contradict each other.
     """
     from mesoslip.errors import ConfigError, Problem
     from mesoslip.execution.executors import Dask, Processes, Threads, ThreadsThenProcesses
@@ -89,15 +87,58 @@ def executor_of(
     return workers if pool is None else pools[pool](workers)
 
 
-def show(name: str, value: float | bool | None, unit: str, meaning: str) -> None:
-    """A line for a quantity."""
+def show(
+    name: str,
+    value: float | bool | None,
+    unit: str,
+    meaning: str,
+    error: float | bool | None = None,
+) -> None:
+    """A line for a quantity in SI, in a suitable unit, with its error if that is known."""
+    from mesoslip.quantities import with_error, with_unit
+
     if isinstance(value, bool) or value is None:
         shown = {True: "yes", False: "no", None: "none"}[value]
     elif math.isnan(value):
-        shown = "not known"
+        shown = "unknown"
+    elif error:
+        shown = with_error(value, error, unit, 6)
     else:
         shown = with_unit(value, unit, 6)
     typer.echo(f"{name:22} {shown:20} {meaning}")
+
+
+def show_all(
+    values: Mapping[str, float | bool | None], meanings: Mapping[str, tuple[str, str]]
+) -> None:
+    """A line for each quantity, which has its error beside it if there is one.
+
+    Parameters
+    ----------
+    values
+        Quantities in SI by name; the error of ``name`` is ``name_error``.
+    meanings
+        Their units and meanings.
+    """
+    for name, value in values.items():
+        if name.removesuffix("_error") != name and name.removesuffix("_error") in values:
+            continue
+        show(name, value, *meanings[name], values.get(f"{name}_error"))
+
+
+def print_table(rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> None:
+    """Print rows of cells, right-aligned; the note on a row stands below it."""
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
+    for row, note in zip(rows, notes or [""] * len(rows), strict=True):
+        line = "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        typer.echo(line)
+        if note:
+            typer.echo(f"{'':{len(line)}}{note}")
+
+
+def counted(count: float, noun: str) -> str:
+    """A number of things: "1 slip", "2 slips"."""
+    return f"{count:.0f} {noun}{'s' if count != 1 else ''}"
 
 
 def print_json(value: object) -> None:
@@ -124,12 +165,12 @@ def quantity(
     positive: bool = False,
     negative: bool = True,
 ) -> float:
-    """A quantity given to an option, in SI.
+    """The value of an option that is a quantity, in SI.
 
     Raises
     ------
     ConfigError
-        If it is not a quantity of the unit's dimension, or of a sign that the option refuses.
+        If it is not a quantity of the unit's dimension, or has the wrong sign.
     """
     from mesoslip.configuration.units import to_si
     from mesoslip.errors import ConfigError, Problem
@@ -158,10 +199,10 @@ def _number_or_text(text: str) -> float | str:
 def quantity_or_none(
     text: str | None, option: str, unit: str, example: str, *, positive: bool = False
 ) -> float | None:
-    """A quantity given to an option, in SI; None if the option is not given. See `quantity`."""
+    """The value of an option that is a quantity, in SI; None without it. See `quantity`."""
     return None if text is None else quantity(text, option, unit, example, positive=positive)
 
 
 def time_of(text: str, option: str) -> float:
-    """A time given to an option [s]."""
+    """The value of an option that is a time [s]."""
     return quantity(text, option, "s", "2 s")

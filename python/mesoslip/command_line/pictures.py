@@ -13,7 +13,7 @@ from mesoslip.command_line.options import OutputsArgument, time_of
 
 
 class Against(StrEnum):
-    """What a run is drawn against."""
+    """Abscissa of the picture of a run."""
 
     TIME = "time"
     DISPLACEMENT = "displacement"
@@ -27,7 +27,7 @@ def plot(
         typer.Option(
             "-o",
             "--output",
-            help="Picture; beside the first output by default; a .gif shows the lattice in motion",
+            help="Picture, beside the first output by default; .gif: a movie of the lattice",
             metavar="FIG",
         ),
     ] = None,
@@ -44,7 +44,7 @@ def plot(
         int | None,
         typer.Option(
             min=0,
-            help="Which snapshot of the lattice; that after the largest avalanche by default",
+            help="Snapshot of the lattice; by default the one after the largest avalanche",
             metavar="NUMBER",
         ),
     ] = None,
@@ -52,7 +52,7 @@ def plot(
         int | None,
         typer.Option(
             min=0,
-            help="Which realization of a run; the first one, with others behind it, by default",
+            help="Realization of a run; by default the first one, in front of the others",
             metavar="NUMBER",
         ),
     ] = None,
@@ -64,10 +64,12 @@ def plot(
     ] = None,
     x: Annotated[
         Against | None,
-        typer.Option("--x", help="What a run is drawn against; drive: the drive's displacement"),
+        typer.Option(
+            "--x", help="Abscissa: time, or the displacement of the slider or of the drive"
+        ),
     ] = None,
 ) -> None:
-    """Draw an output, or several over each other."""
+    """Draw an output, or several in one picture."""
     from mesoslip.output import targets
     from mesoslip.plots import plot as plots
 

@@ -1,4 +1,4 @@
-"""How far a run has come."""
+"""Progress and messages on the terminal."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import typer
 
 @contextmanager
 def progress_shown(quiet: bool) -> Iterator[Callable[[float], None]]:
-    """A progress bar on a terminal, otherwise a line for each tenth."""
+    """A progress bar on a terminal; elsewhere a line for each 10 %."""
     if quiet:
         yield lambda _: None
         return
@@ -32,36 +32,36 @@ def progress_shown(quiet: bool) -> Iterator[Callable[[float], None]]:
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
     task = bar.add_task("", total=1.0)
 
-    def tell(part: float) -> None:
+    def update(part: float) -> None:
         with suppress(OSError):
             bar.update(task, completed=part)
 
     with suppress(OSError):
         bar.start()
     try:
-        yield tell
+        yield update
     finally:
         with suppress(OSError):
             bar.stop()
 
 
 def say(text: str) -> None:
-    """Tell the user, if there still is a terminal: a run does not end because nobody listens."""
+    """Print a message on stderr; a run continues if its terminal is gone."""
     with suppress(OSError):
         typer.echo(text, err=True)
 
 
 def _lines() -> Callable[[float], None]:
     start = time.monotonic()
-    told = 0
+    reported = 0
 
-    def tell(part: float) -> None:
-        nonlocal told
+    def update(part: float) -> None:
+        nonlocal reported
         passed = time.monotonic() - start
-        # Runs that are over in a moment need no lines.
-        if int(10 * part) > told and passed > 2:
-            told = int(10 * part)
+        # Short runs need no lines.
+        if int(10 * part) > reported and passed > 2:
+            reported = int(10 * part)
             left = passed * (1 - part) / part
-            say(f"{10 * told} % after {passed:.0f} s, {left:.0f} s left")
+            say(f"{10 * reported} % after {passed:.0f} s, {left:.0f} s left")
 
-    return tell
+    return update

@@ -19,7 +19,7 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Write a page about an output, or about several of one command side by side."""
+    """Write a self-contained page about an output, or about several of one command."""
     from mesoslip.output import targets
     from mesoslip.reports import report as reports
 

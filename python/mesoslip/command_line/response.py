@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, print_json, quantity_or_none
+from mesoslip.command_line.options import JsonOption, print_json, print_table, quantity_or_none
 
 if TYPE_CHECKING:
     from mesoslip.analysis.response import ResponseTable
@@ -59,10 +59,6 @@ def response(
 def _print(table: ResponseTable) -> None:
     """Print a table; the note on a row stands below it."""
     typer.echo(f"\n{table.title}")
-    widths = [max(map(len, column)) for column in zip(table.head, *table.rows, strict=True)]
-    for row, note in zip((table.head, *table.rows), ("", *table.notes), strict=True):
-        typer.echo("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
-        if note:
-            typer.echo(f"{'':{len(row)}}{note}")
+    print_table((table.head, *table.rows), ("", *table.notes))
     if table.line:
         typer.echo(table.line)

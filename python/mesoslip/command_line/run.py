@@ -11,6 +11,7 @@ from mesoslip.command_line.options import (
     ConfigArgument,
     SchedulerOption,
     SetOption,
+    counted,
     executor_of,
     load,
     quantity,
@@ -40,30 +41,30 @@ def run(
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", help="Go on from the checkpoint of a run that was stopped, to the bit"
+            "--resume", help="Continue a stopped run from its checkpoint, with identical results"
         ),
     ] = False,
     checkpoint_interval: Annotated[
         str,
         typer.Option(
-            help="Wall time between checkpoints, such as '30 s'; 0 for one only when the run is "
-            "stopped",
+            help="Wall time between checkpoints, such as '30 s'; 0: a checkpoint only when the run "
+            "is stopped",
             metavar="TIME",
         ),
     ] = "60 s",
     workers: Annotated[
         int | None,
-        typer.Option(min=1, help="Realizations at the same time; as many as processors by default"),
+        typer.Option(min=1, help="Parallel realizations; the number of processors by default"),
     ] = None,
     scheduler: SchedulerOption = None,
     quiet: Annotated[
-        bool, typer.Option("--quiet", help="Show neither progress nor what came of it")
+        bool, typer.Option("--quiet", help="Print neither progress nor results")
     ] = False,
 ) -> None:
     """Simulate, and write an output file.
 
-    A checkpoint beside the output, NAME.checkpoint, is kept every minute, and when the run is
-    stopped by Ctrl-C, SIGTERM or SIGHUP; the same command with --resume goes on from it.
+    A checkpoint is written beside the output, as NAME.checkpoint, every minute and when the run is
+    stopped by Ctrl-C, SIGTERM or SIGHUP. The same command with --resume continues from it.
     """
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
@@ -81,7 +82,9 @@ def run(
         say(f"{path}: {text}")
 
     if not quiet and files.is_of_another(path, checked):
-        report("replaces the output of another configuration at the end; -o gives other names")
+        report(
+            "the output of another configuration will be replaced at the end; -o gives another name"
+        )
     with (
         Checkpoint(
             checkpoint_folder(path),
@@ -107,8 +110,8 @@ def run(
         except FileError as error:
             if checkpoint.write(results.realizations):
                 raise FileError(
-                    f"{error}; the results are kept in {checkpoint.folder}: the same command with "
-                    "--resume writes them"
+                    f"{error}; the results are in {checkpoint.folder}: the same command with "
+                    "--resume writes the output"
                 ) from error
             raise
         if not quiet:
@@ -122,23 +125,23 @@ def _partial(path: Path) -> Path:
 
 
 def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> int:
-    """Tell what is kept of a run that was stopped; the exit status."""
+    """Report what is kept of a stopped run; the exit status."""
     import signal
 
     from mesoslip.output import layout, writing
 
-    told = str(layout.attributes(results)["comment"])
+    message = str(layout.attributes(results)["comment"])
     is_kept = checkpoint.saved_time is not None
     if is_kept:
-        told += "; the same command with --resume goes on from there"
-    # Who is being shut down has no time for a file that the checkpoint makes superfluous.
+        message += "; the same command with --resume continues from the checkpoint"
+    # At a shutdown there is no time for a file that the checkpoint makes superfluous.
     if stop.signal in {None, signal.SIGINT} or not is_kept:
         try:
             writing.write_results(results, _partial(path))
-            told += f"; what there is, is in {_partial(path)}"
+            message += f"; the results so far are in {_partial(path)}"
         except FileError as error:
-            told += f"; {error}"
-    say(f"{path}: {told}")
+            message += f"; {error}"
+    say(f"{path}: {message}")
     return stop.exit_status
 
 
@@ -147,23 +150,23 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS
 
-    told = layout.attributes(results)
-    slips = sum(len(one.rows("slips")) for one in results.realizations)
-    found = f"{slips} slip{'s' if slips != 1 else ''}"
+    known = layout.attributes(results)
+    counts = [counted(known["break_count"], "break")]
     if config.has_avalanches:
-        count = sum(one.avalanche_count for one in results.realizations)
-        found = f"{count} avalanches, {found}"
+        counts.append(
+            counted(sum(one.avalanche_count for one in results.realizations), "avalanche")
+        )
+    counts.append(counted(sum(len(one.rows("slips")) for one in results.realizations), "slip"))
     say(
-        f"{path}: {told['break_count']:.0f} breaks, {found}, "
-        f"energy balance to {abs(told['energy_residual']):.0e}, "
-        f"{told['wall_seconds']:.2f} s",
+        f"{path}: {', '.join(counts)}; relative energy residual "
+        f"{abs(known['energy_residual']):.0e}; {known['wall_seconds']:.2f} s"
     )
     say(f"{path}: {regime.summary(list(regime.regimes_of_results(results)))}")
-    if told["break_count"] == 0:
-        say(f"{path}: no contact broke: the drive did not come far enough in this time")
-    if told["audit"] != "passed":
-        say(f"{path}: warning: {told['audit']}")
+    if known["break_count"] == 0:
+        say(f"{path}: no contact broke: the drive did not move far enough")
+    if known["audit"] != "passed":
+        say(f"{path}: warning: {known['audit']}")
     if config.unreached_drive is not None:
         say(f"{path}: warning: {config.unreached_drive}")
-    if told["ending"] != ENDINGS["drive"]:
-        say(f"{path}: the run ended as follows: {told['ending']}")
+    if known["ending"] != ENDINGS["drive"]:
+        say(f"{path}: end of the run: {known['ending']}")

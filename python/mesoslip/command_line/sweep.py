@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from mesoslip.campaign.plan import Plan
     from mesoslip.campaign.runner import Sweep
 
-# Failures of which each is told on the terminal.
+# Maximum number of failures that are printed.
 MAX_REPORTED = 20
-# Exit status of a sweep that is not whole.
+# Exit status of a sweep with failed or missing points.
 FAILED = 1
 
 
@@ -33,19 +33,20 @@ def sweep(
     changes: SetOption = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=1, help="Points at the same time; as many as processors by default"),
+        typer.Option(min=1, help="Parallel points; the number of processors by default"),
     ] = None,
     scheduler: SchedulerOption = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Tell what it will take, and run nothing")
+        bool,
+        typer.Option("--dry-run", help="Estimate time, memory and disk space, and run nothing"),
     ] = False,
     pool: PoolOption = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress")] = False,
 ) -> None:
     """Run a configuration over a range of parameters, and write the measures of all runs.
 
-    Each point is kept in a folder beside the output, NAME.points, as soon as it is done. Called
-    again, the command does what is missing. The exit status is 1 if points failed.
+    Each finished point is stored beside the output, in NAME.points. Called again, the command
+    computes the missing points. The exit status is 1 if points failed.
     """
     from mesoslip.campaign.plan import Plan
     from mesoslip.campaign.runner import run_sweep
@@ -59,7 +60,7 @@ def sweep(
     if dry_run:
         _print_estimate(plan, folder, workers)
         return
-    # All of them are checked before anything is made.
+    # All combinations are checked before anything is written.
     _ = plan.combinations
     targets.check_output(path, [file])
     with Store(folder, "points") as store, stopped_by_signals() as stop:
@@ -75,7 +76,7 @@ def sweep(
         except WriteError as error:
             kept = len(store.names())
             raise WriteError(
-                f"{error}; {kept} points are kept: the same command goes on"
+                f"{error}; {kept} points are stored: the same command continues"
             ) from error
         status = _write(done, path, stop)
     _report(done, path, quiet)
@@ -96,7 +97,7 @@ def _write(done: Sweep, path: Path, stop: Stop) -> int:
         return FAILED if done.failures else 0
     say(
         f"{path}: {done.ending}; {done.missing} of {done.dataset['status'].size} points are "
-        f"missing: the same command does them; what there is, is in {partial}"
+        f"missing, and the same command computes them; the others are in {partial}"
     )
     return stop.exit_status if stop.is_set() else FAILED
 
@@ -105,10 +106,13 @@ def _report(done: Sweep, path: Path, quiet: bool) -> None:
     for point, reason in list(done.failures.items())[:MAX_REPORTED]:
         say(f"{path}: failed: {point}: {reason}")
     if len(done.failures) > MAX_REPORTED:
-        say(f"{path}: {len(done.failures) - MAX_REPORTED} more failed; see the attribute failures")
+        say(
+            f"{path}: {len(done.failures) - MAX_REPORTED} more failed: see the attribute failures "
+            "of the output"
+        )
     if not quiet and done.complete:
         failed = f", {len(done.failures)} failed" if done.failures else ""
-        say(f"{path}: {done.computed} points computed, {done.stored} were there{failed}")
+        say(f"{path}: {done.computed} points computed, {done.stored} read from the store{failed}")
 
 
 def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
@@ -117,19 +121,19 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from mesoslip.execution.store import Pieces
 
     count = checked_workers(workers)
-    told = estimate(plan, Pieces(folder), count)
+    expected = estimate(plan, Pieces(folder), count)
     axes = " x ".join(
         [f"{len(axis.rows)} {' + '.join(axis.keys)}" for axis in plan.axes]
         + [f"{plan.realizations} realization{'s' * (plan.realizations > 1)}"]
     )
-    typer.echo(f"points   {told.points} ({axes}), {told.stored} of them done")
-    typer.echo(f"time     about {_duration(told.seconds)} with {count} workers")
-    typer.echo(f"memory   about {told.memory_bytes / 1e6:.0f} MB")
-    typer.echo(f"disk     about {told.disk_bytes / 1e6:.1f} MB")
+    typer.echo(f"points   {expected.points} ({axes}), {expected.stored} of them done")
+    typer.echo(f"time     about {_duration(expected.seconds)} with {count} workers")
+    typer.echo(f"memory   about {expected.memory_bytes / 1e6:.0f} MB")
+    typer.echo(f"disk     about {expected.disk_bytes / 1e6:.1f} MB")
 
 
 def _duration(seconds: float) -> str:
-    """A time as people tell it."""
+    """A time, rounded, in s, min or h."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     if seconds < 6000:

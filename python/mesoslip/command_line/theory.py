@@ -1,4 +1,4 @@
-"""``mesoslip info``, ``curve`` and ``onset``: what the theory says before anything is run."""
+"""``mesoslip info``, ``curve`` and ``onset``: theory, without a simulation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mesoslip.command_line.options import (
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Work that the stability of steady sliding may take after a force curve, some seconds.
+# Maximum work for the stability of steady sliding, some seconds.
 MAX_WORK = 400_000
 
 
@@ -34,9 +34,9 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         return
     for name, one in quantities.items():
         show(name, one.value, one.unit, one.meaning)
-    for told in (verdict(checked), checked.unreached_drive):
-        if told is not None:
-            typer.echo(told)
+    for message in (verdict(checked), checked.unreached_drive):
+        if message is not None:
+            typer.echo(message)
 
 
 def curve(
@@ -68,16 +68,16 @@ def curve(
             show(name, value, *SUMMARY[name])
         typer.echo(force_curve.verdict)
         sliding = steady_sliding(checked, MAX_WORK)
-        for told in (
+        for message in (
             None if sliding is None else sliding.summary,
             stiffness_summary(checked, MAX_WORK),
         ):
-            if told is not None:
-                typer.echo(told)
+            if message is not None:
+                typer.echo(message)
     if force_curve.error > checked.curve.tolerance:
         typer.echo(
-            f"the force has {force_curve.digits} digits; more would take too much work, as its "
-            "law is not smooth, or too narrow for this length (curve.length, curve.tolerance)",
+            f"the force has {force_curve.digits} digits: its threshold law is not smooth, or too "
+            "narrow for this length (curve.length), and curve.tolerance would take too much work",
             err=True,
         )
 
@@ -113,6 +113,8 @@ def onset(
 
 
 def _warn_of_interaction(config: Config) -> None:
-    """The master equation has no neighbours: say so to who asks for some."""
+    """Warn that the master equation ignores interaction."""
     if config.interaction is not None and config.interaction.strength > 0:
-        typer.echo("this is without [interaction], which the master equation cannot have", err=True)
+        typer.echo(
+            "computed without [interaction]: the master equation has no neighbours", err=True
+        )

@@ -29,19 +29,19 @@ def trace(
         str | None,
         typer.Option(
             "--config",
-            help="Configuration of the experiment, so that every command works on the output",
+            help="Configuration of the experiment, which some commands need",
             metavar="CONFIG",
         ),
     ] = None,
     columns: Annotated[
         str | None,
         typer.Option(
-            help="Headers in the place of those of the file, such as 'time [s], force [uN], -'",
+            help="Headers that replace those of the file, such as 'time [s], force [uN], -'",
             metavar="HEADERS",
         ),
     ] = None,
     rate: Annotated[
-        str | None, typer.Option(help="Sampling rate, if there are no times", metavar="1 kHz")
+        str | None, typer.Option(help="Sampling rate, if the table has no times", metavar="1 kHz")
     ] = None,
     velocity: Annotated[
         str | None, typer.Option(help="Velocity of the drive", metavar="'0.1 um/s'")
@@ -58,12 +58,14 @@ def trace(
     period: Annotated[
         str | None,
         typer.Option(
-            help="Period of the setup; from --config, or else estimated", metavar="'25 ms'"
+            help="Period of the setup; by default from --config, or estimated", metavar="'25 ms'"
         ),
     ] = None,
     max_gap: Annotated[
         str | None,
-        typer.Option(help="Gaps up to this are filled by straight lines", metavar="'10 ms'"),
+        typer.Option(
+            help="Maximum duration of gaps that are filled by straight lines", metavar="'10 ms'"
+        ),
     ] = None,
 ) -> None:
     """Read a measured trace, find its slips, and write an output like that of a run."""
@@ -86,7 +88,7 @@ def trace(
     )
     writing.write(tree, path)
     time, known = tree.to_dataset()["time"].values, tree.attrs
-    told = [
+    report = [
         f"{time.size} samples",
         with_unit(time[-1] - time[0], "s", 6),
         f"noise {with_unit(known['noise'], 'N', 3)}",
@@ -94,7 +96,7 @@ def trace(
     ]
     if math.isfinite(known["setup_period"]):
         period = with_unit(known["setup_period"], "s", 3)
-        told.insert(3, f"period of the setup {period} ({known['setup_period_origin']})")
-    typer.echo(f"{path}: {', '.join(told)}", err=True)
+        report.insert(3, f"period of the setup {period} ({known['setup_period_origin']})")
+    typer.echo(f"{path}: {', '.join(report)}", err=True)
     if known["comment"]:
         typer.echo(f"{path}: {known['comment']}", err=True)

@@ -18,7 +18,7 @@ from mesoslip.configuration.keys import key_kind
 from mesoslip.execution.newest import Newest
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import CONTROLS, STEPS, values
-from mesoslip.explorer.following import Pace, explored, follow
+from mesoslip.explorer.live_run import Pace, explored, run_live
 from mesoslip.explorer.pictures import Theories, motion, theory
 from mesoslip.explorer.session import Session
 from mesoslip.simulation.realization import Realization
@@ -60,7 +60,7 @@ def brought_by(key):
     return next(
         (control.key, choice)
         for control in CONTROLS
-        for choice, keys in control.beside.items()
+        for choice, keys in control.required.items()
         if key in keys
     )
 
@@ -91,7 +91,7 @@ def test_a_value_as_at_the_start_is_no_change(session):
     assert session.config == session.start
 
 
-def test_what_is_wrong_is_told_at_its_control_until_it_is_right(session):
+def test_what_is_wrong_is_reported_at_its_control_until_it_is_right(session):
     good = session.config
     assert not session.change("contacts.delay", "1 kg")
     assert "expected a quantity" in session.problems["contacts.delay"]
@@ -105,7 +105,7 @@ def test_what_is_wrong_is_told_at_its_control_until_it_is_right(session):
     assert session.config.slider.spring_stiffness == 100.0
 
 
-def test_a_combination_is_told_at_the_control_that_brought_it_about(session):
+def test_a_combination_is_reported_at_the_control_that_brought_it_about(session):
     assert session.change("interaction.lattice", "triangular")
     assert not session.change("run.engine", "me")
     assert "no neighbours" in session.problems["run.engine"]
@@ -114,7 +114,7 @@ def test_a_combination_is_told_at_the_control_that_brought_it_about(session):
     assert "even" in session.problems["interaction.rows"]
 
 
-def test_a_problem_of_a_key_without_a_control_is_told_at_the_one_that_was_changed(session):
+def test_a_problem_of_a_key_without_a_control_is_reported_at_the_one_that_was_changed(session):
     """A duration below the interval of the trace, which has no control."""
     assert not session.change("run.duration", "0.1 ms")
     assert session.problems["run.duration"].startswith("output.interval")
@@ -122,7 +122,7 @@ def test_a_problem_of_a_key_without_a_control_is_told_at_the_one_that_was_change
 
 @pytest.mark.parametrize("text", ["", "'", "1\nx = 2", "[1]", "{}", "nan", "1e999", "\x00", "∞"])
 @pytest.mark.parametrize("key", ["contacts.delay", "contacts.count", "slider.kind"])
-def test_nonsense_is_told(session, key, text):
+def test_nonsense_is_reported(session, key, text):
     assert not session.change(key, text)
     assert session.problems[key]
 
@@ -152,7 +152,7 @@ def test_contacts_begin_to_age_and_cease_to(session):
     assert session.config == session.start
 
 
-def test_what_the_kernel_refuses_is_told_too(session):
+def test_what_the_kernel_refuses_is_reported_too(session):
     """Such as a law of which no threshold is above the back force."""
     for key, text in (
         ("contacts.ageing.law", "relax"),
@@ -191,7 +191,7 @@ def test_a_run_is_shown_soon_and_at_its_end():
         times.append(time.thread_time() - start)
         parts.append(motion(results).part_done)
 
-    follow(config, Stop(), show)
+    run_live(config, Stop(), show)
     assert parts[-1] == 1.0
     assert parts == sorted(parts)
     # Of computing time, as others may use the machine as well.
@@ -202,7 +202,7 @@ def test_what_is_explored_moves_as_what_is_run():
     """Samples and snapshots do not change the motion."""
     config = Config.load(KLEIN, ["run.duration=3 s"])
     seen = []
-    follow(explored(config), Stop(), seen.append)
+    run_live(explored(config), Stop(), seen.append)
     (mine,), (theirs,) = seen[-1].realizations, run_realizations(config).realizations
     assert mine.breaks == theirs.breaks
     assert mine.slips == pytest.approx(theirs.slips)
@@ -212,7 +212,7 @@ def test_what_is_explored_moves_as_what_is_run():
 def test_every_kind_of_run_is_drawn(kind):
     config = configuration(kind)
     seen = []
-    follow(explored(config), Stop(), lambda results: seen.append(motion(results)))
+    run_live(explored(config), Stop(), lambda results: seen.append(motion(results)))
     drawn = seen[-1]
     for line in (drawn.force, drawn.velocity, drawn.detached):
         assert len(line.x) == len(line.y) > 1
@@ -225,7 +225,7 @@ def test_every_kind_of_run_is_drawn(kind):
 def test_pictures_are_as_long_as_a_picture_is_wide():
     config = explored(Config.load(KLEIN))
     seen = []
-    follow(config, Stop(), lambda results: seen.append(motion(results)))
+    run_live(config, Stop(), lambda results: seen.append(motion(results)))
     drawn = seen[-1]
     assert len(drawn.force.x) < 4000
     # The first spike of Klein's case: 18 uN less the spread of the thresholds.
@@ -244,7 +244,7 @@ def test_the_line_of_the_spring_touches_the_curve():
     # In µN and nm, so that the slope is in 1000 N/m.
     slope = np.diff(shown.spring.y) / np.diff(shown.spring.x)
     assert slope == pytest.approx(-0.097)
-    assert "K < K*" in shown.told
+    assert "K < K*" in shown.summary
 
 
 def test_what_has_no_curve_says_so():
@@ -252,13 +252,13 @@ def test_what_has_no_curve_says_so():
     tables = klein_tables(contacts__coupling="equal", contacts__ageing=ageing)
     shown = theory(Config.from_dict(tables))
     assert shown.curve.is_empty
-    assert "age" in shown.told
+    assert "age" in shown.summary
 
 
 def test_a_lattice_is_shown_in_motion():
     config = Config.load(ROOT / "runs" / "source" / "S25d.toml", ["run.duration=2 s"])
     seen = []
-    follow(explored(config), Stop(), lambda results: seen.append(motion(results)))
+    run_live(explored(config), Stop(), lambda results: seen.append(motion(results)))
     lattice = seen[-1].lattice
     assert lattice.loads.shape[1:] == (68, 60)
     assert len(lattice.times) == len(lattice.loads) > 50
@@ -280,7 +280,7 @@ def test_a_run_is_cut_off_by_the_next_one():
 
     def hour(stop):
         begun.set()
-        follow(long, stop, lambda _: None)
+        run_live(long, stop, lambda _: None)
         done.append("hour")
 
     worker.submit(hour)
@@ -303,21 +303,21 @@ def test_the_first_picture_comes_though_the_next_change_is_there():
     """So that the picture follows a knob that is being turned."""
     stop, seen = Stop(), []
     stop.set()
-    follow(explored(Config.load(KLEIN, ["run.duration=1000 s"])), stop, seen.append)
+    run_live(explored(Config.load(KLEIN, ["run.duration=1000 s"])), stop, seen.append)
     assert len(seen) == 1
     assert not seen[0].complete
 
 
 def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
-    told, done = [], threading.Event()
-    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_value))
+    reported, done = [], threading.Event()
+    monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_value))
     worker = Newest()
     worker.submit(lambda _: 1 / 0)
-    while not told:
+    while not reported:
         time.sleep(0.01)
     worker.submit(lambda _: done.set())
     assert done.wait(30)
-    assert isinstance(told[0], ZeroDivisionError)
+    assert isinstance(reported[0], ZeroDivisionError)
     worker.close()
 
 
@@ -350,12 +350,12 @@ def test_theory_is_computed_once():
     theories, config = Theories(), Config.load(KLEIN)
     assert theories.known(config) is None
     first, last = theories.compute(config)
-    assert "steady sliding" not in first.told
-    assert "steady sliding" in last.told
+    assert "steady sliding" not in first.summary
+    assert "steady sliding" in last.summary
     assert theories.known(config) is last
     assert theories.known(Config.load(KLEIN, ["run.seed=7", "run.duration=3 s"])) is last
     assert theories.known(Config.load(KLEIN, ["slider.stiffness=98 N/m"])) is None
-    assert theory(config).told == last.told
+    assert theory(config).summary == last.summary
 
 
 def test_a_slip_has_both_forces_in_one_unit():
@@ -373,7 +373,7 @@ def test_a_slip_has_both_forces_in_one_unit():
         KLEIN, ["run.duration=2.5 s", *(f"{key}={larger * one}" for key, one in changes.items())]
     )
     seen = []
-    follow(explored(config), Stop(), lambda results: seen.append(motion(results)))
+    run_live(explored(config), Stop(), lambda results: seen.append(motion(results)))
     spring, contact = seen[-1].slip_force, seen[-1].slip_contact_force
     assert spring.y_label == contact.y_label == "force (mN)"
     assert np.max(contact.y) < 1 < np.max(spring.y)
@@ -406,16 +406,16 @@ def test_values_are_those_that_have_a_meaning(klein):
 
 def test_a_missing_library_is_named(command, monkeypatch):
     monkeypatch.setattr("mesoslip.command_line.explore.find_spec", lambda _: None)
-    status, out, told = command("explore", KLEIN, "--no-browser")
+    status, out, errors = command("explore", KLEIN, "--no-browser")
     assert (status, out) == (2, "")
-    assert "mesoslip[explore]" in told
-    assert len(told.splitlines()) == 1
+    assert "mesoslip[explore]" in errors
+    assert len(errors.splitlines()) == 1
 
 
-def test_what_cannot_be_explored_is_told(command):
-    status, _, told = command("explore", KLEIN, "--no-browser", "--set", "contacts.delay=1kg")
+def test_what_cannot_be_explored_is_reported(command):
+    status, _, errors = command("explore", KLEIN, "--no-browser", "--set", "contacts.delay=1kg")
     assert status == 2
-    assert "contacts.delay" in told
+    assert "contacts.delay" in errors
 
 
 def test_the_page_is_of_every_control():
@@ -501,7 +501,7 @@ def test_a_run_too_large_for_a_page_is_refused_at_its_control(session, monkeypat
     assert message.count(".") == 0
     assert session.config is before
     assert session.change("contacts.count", "4000")
-    monkeypatch.setattr("mesoslip.explorer.following.free_memory", lambda: 1e6)
+    monkeypatch.setattr("mesoslip.explorer.live_run.free_memory", lambda: 1e6)
     assert not session.change("contacts.count", "100000")
     assert "GiB" in session.problems["contacts.count"]
     assert session.config.contacts.count == 4000
@@ -530,11 +530,11 @@ def test_memory_of_a_run_that_was_replaced_is_returned():
     worker, peaks, done = Newest(), [], threading.Event()
     before = resident()
     try:
-        worker.submit(lambda stop: follow(large, stop, lambda _: peaks.append(resident())))
+        worker.submit(lambda stop: run_live(large, stop, lambda _: peaks.append(resident())))
         end = time.monotonic() + 60
         while not peaks and time.monotonic() < end:
             time.sleep(0.01)
-        worker.submit(lambda stop: follow(small, stop, lambda _: None))
+        worker.submit(lambda stop: run_live(small, stop, lambda _: None))
         worker.submit(lambda _: done.set())
         assert done.wait(60)
     finally:

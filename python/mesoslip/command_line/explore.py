@@ -67,4 +67,4 @@ def explore(
         typer.echo(f"mesoslip explore: {address} (Ctrl-C ends it)")
 
     with suppress(KeyboardInterrupt):
-        serve(start, source, port=port, opens=browser, tell=report)
+        serve(start, source, port=port, opens=browser, report=report)

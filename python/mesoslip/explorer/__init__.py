@@ -1,6 +1,6 @@
 """The explorer: a page on which a person turns knobs and sees the motion change.
 
-`controls` says what can be changed, `session` holds what was changed, `following` runs it, and
-`pictures` makes numbers to draw of it. None of them knows the page, which is `view`, served by
-`server`.
+`controls` defines the knobs, `session` has the changes and the errors, `live_run` runs, and
+`pictures` computes the numbers that are drawn. None of them depends on the page, which is `view`,
+served by `server`.
 """

@@ -1,4 +1,4 @@
-"""What can be changed on the page: keys of the configuration, with ranges and choices."""
+"""The controls of the page: keys of the configuration, with ranges and choices."""
 
 from __future__ import annotations
 
@@ -16,35 +16,34 @@ from mesoslip.quantities import with_unit
 
 # Positions of a slider on the page.
 STEPS = 200
-# What a choice is called that leaves out a table.
+# Name of the choice that omits a table.
 NONE = "none"
 
 
 @dataclass(frozen=True)
 class Control:
-    """A key that can be changed.
+    """A key with a control.
 
     Attributes
     ----------
     key
-        Its dotted name.
+        Dotted name of the key.
     label
-        What it is called on the page.
+        Name on the page.
     group
         Heading under which it stands.
     decades
-        How far the range goes to both sides of the value at the start, in powers of ten; 0 if the
-        range is linear.
+        Range to each side of the value at the start, in powers of ten; 0 for a linear range.
     range
-        Of a linear range the ends, of another one those it must not pass, in SI.
+        Ends of a linear range, or bounds of a logarithmic one, in SI.
     usual
-        Where a range of decades is about if the value at the start is zero, in SI.
+        Center of a logarithmic range if the value at the start is zero, in SI.
     choices
-        What it may be, if it is no number.
-    told
-        What choices are called on the page, if not as in a file.
-    beside
-        Keys that a choice needs, and what they are if they are not given.
+        Possible values of a key that is no number.
+    choice_labels
+        Names of choices on the page, if other than in a file.
+    required
+        Keys that a choice requires, with their default values.
     """
 
     key: str
@@ -54,8 +53,8 @@ class Control:
     range: tuple[float, float] = (0.0, math.inf)
     usual: float = 1.0
     choices: tuple[str, ...] = ()
-    told: Mapping[str, str] = field(default_factory=dict)
-    beside: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    choice_labels: Mapping[str, str] = field(default_factory=dict)
+    required: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     @property
     def unit(self) -> str:
@@ -65,17 +64,17 @@ class Control:
 
     @property
     def is_whole(self) -> bool:
-        """Whether it takes whole numbers."""
+        """Whether values are whole numbers."""
         kind = key_kind(self.key)
         return kind is not None and kind.is_whole
 
     def scale(self, start: object) -> Scale:
-        """The positions of a slider for it, given the value at the start.
+        """The scale of its slider, given the value at the start.
 
         Raises
         ------
         TypeError
-            If it takes no numbers.
+            If it has choices.
         """
         if self.choices:
             raise TypeError(f"{self.key} has choices, not a range")
@@ -84,11 +83,11 @@ class Control:
         if self.decades:
             factor = 10**self.decades
             low, high = max(low, given / factor), min(high, given * factor)
-        # What the file says is always in the range.
+        # The value in the file is always in the range.
         return Scale(min(low, given), max(high, given), bool(self.decades), self.is_whole)
 
     def text(self, value: float) -> str:
-        """A value in SI as it is written, such as "0.5 ms"."""
+        """A value in SI as text, such as "0.5 ms"."""
         if self.is_whole:
             return str(round(value))
         return with_unit(value, self.unit, 3)
@@ -113,7 +112,7 @@ class Scale:
         return float(round(value)) if self.is_whole else value
 
     def position(self, value: float) -> int:
-        """The position nearest to a value; an end for what is beyond it."""
+        """The position nearest to a value; the nearer end for values out of range."""
         if self.high <= self.low:
             return 0
         value = min(max(value, self.low), self.high)
@@ -142,14 +141,14 @@ CONTROLS = (
         "contacts are",
         "Drive and run",
         choices=("eq", "me"),
-        told={"eq": "N, one by one", "me": "N → ∞, the master equation"},
+        choice_labels={"eq": "N, one by one", "me": "N → ∞, the master equation"},
     ),
     Control(
         "slider.kind",
         "kind",
         "Slider",
         choices=tuple(SLIDERS),
-        beside={"layered": {"slider.layers": "8"}},
+        required={"layered": {"slider.layers": "8"}},
     ),
     Control("slider.stiffness", "spring K", "Slider", 2),
     Control("slider.mass", "mass M", "Slider", 2),
@@ -172,8 +171,8 @@ CONTROLS = (
         "law",
         "Ageing",
         choices=(NONE, "log", "relax"),
-        told={"log": "thresholds grow as a logarithm", "relax": "thresholds relax"},
-        beside={
+        choice_labels={"log": "thresholds grow as a logarithm", "relax": "thresholds relax"},
+        required={
             "log": {
                 "contacts.ageing.time": "1 ms",
                 "contacts.ageing.growth": "0.05",
@@ -198,7 +197,7 @@ CONTROLS = (
         "lattice",
         "Interaction",
         choices=(NONE, *LATTICES),
-        beside={name: _lattice(60, 68) for name in LATTICES},
+        required={name: _lattice(60, 68) for name in LATTICES},
     ),
     Control("interaction.strength", "strength ξ", "Interaction", range=(0, 1)),
     Control("interaction.columns", "columns", "Interaction", range=(4, 200)),
@@ -206,16 +205,16 @@ CONTROLS = (
 )
 BY_KEY = {control.key: control for control in CONTROLS}
 
-# Controls that stand for a table as a whole: they are there without it.
-FOR_TABLES = ("contacts.ageing.law", "interaction.lattice")
-# What a lattice counts is not changed beside it.
-COUNTED = ("interaction.columns", "interaction.rows", "contacts.count")
+# Controls of whole tables: they are shown without the table too.
+TABLE_CONTROLS = ("contacts.ageing.law", "interaction.lattice")
+# Keys that the size of a lattice determines, or that determine it.
+LATTICE_SIZE = ("interaction.columns", "interaction.rows", "contacts.count")
 
 
 def values(config: Config) -> dict[str, object]:
-    """Values of the controls that have a meaning for a configuration, in SI, by key."""
+    """Values of the controls that apply to a configuration, in SI, by key."""
     given = flat(config)
-    for key in FOR_TABLES:
+    for key in TABLE_CONTROLS:
         given.setdefault(key, NONE)
     if config.interaction is not None:
         given.pop("contacts.count")

@@ -1,4 +1,4 @@
-"""The pictures of the page: lines in figures, and a lattice in motion."""
+"""The figures of the page: lines, and an animated lattice."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from bokeh.models.ui import UIElement
 from bokeh.models.widgets import Div, Slider, Toggle
 from bokeh.plotting import figure
 
-from mesoslip.explorer.following import Pace
 from mesoslip.explorer.knobs import set_changed
+from mesoslip.explorer.live_run import Pace
 from mesoslip.explorer.pictures import Lattice, Line, Motion, Theory
 from mesoslip.quantities import with_unit
 
@@ -27,8 +27,8 @@ FRAME_MILLISECONDS = 120
 FIRST, SECOND = "#1f3b6f", "#c2571a"
 # Room for the numbers of an axis, so that axes one below the other are of one length [px].
 LEFT, RIGHT = 64, 12
-# Tells that a picture was drawn: figures draw in the next frame of the browser.
-TELL_DRAWN = """
+# Reports that a picture was drawn: figures draw in the next frame of the browser.
+ACKNOWLEDGE = """
 requestAnimationFrame(() => requestAnimationFrame(() => { drawn.tags = [...cb_obj.tags] }))
 """
 
@@ -90,7 +90,7 @@ class MotionView:
 
     Attributes
     ----------
-    title, told, plots
+    title, summary, plots
         Heading, regime and numbers, and the figures.
     now
         Line at the time of the lattice that is shown.
@@ -100,9 +100,9 @@ class MotionView:
     Parameters
     ----------
     prefix
-        What the names of its models begin with.
+        Prefix of the names of its models.
     title, color
-        Of what it shows.
+        Heading, and color of the lines.
     drawn
         Called when the browser has drawn a picture.
     """
@@ -112,7 +112,7 @@ class MotionView:
         self._count = 0
         self._range = Range1d(start=0, end=1)
         self.title = Div(text=f"<b>{html.escape(title)}</b>", name=f"{prefix}title")
-        self.told = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
+        self.summary = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
         self.now = Span(location=0, dimension="height", line_color="gray", visible=False)
         self.force = Plot(
             f"{prefix}force", "Spring force", {"force": color}, 210, x_range=self._range
@@ -140,15 +140,15 @@ class MotionView:
             drawn()
 
         acknowledged.on_change("tags", was_drawn)
-        self.told.js_on_change("tags", CustomJS(args={"drawn": acknowledged}, code=TELL_DRAWN))
+        self.summary.js_on_change("tags", CustomJS(args={"drawn": acknowledged}, code=ACKNOWLEDGE))
 
     @property
     def roots(self) -> list[UIElement]:
-        """What stands on the page."""
-        return [self.title, self.told, *(plot.figure for plot in self.plots)]
+        """The models on the page."""
+        return [self.title, self.summary, *(plot.figure for plot in self.plots)]
 
     def show(self, shown: Motion) -> None:
-        """Draw what a run has come to; what it has not yet come to is grey."""
+        """Draw a run as far as it is done; the rest of the time axis is grey."""
         self.force.show(force=shown.force)
         self.velocity.show(velocity=shown.velocity)
         self.detached.show(detached=shown.detached)
@@ -159,13 +159,15 @@ class MotionView:
         reached = shown.force.x[-1] if len(shown.force.x) else 0.0
         set_changed(self._done, left=float(reached), visible=shown.part_done < 1)
         numbers = ", ".join(f"{name} {value}" for name, value in shown.numbers)
-        set_changed(self.told, text=f"<b>{html.escape(shown.regime)}</b><br>{html.escape(numbers)}")
+        set_changed(
+            self.summary, text=f"<b>{html.escape(shown.regime)}</b><br>{html.escape(numbers)}"
+        )
         self._count += 1
-        self.told.tags = [self._count]
+        self.summary.tags = [self._count]
 
 
 class TheoryView:
-    """The force curve of the master equation, and what follows from it."""
+    """The force curve of the master equation, and predictions from it."""
 
     def __init__(self) -> None:
         self.plot = Plot(
@@ -178,8 +180,8 @@ class TheoryView:
         )
         self._critical = ColumnDataSource({"x": [], "y": []}, name="curve:X_c")
         self.plot.figure.scatter("x", "y", source=self._critical, size=9, color=SECOND)
-        self.told = Div(text="", name="theory", sizing_mode="stretch_width")
-        self.roots: list[UIElement] = [self.plot.figure, self.told]
+        self.summary = Div(text="", name="theory", sizing_mode="stretch_width")
+        self.roots: list[UIElement] = [self.plot.figure, self.summary]
 
     def show(self, shown: Theory) -> None:
         """Draw the curve, and the line of slope -K through X_c."""
@@ -206,11 +208,11 @@ class TheoryView:
             set_changed(self.plot.figure.xaxis[0], axis_label=shown.curve.x_label)
             set_changed(self.plot.figure.yaxis[0], axis_label=shown.curve.y_label)
         numbers = ", ".join(f"{name} = {value}" for name, value in shown.numbers)
-        set_changed(self.told, text=f"{html.escape(numbers)}<br>{html.escape(shown.told)}")
+        set_changed(self.summary, text=f"{html.escape(numbers)}<br>{html.escape(shown.summary)}")
 
 
 class LatticeView:
-    """A lattice of contacts in motion: how near each is to breaking."""
+    """An animated lattice: the load of each contact, its force over its threshold."""
 
     def __init__(self, document: Document, now: Span) -> None:
         self._document, self._now = document, now
@@ -233,47 +235,47 @@ class LatticeView:
         look: dict[str, Any] = {"color_mapper": mapper}
         self._figure.image(source=self._source, **look)
         self._figure.add_layout(ColorBar(color_mapper=mapper, width=8), "right")
-        self._place = Slider(
+        self._snapshot = Slider(
             start=0, end=1, step=1, value=0, title="snapshot", name="snapshot", width=280
         )
-        self._place.on_change("value", lambda _a, _o, place: self._draw(int(place)))
-        self._moving = Toggle(label="▶ move", name="moving", width=90)
+        self._snapshot.on_change("value", lambda _a, _o, number: self._draw(int(number)))
+        self._moving = Toggle(label="▶ play", name="moving", width=90)
         self._moving.on_change("active", lambda _a, _o, is_active: self._move(is_active))
-        self._told = Div(text="", name="lattice:told", width=400)
+        self._caption = Div(text="", name="lattice:caption", width=400)
         self.roots: list[UIElement] = [
             self._figure,
-            self._told,
-            row(self._moving, self._place, name="lattice:moving"),
+            self._caption,
+            row(self._moving, self._snapshot, name="lattice:moving"),
         ]
 
     def show(self, lattice: Lattice | None) -> None:
-        """Show snapshots, first the last one; nothing without a lattice."""
+        """Show snapshots, beginning with the last one; nothing without a lattice."""
         self._lattice = lattice
         set_changed(self._now, visible=lattice is not None)
         if lattice is None:
             set_changed(self._moving, active=False)
             return
         last = len(lattice.times) - 1
-        set_changed(self._place, end=max(1, last))
-        if self._place.value != last and not self._moving.active:
-            self._place.value = last
+        set_changed(self._snapshot, end=max(1, last))
+        if self._snapshot.value != last and not self._moving.active:
+            self._snapshot.value = last
         else:
-            self._draw(min(int(self._place.value), last))
+            self._draw(min(int(self._snapshot.value), last))
 
-    def _draw(self, place: int) -> None:
+    def _draw(self, number: int) -> None:
         lattice = self._lattice
         if lattice is None:
             return
-        place = min(place, len(lattice.times) - 1)
-        loads = lattice.loads[place]
+        number = min(number, len(lattice.times) - 1)
+        loads = lattice.loads[number]
         rows, columns = loads.shape
         data = {"image": [loads], "x": [0], "y": [0], "dw": [columns], "dh": [rows]}
         self._source.data = data
-        told = f"at {with_unit(float(lattice.times[place]), 's', 4)}; grey: detached"
-        if lattice.avalanches[place]:
-            told += f"; just before: an avalanche of {lattice.avalanches[place]}"
-        set_changed(self._told, text=told)
-        set_changed(self._now, location=float(lattice.places[place]))
+        caption = f"at {with_unit(float(lattice.times[number]), 's', 4)}; grey: detached"
+        if lattice.avalanches[number]:
+            caption += f"; largest avalanche since the last snapshot: {lattice.avalanches[number]}"
+        set_changed(self._caption, text=caption)
+        set_changed(self._now, location=float(lattice.positions[number]))
 
     def _move(self, is_active: bool) -> None:
         if self._beat is not None:
@@ -284,4 +286,4 @@ class LatticeView:
 
     def _step(self) -> None:
         if self._lattice is not None:
-            self._place.value = (int(self._place.value) + 1) % len(self._lattice.times)
+            self._snapshot.value = (int(self._snapshot.value) + 1) % len(self._lattice.times)

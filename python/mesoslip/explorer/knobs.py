@@ -1,4 +1,4 @@
-"""The knobs of the page: a field, a slider, and what is wrong with a value."""
+"""The knobs of the page: a field, a slider, and the error of a value."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ FLAT = """
 label, .bk-input-group > label { white-space: nowrap; overflow: visible; }
 """
 CHANGED: dict[str, str | None] = {"background-color": "#fff3cd", "border-radius": "4px"}
-# A style that is only left out stays as it was in the browser.
+# A style that is omitted stays in the browser.
 UNCHANGED: dict[str, str | None] = {"background-color": "transparent", "border-radius": "4px"}
 RED: dict[str, str | None] = {"color": "#b00020"}
 PLAIN: dict[str, str | None] = {"color": "inherit"}
 
 
 def set_changed(model: Any, **properties: Any) -> None:
-    """Set properties of a model that are not so already, as each of them is sent to
-    the browser, which then draws it anew.
+    """Set those properties of a model that differ: each one that is set is sent to the browser,
+    which draws it again.
     """
     for name, value in properties.items():
         if getattr(model, name) != value:
@@ -37,11 +37,11 @@ def set_changed(model: Any, **properties: Any) -> None:
 
 
 class ControlView:
-    """A control on the page: a slider or a choice, the value as text, and what is wrong with it."""
+    """A control on the page: a slider or a choice, the value as text, and its error."""
 
     def __init__(self, control: Control, session: Session, change: Callable[[str, str], None]):
         self.control, self._session, self._change = control, session, change
-        # What the page shows: a change to that is no wish of a person.
+        # Values that the page itself sets: a change to them is not one by the user.
         self._text, self._position = "", 0.0
         self._scale = None if control.choices else control.scale(_number(session, control.key))
         self.message = Div(
@@ -51,7 +51,7 @@ class ControlView:
         self._slider: Slider | None = None
         if self._scale is None:
             options: list[Any] = [
-                (one, control.told.get(one, one))
+                (one, control.choice_labels.get(one, one))
                 for one in control.choices
                 if one != NONE or self._may_lack
             ]
@@ -98,7 +98,7 @@ class ControlView:
             self._change(self.control.key, text)
 
     def show(self) -> None:
-        """Show the value, whether it is changed, and what is wrong with it."""
+        """Show the value, whether it is changed, and its error."""
         session, key = self._session, self.control.key
         is_changed = session.is_changed(key)
         before = session.start_text(key) or "not given"
@@ -109,13 +109,13 @@ class ControlView:
         value = _number(session, key)
         if self._slider is not None and self._scale is not None and key not in session.problems:
             self._position = self._slider.value
-            # Where a hand has put it, it stays: the text is rounded, and further on already.
+            # A slider stays where the user moved it: the text is rounded, and may lag behind.
             is_there = self.control.text(self._scale.value(self._position)) == self._text
             if isinstance(value, int | float) and not is_there:
                 self._position = self._scale.position(float(value))
             set_changed(self._slider, value=self._position)
-        told = session.problems.get(key, "")
-        set_changed(self.message, text=html.escape(told), visible=bool(told))
+        message = session.problems.get(key, "")
+        set_changed(self.message, text=html.escape(message), visible=bool(message))
         set_changed(self.layout, visible=key in session.shown)
 
 

@@ -1,4 +1,4 @@
-"""Numbers to draw of a run, and of what theory says of it."""
+"""Numbers to draw: of a run, and of its theory."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Parts of a line of each of which the extremes are drawn.
+# Parts of a line; the extremes of each are drawn.
 PARTS = 500
-# Least part of the time axis that is drawn of a run that goes on.
-LEAST_PART = 0.2
+# Minimum part of the time axis that a run under way fills.
+MIN_PART = 0.2
 # Points of the force curve that are drawn, its length in mean breaking stretches, its precision: a
 # picture needs no more, and a person does not wait for it.
 CURVE_POINTS = 800
 CURVE_LENGTH = 6.0
 CURVE_TOLERANCE = 1e-6
 # Work that the stability of steady sliding may take.
-MOST_WORK = 10_000
-# Configurations of which it is kept what theory says.
-MOST_THEORIES = 50
+MAX_WORK = 10_000
+# Configurations whose theory is kept.
+MAX_THEORIES = 50
 # Largest picture of the lattice, in contacts along a side.
-MOST_PLACES = 300
+MAX_SITES = 300
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line in a picture: what is along its axes, and in which units."""
+    """A line in a picture, in the units of its axes."""
 
     x: Array
     y: Array
@@ -74,8 +74,8 @@ class Lattice:
     ----------
     times
         When they were taken [s].
-    places
-        The same in the unit of the pictures of the motion.
+    positions
+        The same in the unit of the time axis.
     loads
         Force over threshold of each contact, NaN if it is detached, shape (snapshots, rows,
         columns).
@@ -84,14 +84,14 @@ class Lattice:
     """
 
     times: Array
-    places: Array
+    positions: Array
     loads: NDArray[np.float32]
     avalanches: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What a run has come to.
+    """A run, as far as it is done.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Motion:
     regime
         Which motion it is, in words.
     numbers
-        Names and values of what else is told.
+        Names and values of further results.
     lattice
         Snapshots, if contacts are on a lattice.
     part_done
@@ -128,7 +128,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Theory:
-    """What theory says before anything is run.
+    """Predictions of theory.
 
     Attributes
     ----------
@@ -138,29 +138,29 @@ class Theory:
         The line of slope -K through the point where the slider becomes unstable.
     critical
         That point, X_c and its force, in the units of the curve; None if there is none.
-    told
-        In words: the verdict, or why there is no curve.
+    summary
+        The verdict in words, or the reason why there is no curve.
     numbers
-        Names and values of what else is told.
+        Names and values of further results.
     """
 
     curve: Line
     spring: Line
     critical: tuple[float, float] | None
-    told: str
+    summary: str
     numbers: tuple[tuple[str, str], ...]
 
 
 def motion(results: Results) -> Motion:
-    """What a run has come to, though it may not be over."""
+    """The pictures of a run, as far as it is done."""
     config, (realization,) = results.config, results.realizations
     tree = build_tree(results)
     extent = Extent(0, parts=PARTS)
     times = times_of(tree)
     reached = float(times[-1]) if len(times) else 0.0
     end = max(config.expected_duration, reached)
-    if 0 < reached < LEAST_PART * end:
-        end = reached / LEAST_PART
+    if 0 < reached < MIN_PART * end:
+        end = reached / MIN_PART
     along = scale_for(end, "s")
     force, velocity, detached = (
         _line(tree, name, extent, extent.window(tree) if len(times) else (0.0, 0.0), along)
@@ -176,7 +176,7 @@ def motion(results: Results) -> Motion:
         numbers.append(("energy balance", f"to {abs(realization.energy_residual):.0e}"))
     if config.has_avalanches:
         numbers.insert(1, ("avalanches", str(realization.avalanche_count)))
-    told = results_of(regimes(tree))[0].summary
+    summary = results_of(regimes(tree))[0].summary
     return Motion(
         force,
         velocity,
@@ -184,7 +184,7 @@ def motion(results: Results) -> Motion:
         close,
         close_contact,
         end / along.size,
-        told if results.complete else f"{told} (so far)",
+        summary if results.complete else f"{summary} (so far)",
         tuple(numbers),
         _lattice(tree, along),
         1.0 if results.complete else realization.part_done,
@@ -193,7 +193,7 @@ def motion(results: Results) -> Motion:
 
 
 def _progress(results: Results) -> str:
-    """How much of a run is done, and how long the rest takes."""
+    """The part of a run that is done, and the remaining time."""
     if results.complete:
         return "done"
     part = results.realizations[0].part_done
@@ -260,68 +260,68 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
     if data.sizes["snapshot"] == 0:
         return None
     times = data["snapshot_time"].values
-    step = max(1, math.ceil(max(data.sizes["row"], data.sizes["column"]) / MOST_PLACES))
+    step = max(1, math.ceil(max(data.sizes["row"], data.sizes["column"]) / MAX_SITES))
     loads = data["load"].values[:, ::step, ::step].astype(np.float32)
     catalogue = group_of(tree, "avalanches")
-    place = np.searchsorted(times, catalogue["start_time"].values)
+    position = np.searchsorted(times, catalogue["start_time"].values)
     largest = np.zeros(len(times) + 1, dtype=np.int64)
-    np.maximum.at(largest, place, catalogue["size"].values.astype(np.int64))
+    np.maximum.at(largest, position, catalogue["size"].values.astype(np.int64))
     return Lattice(times, times / along.size, loads, largest[:-1])
 
 
 class Theories:
-    """What theory says of the configurations that were looked at last, so that it is not computed
-    again when a knob goes back, or one is turned that it does not depend on.
+    """The theory of recent configurations, so that it is not computed again when a knob returns,
+    or when theory does not depend on it.
     """
 
     def __init__(self) -> None:
         self._known: OrderedDict[str, Theory] = OrderedDict()
 
     def known(self, config: Config) -> Theory | None:
-        """What theory says of a configuration, if it was computed before."""
+        """The theory of a configuration, if it was computed before."""
         return self._known.get(_depends_on(config))
 
     def compute(self, config: Config) -> Iterator[Theory]:
-        """What theory says of a configuration: first the curve alone, which comes soon."""
+        """The theory of a configuration: first the curve alone, which is fast."""
         shown = curve_alone(config)
         yield shown
         shown = with_steady_sliding(config, shown)
         self._known[_depends_on(config)] = shown
-        while len(self._known) > MOST_THEORIES:
+        while len(self._known) > MAX_THEORIES:
             self._known.popitem(last=False)
         yield shown
 
 
 def _depends_on(config: Config) -> str:
-    """What theory depends on, as text."""
+    """The part of a configuration that theory depends on, as text."""
     return config.model_dump_json(exclude={"title": True, "run": True, "output": True})
 
 
 def theory(config: Config) -> Theory:
-    """What theory says of a configuration."""
+    """The theory of a configuration."""
     return with_steady_sliding(config, curve_alone(config))
 
 
 def curve_alone(config: Config) -> Theory:
-    """The force curve and what follows from it, without steady sliding."""
+    """The force curve and its instability, without steady sliding."""
     try:
         curve = ForceCurve(_quick(config))
         drawn, spring, critical, numbers, verdict = _curve(config, curve)
     except MesoslipError as error:
         return Theory(NOTHING, NOTHING, None, str(error), ())
     if config.interaction is not None and config.interaction.strength > 0:
-        verdict = f"without interaction, which the curve cannot have: {verdict}"
+        verdict = f"without interaction: {verdict}"
     return Theory(drawn, spring, critical, verdict, numbers)
 
 
 def with_steady_sliding(config: Config, curve: Theory) -> Theory:
-    """What is known of the curve, and of the stability of steady sliding."""
-    sliding = steady_sliding(config, MOST_WORK)
+    """The theory of a curve together with the stability of steady sliding."""
+    sliding = steady_sliding(config, MAX_WORK)
     if sliding is None:
         return curve
-    told = [curve.told, *([] if sliding.summary is None else [sliding.summary])]
+    summaries = [curve.summary, *([] if sliding.summary is None else [sliding.summary])]
     numbers = (*curve.numbers, ("steady force", with_unit(sliding.force, "N", 4)))
-    return replace(curve, told="; ".join(told), numbers=numbers)
+    return replace(curve, summary="; ".join(summaries), numbers=numbers)
 
 
 def _quick(config: Config) -> Config:

@@ -1,4 +1,4 @@
-"""The server of the page: for this machine alone, and for no other page in its browser."""
+"""The server of the page: it answers this machine only, and no other page in the browser."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from mesoslip.explorer.view import Page
 ADDRESS = "127.0.0.1"
 # Ports that are tried after the one that is wanted.
 MORE_PORTS = 20
-# How soon the runs of a closed tab are ended [ms].
+# Delay after which the runs of a closed tab are ended [ms].
 UNUSED_MILLISECONDS = 3_000
 
-# Bokeh compiles what it is told to do at a click, and styles what it draws; nothing else is let in,
-# and nothing at all from elsewhere.
+# Bokeh compiles the scripts of its widgets and styles its figures; all else is refused, and
+# everything from other hosts.
 POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
@@ -68,7 +68,7 @@ class Pages(Handler):
 
 
 class OnlyHere(AuthProvider):
-    """Who may ask: the page itself, under the address of this machine."""
+    """Allows requests of the page itself, under the address of this machine."""
 
     def __init__(self) -> None:
         self.hosts: set[str] = set()
@@ -80,13 +80,13 @@ class OnlyHere(AuthProvider):
 
     @property
     def login_url(self) -> str:
-        """Nobody can log in: who is refused stays so."""
+        """There is no login: a refusal is final."""
         return "/"
 
     async def _user(self, handler: RequestHandler) -> str:
         headers = handler.request.headers
         origin, site = headers.get("Origin"), headers.get("Sec-Fetch-Site", "none")
-        # A foreign name that leads here has its own name in Host.
+        # A foreign name that resolves to this machine is in Host.
         is_allowed = (
             handler.request.host.lower() in self.hosts
             and (origin is None or urlsplit(origin).netloc.lower() in self.hosts)
@@ -96,7 +96,7 @@ class OnlyHere(AuthProvider):
             raise HTTPError(403)
         handler.set_header("Content-Security-Policy", POLICY)
         handler.set_header("X-Content-Type-Options", "nosniff")
-        # A browser that keeps the page for its way back keeps its runs going, too.
+        # A browser that caches the page for its history would keep its runs going.
         handler.set_header("Cache-Control", "no-store")
         return "here"
 
@@ -107,21 +107,21 @@ def serve(
     *,
     port: int,
     opens: bool,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> None:
     """Serve the page until the program is interrupted.
 
     Parameters
     ----------
     config
-        What the page starts from.
+        Configuration at the start.
     source
-        What the command line calls it.
+        Its name on the command line.
     port
         Port of the loopback address; the first free one from there on.
     opens
         Whether a browser is opened.
-    tell
+    report
         Called with the address of the page.
 
     Raises
@@ -131,7 +131,7 @@ def serve(
     """
     server = make_server(config, source, port)
     address = f"http://{ADDRESS}:{server.port}/"
-    tell(address)
+    report(address)
     if opens:
         IOLoop.current().call_later(0, webbrowser.open, address)
     server.start()
@@ -143,17 +143,17 @@ def serve(
 
 def make_server(config: Config, source: str, port: int) -> Server:
     """A server of the page that is not started; see `serve`."""
-    # What is there stays: the collector of garbage, which runs after each change, leaves it alone.
+    # Objects that exist now stay: the garbage collector, which runs after each change, skips them.
     gc.collect()
     gc.freeze()
 
-    # What the library has to say is for its own developers.
+    # Messages of the libraries are for their developers.
     logging.getLogger("bokeh").setLevel(logging.CRITICAL)
     logging.getLogger("tornado").setLevel(logging.CRITICAL)
 
     # Scripts and styles come from this server, whatever its environment says.
     settings.resources = "server"
-    # Whether models fit together is for tests to check, not for each tab.
+    # The consistency of the models is checked in tests, not for each tab.
     settings.perform_document_validation = False
 
     for one in [0] if port == 0 else range(port, port + MORE_PORTS):

@@ -1,4 +1,4 @@
-"""What a person has changed on the page, and what is wrong with it."""
+"""The changes that were made on the page, and their errors."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import text_of
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.errors import ConfigError, MesoslipError, Problem
-from mesoslip.explorer.controls import BY_KEY, COUNTED, FOR_TABLES, NONE, values
-from mesoslip.explorer.following import runnable
+from mesoslip.explorer.controls import BY_KEY, LATTICE_SIZE, NONE, TABLE_CONTROLS, values
+from mesoslip.explorer.live_run import runnable
 
 
 class Session:
@@ -18,17 +18,17 @@ class Session:
     Attributes
     ----------
     start
-        The configuration without them.
+        The configuration without changes.
     source
-        What the command line calls it.
+        Name of the configuration on the command line.
     changes
         Text of each key that was changed, as for ``--set``.
     config
         The latest configuration that can be run; all changes are in it unless there are problems.
     problems
-        What is wrong, by the key of the control that it is shown at.
+        Errors, by the key of the control that shows them.
     values
-        Values of the controls that have a meaning in ``config``, in SI, by key.
+        Values of the controls that apply to ``config``, in SI, by key.
     """
 
     def __init__(self, start: Config, source: str) -> None:
@@ -47,7 +47,7 @@ class Session:
         key
             Key of a control.
         text
-            Its value as for ``--set``; with that of the start it is not changed any more.
+            Its value as for ``--set``; the value at the start removes the change.
 
         Raises
         ------
@@ -60,14 +60,14 @@ class Session:
             self.changes.pop(key, None)
         else:
             self.changes[key] = text
-        if control.beside:
-            self._lay_beside(key, text)
-        if key in COUNTED:
+        if control.required:
+            self._set_required(key, text)
+        if key in LATTICE_SIZE:
             self._count_lattice()
         return self._check(key)
 
     def reset(self) -> bool:
-        """Take back all changes."""
+        """Remove all changes."""
         self.changes.clear()
         return self._check("")
 
@@ -76,7 +76,7 @@ class Session:
         return text_of(key, self._at_start[key]) if key in self._at_start else ""
 
     def text(self, key: str) -> str:
-        """Value of a key as it is now, right or wrong."""
+        """Current value of a key, valid or not."""
         if key in self.changes:
             return self.changes[key]
         value = self.values.get(key)
@@ -88,7 +88,7 @@ class Session:
 
     @property
     def shown(self) -> list[str]:
-        """Keys of the controls that have a meaning now, and of those that are wrong."""
+        """Keys of the controls that apply, and of those with errors."""
         return [key for key in BY_KEY if key in self.values or key in self.problems]
 
     @property
@@ -99,13 +99,13 @@ class Session:
             words += ["--set", f"{key}={text}"]
         return shlex.join(words)
 
-    def _lay_beside(self, key: str, text: str) -> None:
-        """What a choice needs, and without what it does not know."""
-        needed = BY_KEY[key].beside
+    def _set_required(self, key: str, text: str) -> None:
+        """Add the keys that a choice requires, and remove those that it does not have."""
+        needed = BY_KEY[key].required
         mine = {one for keys in needed.values() for one in keys}
         known = self._at_start
-        if key in FOR_TABLES:
-            # What stands in a table goes with it, and with the choice that it belongs to.
+        if key in TABLE_CONTROLS:
+            # Changes within a table are removed with the table, or with their choice.
             for one in mine.difference(needed.get(text, {})):
                 self.changes.pop(one, None)
         else:
@@ -116,47 +116,49 @@ class Session:
                     del self.changes[one]
         if key in self.changes:
             for one, value in needed.get(text, {}).items():
-                # What goes with a table is given only if the table is.
-                is_given = one in known and (key not in FOR_TABLES or known[key] != NONE)
+                # Keys of a table are given only if the table is.
+                is_given = one in known and (key not in TABLE_CONTROLS or known[key] != NONE)
                 if not is_given:
                     self.changes.setdefault(one, value)
 
     def _count_lattice(self) -> None:
-        """The number of contacts is that of the places of their lattice."""
+        """Set the number of contacts to that of the sites of the lattice."""
         try:
-            places = int(self.text("interaction.columns")) * int(self.text("interaction.rows"))
+            sites = int(self.text("interaction.columns")) * int(self.text("interaction.rows"))
         except ValueError:
             return
-        self.changes["contacts.count"] = str(places)
-        if places == self.start.contacts.count:
+        self.changes["contacts.count"] = str(sites)
+        if sites == self.start.contacts.count:
             del self.changes["contacts.count"]
 
     def _check(self, last: str) -> bool:
-        """Lay all changes over the start, and keep the result if it can be run."""
+        """Apply all changes to the start, and keep the result if it can be run."""
         self.problems = {}
         try:
             config = self.start.replace(*(f"{key}={text}" for key, text in self.changes.items()))
             runnable(config)
         except ConfigError as error:
             for problem in error.problems:
-                key = self._place(problem, last)
-                told = problem.message if key == problem.key else f"{problem.key} {problem.message}"
+                key = self._control_of(problem, last)
+                message = (
+                    problem.message if key == problem.key else f"{problem.key} {problem.message}"
+                )
                 self.problems[key] = "; ".join(
-                    part for part in (self.problems.get(key), told) if part
+                    part for part in (self.problems.get(key), message) if part
                 )
         except MesoslipError as error:
             self.problems[last] = str(error)
         else:
             self.config = config
             self.values = values(config)
-            # What is written otherwise, as 500 us for 0.5 ms, is not changed.
+            # Another notation of the same value, as 500 us for 0.5 ms, is no change.
             for key in list(self.changes):
                 if key in self.values and self.values[key] == self._at_start.get(key):
                     del self.changes[key]
         return not self.problems
 
-    def _place(self, problem: Problem, last: str) -> str:
-        """The control that a problem is shown at: its own, or else the one that was changed."""
+    def _control_of(self, problem: Problem, last: str) -> str:
+        """The control that shows an error: its own if it is shown, else the one changed last."""
         is_there = problem.key in self.values or problem.key in self.changes
         if problem.key == "contacts.count" and self.text("interaction.lattice") != NONE:
             # The number of contacts is that of the lattice, and has no control.

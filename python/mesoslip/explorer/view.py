@@ -1,7 +1,7 @@
-"""The page: knobs on the left, pictures on the right. What it shows is made elsewhere.
+"""The page: knobs on the left, pictures on the right. `pictures` computes the numbers.
 
-Each piece stands on the page by itself, where `page.html` has its place: what is drawn anew is then
-that piece, and not all of the page.
+Each piece is a root of its own, placed by `page.html`: a change draws that piece again, and not the
+whole page.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from mesoslip.execution.newest import Newest
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import BY_KEY
 from mesoslip.explorer.figures import FIRST, SECOND, LatticeView, MotionView, TheoryView
-from mesoslip.explorer.following import explored, follow, runnable
 from mesoslip.explorer.knobs import PLAIN, RED, ControlView, set_changed
+from mesoslip.explorer.live_run import explored, run_live, runnable
 from mesoslip.explorer.pictures import Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
 from mesoslip.output.writing import write_results
 from mesoslip.simulation.runner import Results
 
-# How long theory waits for the next change, after a picture was drawn [s].
+# Time that theory waits for another change after a picture was drawn [s].
 REST = 0.15
-# Tag of the status of what cannot be run; otherwise the part of the run that is drawn.
+# Tag of the status if the run is refused; otherwise the part of the run that is drawn.
 REFUSED = -1
 
-# The browser saves what the server has put into a source, under the name that it has been given.
+# The browser saves the content of a source under the name in its tags.
 SAVE = """
 const content = cb_obj.data.content
 if (content.length == 0) return
@@ -59,16 +59,16 @@ navigator.clipboard.writeText(command.value).then(() => {
 COMMAND = """
 .bk-input { height: 26px; min-height: 26px; padding: 0 6px; font-family: monospace; color: #222; }
 """
-# The page has room for what is there: places are those of the style sheet.
+# The page has room for the parts that are shown; the style sheet has their places.
 ARRANGE = "document.querySelector('main').className = cb_obj.tags.join(' ')"
 
-# What is said when the program does not answer any more, and taken back when it does.
+# Shows a message when the connection to the program is lost, and hides it afterwards.
 LOST = "document.body.classList.add('lost')"
 FOUND = "document.body.classList.remove('lost')"
 
 
 class Page:
-    """A page of its own for each tab, with its own changes and its own runs."""
+    """The page of one tab, with its own changes and runs."""
 
     def __init__(self, document: Document, start: Config, source: str) -> None:
         self._document = document
@@ -99,7 +99,9 @@ class Page:
         self._limit.on_change("active", lambda _a, _o, _n: self._update())
         self._limit_message = Div(visible=False, styles=RED, name="limit:message")
         self._motion = MotionView("", "N contacts", FIRST, self._explain)
-        self._beside = MotionView("limit:", "N → ∞, the master equation", SECOND, lambda: None)
+        self._limit_motion = MotionView(
+            "limit:", "N → ∞, the master equation", SECOND, lambda: None
+        )
         self._theory = TheoryView()
         self._lattice = LatticeView(document, self._motion.now)
         document.title = f"mesoslip explore: {start.title or source}"
@@ -121,7 +123,7 @@ class Page:
         self._show_controls()
 
     def close(self) -> None:
-        """End all that is under way for the page."""
+        """End the runs of the page."""
         self._is_closed = True
         self._results = None
         for worker in self._workers.values():
@@ -142,7 +144,7 @@ class Page:
             made.append(button)
         copy = Button(label="copy the command", name="copy", width=150)
         copy.js_on_click(CustomJS(args={"command": self._command, "button": copy}, code=COPY))
-        # What has no place on the page is a part of it all the same.
+        # Models without a place on the page belong to its document too.
         arrangement = ColumnDataSource(name="arrangement", tags=[])
         arrangement.js_on_change("tags", CustomJS(code=ARRANGE))
         self._arrangement = arrangement
@@ -150,12 +152,12 @@ class Page:
         self._status.js_on_change("tags", CustomJS(args=held, code=""))
         yield row(*made, copy, self._limit, name="buttons")
         yield from (self._error, self._limit_message, self._command, self._status)
-        for view in (self._motion, self._beside, self._theory, self._lattice):
+        for view in (self._motion, self._limit_motion, self._theory, self._lattice):
             yield from view.roots
 
     @contextmanager
     def _together(self) -> Iterator[None]:
-        """Send all that is changed as one message."""
+        """Send all changes as one message."""
         self._document.hold("combine")
         try:
             yield
@@ -195,27 +197,27 @@ class Page:
             self._start_limit(self.session.config)
 
     def _start_limit(self, config: Config) -> None:
-        """Run the same with infinitely many contacts beside it, if that is wanted and possible."""
-        told = ""
+        """Run the same with infinitely many contacts too, if that is wanted and possible."""
+        message = ""
         is_wanted = bool(self._limit.active)
         self._workers["limit"].cancel()
         if is_wanted:
             try:
                 self._start("limit", runnable(config.replace({"run.engine": "me"})))
             except ConfigError as error:
-                told = "N → ∞: " + "; ".join(one.message for one in error.problems)
-        set_changed(self._limit_message, text=html.escape(told), visible=bool(told))
-        self._arrange(beside=is_wanted and not told)
+                message = "N → ∞: " + "; ".join(one.message for one in error.problems)
+        set_changed(self._limit_message, text=html.escape(message), visible=bool(message))
+        self._arrange(beside=is_wanted and not message)
 
     def _arrange(self, **parts: bool) -> None:
-        """Make room on the page for parts, or take it away."""
+        """Show or hide parts of the page."""
         there = [one for one in self._arrangement.tags if parts.get(one, True)]
         there += [one for one, is_there in parts.items() if is_there and one not in there]
         set_changed(self._arrangement, tags=there)
 
     def _start(self, name: str, config: Config) -> None:
         turn = self._turn
-        view = self._motion if name == "run" else self._beside
+        view = self._motion if name == "run" else self._limit_motion
         show = self._show_motion if name == "run" else self._show_limit
 
         def job(stop: Stop) -> None:
@@ -226,18 +228,18 @@ class Page:
                 self._publish(show, turn, shown)
 
             try:
-                follow(config, stop, look)
+                run_live(config, stop, look)
             except MesoslipError as error:
                 self._publish(self._fail, turn, str(error))
             except Exception as error:
-                self._publish(self._fail, turn, f"the program has failed: {error!r}")
+                self._publish(self._fail, turn, f"internal error: {error!r}")
                 raise
 
         self._workers[name].submit(job)
 
     def _explain(self) -> None:
-        """Have theory computed of what was drawn, unless that is done: it waits until there is a
-        picture, as that is what a person waits for.
+        """Compute the theory of the run that was drawn, unless it is known. It starts after the
+        picture, which the user waits for.
         """
         turn, config = self._turn, self.session.config
         if self._is_closed or self._shown != turn or self._explained == turn:
@@ -259,19 +261,19 @@ class Page:
         self._workers["theory"].submit(job)
 
     def _publish(self, show: Callable[[int, Any], None], turn: int, shown: object) -> None:
-        """Have the page show something of a turn."""
+        """Show results of a turn on the page."""
         if self._is_closed:
             return
         try:
             self._document.add_next_tick_callback(partial(self._show, show, turn, shown))
         except AttributeError:
-            # The document of a closed tab is taken apart before the page is told.
+            # The document of a closed tab is destroyed before the page is closed.
             context = self._document.session_context
             if context is not None and not context.destroyed:
                 raise
 
     def _show(self, show: Callable[[int, Any], None], turn: int, shown: object) -> None:
-        # A picture of the change before this one is shown, but none that is older than what is.
+        # A picture of the previous change is shown, but none older than the picture on the page.
         if not self._is_closed and turn >= self._shown:
             with self._together():
                 show(turn, shown)
@@ -279,14 +281,14 @@ class Page:
     def _report(self, text: str) -> None:
         set_changed(self._status, text=html.escape(text), styles=PLAIN)
 
-    def _refuse(self, told: str) -> None:
-        """Tell why what is wanted is not run."""
-        set_changed(self._status, text=html.escape(told), styles=RED)
+    def _refuse(self, message: str) -> None:
+        """Report why the configuration is not run."""
+        set_changed(self._status, text=html.escape(message), styles=RED)
         self._status.tags = [self._change_count, REFUSED]
 
-    def _fail(self, turn: int, told: str) -> None:
+    def _fail(self, turn: int, message: str) -> None:
         if turn == self._turn:
-            self._refuse(told)
+            self._refuse(message)
 
     def _show_motion(self, turn: int, shown: tuple[Motion, Results | None]) -> None:
         self._shown = turn
@@ -303,7 +305,7 @@ class Page:
             self._status.tags = [turn, drawn.part_done]
 
     def _show_limit(self, _turn: int, shown: tuple[Motion, Results | None]) -> None:
-        self._beside.show(shown[0])
+        self._limit_motion.show(shown[0])
 
     def _show_theory(self, turn: int, shown: Theory) -> None:
         if turn == self._turn:
@@ -311,13 +313,13 @@ class Page:
 
     def _save(self) -> None:
         if self.session.problems:
-            self._report("what is marked in red cannot be saved")
+            self._report("not saved: correct the values marked in red")
             return
         self._send(f"{self._stem}.toml", self.session.config.to_toml().encode())
 
     def _download(self) -> None:
         if self._results is None:
-            self._report("the run is not over; the output is there when it is")
+            self._report("the output is available when the run is done")
             return
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{self._stem}.nc"
@@ -325,6 +327,6 @@ class Page:
             self._send(path.name, path.read_bytes())
 
     def _send(self, name: str, content: bytes) -> None:
-        """Give the browser a file to save."""
+        """Send a file to the browser to save."""
         self._files.tags = [name]
         self._files.data = {"content": np.frombuffer(content, dtype=np.uint8)}

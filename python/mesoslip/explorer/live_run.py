@@ -1,4 +1,4 @@
-"""A run that is shown while it is under way, and stopped by the next one."""
+"""A run that is drawn while it is computed, and stopped by the next one."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from mesoslip.simulation.memory import check_memory, free_memory
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results
 
-# Work of the first segment, and wall time of later ones [s]: how soon a run stops.
+# Work of the first segment, and wall time of later ones [s]: the delay of a stop.
 FIRST_WORK = 5_000.0
 SEGMENT_SECONDS = 0.03
-# Time after which a run is first shown [s], and the ratio of later times to each other.
+# Time of the first picture [s], and the ratio of the times of later pictures.
 FIRST_PICTURE = 0.1
 PICTURE_RATIO = 2.0
 
-# How long a picture waits for the one before it to be drawn [s].
+# Maximum wait for the previous picture to be drawn [s].
 MAX_WAIT = 1.0
 
 # Samples of a trace, and of the finer traces of slips.
@@ -40,30 +40,30 @@ MAX_MEMORY_PART = 0.5
 
 
 class Pace:
-    """Has a run send a picture only when the one before it was drawn, so that they do not queue."""
+    """Lets a run send a picture only when the previous one was drawn, so that none queue up."""
 
     def __init__(self) -> None:
         self._drawn = threading.Event()
         self._drawn.set()
 
     def sent(self) -> None:
-        """A picture is on its way."""
+        """A picture was sent."""
         self._drawn.clear()
 
     def drawn(self) -> None:
-        """It was drawn."""
+        """The picture was drawn."""
         self._drawn.set()
 
     def wait(self) -> None:
-        """Wait until the last picture was drawn; for a limited time, as a tab in the background
-        draws none.
+        """Wait until the last picture was drawn, for a limited time: a tab in the background draws
+        none.
         """
         self._drawn.wait(MAX_WAIT)
 
 
 def explored(config: Config) -> Config:
-    """A configuration as it is run for the page: one realization, as many samples as pictures show,
-    and snapshots of a lattice. The motion is the same.
+    """A configuration as it is run for the page: one realization, samples for pictures, and
+    snapshots of a lattice. The motion is the same.
 
     Raises
     ------
@@ -104,15 +104,15 @@ def runnable(config: Config) -> Config:
     return wanted
 
 
-def follow(config: Config, stop: StopRequest, show: Callable[[Results], None]) -> None:
-    """Run the first realization of a configuration, and show the results so far now and then.
+def run_live(config: Config, stop: StopRequest, show: Callable[[Results], None]) -> None:
+    """Run the first realization of a configuration, and show the results at intervals.
 
     The first picture is shown even after a stop, so that it follows a knob that is being turned.
 
     Parameters
     ----------
     config
-        What to run.
+        Configuration of the run, see `runnable`.
     stop
         A request to stop after the first picture.
     show

@@ -7,7 +7,7 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.configuration.reading import PathLike, as_path, is_file
 from mesoslip.errors import ConfigError, FileError, Problem
 
 ENDING = ".toml"
@@ -60,7 +60,7 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
         )
         raise ConfigError([Problem("", "example", message, name)])
     target = as_path(file or f"{Path(name).name}{ENDING}")
-    if target.exists():
+    if is_file(target):
         raise FileError(f"{target}: exists already; give another name with -o, or remove it")
     written = []
     source: Path | None = _folder() / f"{name}{ENDING}"
@@ -82,5 +82,5 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
         source = None if base is None else source.parent / base
         if source is not None:
             target = target.with_name(source.name)
-            source = None if target.exists() else source
+            source = None if is_file(target) else source
     return written

@@ -16,6 +16,7 @@ import pytest
 import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables
+from mesoslip.command_line.progress import say
 
 
 @pytest.fixture
@@ -324,3 +325,28 @@ def test_whole_numbers_may_have_an_exponent(short, command):
     other = command("info", short, "--set", "contacts.count=1000", "--json")[1]
     assert told == other
     assert "integer" in command("info", short, "--set", "contacts.count=1.5e0")[2]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("example", "klein", "-o", "{}.toml"),
+        ("run", ROOT / "runs" / "klein.toml", "-o", "{}.nc"),
+        ("slips", "{}.nc"),
+        ("plot", "{}.nc"),
+        ("report", "{}.nc"),
+        ("info", "{}.toml"),
+    ],
+)
+def test_a_name_too_long_for_the_system_is_one_message(arguments, command):
+    name = 300 * "x"
+    status, _, message = command(*(str(one).format(name) for one in arguments))
+    assert status == 2
+    assert message.startswith(f"mesoslip: {name}")
+    assert message.count("\n") == 1
+    assert "File name too long" in message
+
+
+def test_messages_do_not_steer_the_terminal(capsys):
+    say("out\x1b[2J.nc: a slip\nand another one")
+    assert capsys.readouterr().err == "out\\x1b[2J.nc: a slip\nand another one\n"

@@ -70,12 +70,13 @@ def plot(
     ] = None,
 ) -> None:
     """Draw an output, or several in one picture."""
+    from mesoslip.configuration.reading import is_file
     from mesoslip.output import targets
     from mesoslip.plots import plot as plots
 
     first = outputs[0]
     path = figure or first.parent / f"{first.stem or 'output'}.png"
-    there = [one for one in outputs if one.is_file()]
+    there = [one for one in outputs if is_file(one)]
     if there:
         targets.check_writable(path, there)
     plots.plot(

@@ -9,6 +9,8 @@ from contextlib import contextmanager, suppress
 
 import typer
 
+from mesoslip.errors import printable
+
 
 @contextmanager
 def progress_shown(quiet: bool) -> Iterator[Callable[[float], None]]:
@@ -48,7 +50,7 @@ def progress_shown(quiet: bool) -> Iterator[Callable[[float], None]]:
 def say(text: str) -> None:
     """Print a message on stderr; a run continues if its terminal is gone."""
     with suppress(OSError):
-        typer.echo(text, err=True)
+        typer.echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
 def _lines() -> Callable[[float], None]:

@@ -20,12 +20,13 @@ def report(
     ] = None,
 ) -> None:
     """Write a self-contained page about an output, or about several of one command."""
+    from mesoslip.configuration.reading import is_file
     from mesoslip.output import targets
     from mesoslip.reports import report as reports
 
     first = outputs[0]
     path = page or first.parent / f"{first.stem or 'output'}.html"
-    there = [one for one in outputs if one.is_file()]
+    there = [one for one in outputs if is_file(one)]
     if there:
         targets.check_writable(path, there)
     reports.report(outputs, path)

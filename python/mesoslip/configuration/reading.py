@@ -28,6 +28,24 @@ def as_path(path: PathLike) -> Path:
     return Path(path)
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a regular file; false for names that the system refuses, as too long."""
+    return stat.S_ISREG(_mode(path))
+
+
+def is_directory(path: Path) -> bool:
+    """Whether there is a directory; false for names that the system refuses, as too long."""
+    return stat.S_ISDIR(_mode(path))
+
+
+def _mode(path: Path) -> int:
+    """Type and permissions of a file; 0 if there is none."""
+    try:
+        return path.stat().st_mode
+    except (OSError, ValueError):
+        return 0
+
+
 def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
     """Text of a file.
 

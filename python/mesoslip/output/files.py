@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import netCDF4
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError
 from mesoslip.output.file_locks import lock_held
 from mesoslip.output.hdf5 import LOCK, check_links
@@ -47,7 +48,7 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
     import xarray as xr
 
     path = Path(path)
-    if path.is_dir():
+    if is_directory(path):
         raise FileError(f"{path}: is a directory, not an output file")
     check_signature(path)
     with ExitStack() as stack:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output.file_locks import NO_LOCKS, refused_lock
 
@@ -81,7 +82,7 @@ def _target(path: Path) -> Path:
     FileError
         If it is refused.
     """
-    if path.is_dir():
+    if is_directory(path):
         raise FileError(f"{path}: cannot be written: is a directory; give the name of a file in it")
     try:
         target = path.resolve()

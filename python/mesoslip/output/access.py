@@ -1,4 +1,4 @@
-"""What is asked of an output in memory."""
+"""Configuration, groups and origin of an output in memory."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
     Raises
     ------
     FileError
-        If it has none of a run, as a measured trace of which less is known.
+        If it has none of a run, as a measured trace read without one.
     """
     try:
         return Config.from_toml(tree.attrs["configuration"])

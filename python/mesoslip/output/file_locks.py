@@ -14,9 +14,9 @@ NO_LOCKS = (
 
 
 def lock_held(path: Path) -> str:
-    """Why the library may have been refused the lock that it wants of a file; empty if it was not.
+    """The reason why the library may have been refused a lock on a file; empty if it was not.
 
-    It tells this as it tells a damage.
+    The library reports a refused lock like a damaged file.
     """
     try:
         with path.open("rb") as file:
@@ -29,7 +29,7 @@ def lock_held(path: Path) -> str:
 
 
 def refused_lock(folder: Path) -> str:
-    """What the file system of a folder says when it is asked for a lock; empty if it gives it."""
+    """The error of the file system of a folder when asked for a lock; empty if it grants it."""
     with suppress(OSError), tempfile.TemporaryFile(dir=folder) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

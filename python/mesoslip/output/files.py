@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Memory for chunks of each variable that is read; the library's own is 64 MB.
 CHUNK_CACHE = 2**22
 
-# What a damaged file may raise in the libraries that read it.
+# Errors of the libraries that read a damaged file.
 DAMAGES = (
     ArithmeticError,
     AttributeError,
@@ -37,7 +37,7 @@ DAMAGES = (
 
 @contextmanager
 def opened(path: str | Path) -> Iterator[xr.DataTree]:
-    """An output of any command, of which only what is used is read.
+    """An output of any command; data are read when they are used.
 
     Raises
     ------
@@ -64,14 +64,14 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
         try:
             yield tree
         except (OSError, RuntimeError) as error:
-            # What is read later than here may turn out to be damaged.
+            # Data that are read later may be damaged.
             if "NetCDF" in str(error) or "HDF" in str(error):
                 raise FileError(f"{path}: a damaged netCDF-4 file") from error
             raise
 
 
 def _groups(path: Path, stack: ExitStack) -> dict[str, xr.Dataset]:
-    """The groups of a file, with little memory for what is read of them, closed with a stack."""
+    """The groups of a file, with small chunk caches, closed with a stack."""
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
@@ -87,7 +87,7 @@ def _groups(path: Path, stack: ExitStack) -> dict[str, xr.Dataset]:
             while found:
                 group = found.pop(0)
                 found += group.groups.values()
-                # What is read later is read with this lock too.
+                # Data are read later with this lock too.
                 groups[group.path] = xr.open_dataset(store(group, lock=LOCK))
         finally:
             netCDF4.set_chunk_cache(*before)
@@ -117,7 +117,7 @@ def read_run(path: str | Path) -> xr.DataTree:
 
 @contextmanager
 def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
-    """An output of ``mesoslip run``, of which only what is used is read; see `opened`."""
+    """An output of ``mesoslip run``; see `opened`."""
     with opened(path) as tree:
         check_run(tree, path)
         yield tree
@@ -149,7 +149,7 @@ def is_of_another(path: Path, config: Config) -> bool:
 
 
 def remove_partial(path: Path) -> None:
-    """Remove the output of a run or a sweep that was stopped, if that is what is at a path."""
+    """Remove the output of a run or a sweep that was stopped, if there is one at a path."""
     try:
         check_signature(path)
         check_links(path)

@@ -31,9 +31,9 @@ def check_links(path: Path) -> None:
         seen = {h5py.h5o.get_info(root).addr}
         groups: list[tuple[str, Any]] = [("", root)]
         while groups:
-            place, group = groups.pop()
+            parent, group = groups.pop()
             for name in list(group):
-                where = f"{place}/{name.decode(errors='backslashreplace')}"
+                where = f"{parent}/{name.decode(errors='backslashreplace')}"
                 if group.links.get_info(name).type != h5py.h5l.TYPE_HARD:
                     raise FileError(f"{path}: {where} is a link, which an output does not have")
                 target = h5py.h5o.open(group, name)

@@ -1,4 +1,4 @@
-"""What functions take: a configuration or an output, or the path of one."""
+"""Arguments of functions: a configuration or an output, or the path of one."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def as_run(output: OutputLike) -> xr.DataTree:
 
 @contextmanager
 def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
-    """An output of a run, of which only what is used is read, and its name for messages."""
+    """An output of a run, read when used, and its name for messages."""
     from mesoslip.output import files
 
     if isinstance(output, str | os.PathLike):
@@ -95,7 +95,7 @@ def several(output: OutputLike | Sequence[OutputLike]) -> Sequence[OutputLike]:
 
 
 def opened(outputs: Sequence[OutputLike], stack: ExitStack) -> tuple[list[xr.DataTree], list[str]]:
-    """Outputs of any command, of which only what is used is read, and their names."""
+    """Outputs of any command, read when used, and their names."""
     from mesoslip.output import files
 
     trees, names = [], []

@@ -37,7 +37,7 @@ def kind_of(tree: xr.DataTree) -> str:
     Raises
     ------
     FileError
-        If it is of none of them.
+        If it is of no known kind.
     """
     for name, kind in KINDS.items():
         if kind.is_of(tree):

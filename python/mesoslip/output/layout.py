@@ -1,7 +1,7 @@
 """The layout of the output of a run: its groups, and how rows of the kernel become variables.
 
-`describe` states once what an output holds; `mesoslip.output.tree` puts it together in memory, and
-`mesoslip.output.writing` writes it to a file piece by piece.
+`describe` has the contents of an output; `mesoslip.output.tree` builds it in memory, and
+`mesoslip.output.writing` writes it to a file block by block.
 
 Rows of catalogues name their realization by a ``realization_index``, as CF's indexed ragged arrays
 do, and no variable of a group has the name of a coordinate of the root.
@@ -27,7 +27,7 @@ from mesoslip.simulation.audit import failed_promises
 
 Array = NDArray[Any]
 
-# What a variable takes from rows of a table, given the places of their realizations.
+# Values of a variable from rows of a table and the indices of their realizations.
 Pick = Callable[[Array, Array], Array]
 
 
@@ -53,7 +53,7 @@ class Entry:
 
     @property
     def fill_value(self) -> float | None:
-        """What stands for a missing value; CF has none for coordinates."""
+        """The value for missing data; CF has none for coordinates."""
         return np.nan if self.dtype.kind == "f" and not self.is_coordinate else None
 
 
@@ -249,8 +249,8 @@ def _snapshots(results: RunResults) -> GroupLayout:
     writer.add("displacement", ("snapshot",), pick=column("snapshot_events", "displacement"), **how)
     writer.add("avalanche_size", ("snapshot",), pick=column("snapshot_events", "size"), **how)
     spacing = np.sqrt(config.contacts.area / config.contacts.count)
-    for name, places in zip("xy", lattice_places(lattice), strict=True):
-        writer.add(name, ("row", "column"), is_coordinate=True, values=spacing * places)
+    for name, sites in zip("xy", lattice_sites(lattice), strict=True):
+        writer.add(name, ("row", "column"), is_coordinate=True, values=spacing * sites)
     shape = (-1, lattice.rows, lattice.columns)
     stretch, load, generation = (
         tables.SNAPSHOT_NUMBERS.index(name) for name in ("stretch", "load", "generation")
@@ -276,8 +276,8 @@ def _snapshots(results: RunResults) -> GroupLayout:
     return GroupLayout(sizes, writer.entries, {})
 
 
-def lattice_places(interaction: Interaction) -> tuple[Array, Array]:
-    """Places of the contacts in units of their distance, each of shape (rows, columns)."""
+def lattice_sites(interaction: Interaction) -> tuple[Array, Array]:
+    """Sites of the contacts in units of their distance, each of shape (rows, columns)."""
     row, column_ = np.indices((interaction.rows, interaction.columns), dtype=float)
     if interaction.lattice == "square":
         return column_, row
@@ -295,7 +295,7 @@ def _energy(results: RunResults) -> GroupLayout:
 
 
 def attributes(results: RunResults) -> dict[str, Any]:
-    """Attributes of an output: what was run, by what, and how it went."""
+    """Attributes of an output: configuration, program, and state of the run."""
     config, realizations = results.config, results.realizations
     reached = min(one.time for one in realizations)
     residual: float = max((one.energy_residual for one in realizations), key=abs)

@@ -9,7 +9,7 @@ from mesoslip.output import variables
 if TYPE_CHECKING:
     import xarray as xr
 
-# What rows of groups were called in files of earlier versions, and what they are called now.
+# Names of variables in files of earlier versions, and their present names, by group.
 OLD_NAMES = {
     "slips": {"realization": "realization_index"},
     "slip_traces": {"realization": "realization_index", "time": "sample_time"},

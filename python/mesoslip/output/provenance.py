@@ -11,10 +11,10 @@ from typing import Any, Protocol
 
 from mesoslip import _build
 
-# The line that was typed, if the command line is what asks for an output.
+# The command as typed, if an output is made on the command line.
 COMMAND_LINE: ContextVar[str | None] = ContextVar("COMMAND_LINE", default=None)
 
-# What the output of each command holds.
+# Contents of the output of each command.
 SUMMARIES = {
     "run": "A slider pulled over contacts with random breaking thresholds, simulated with the "
     "earthquake-like model of multicontact friction or its master equation",
@@ -31,14 +31,14 @@ SUMMARIES = {
 
 
 class Described(Protocol):
-    """What an output is of: a configuration, or as much of one as is known."""
+    """The origin of an output: a configuration, perhaps incomplete."""
 
     @property
     def title(self) -> str | None: ...
 
     @property
     def base(self) -> Described | None:
-        """What it was laid over."""
+        """The configuration it is based on."""
         ...
 
     def to_toml(self) -> str:
@@ -53,8 +53,8 @@ def version(package: str) -> str:
 
 
 def program_attributes(config: Described, command: str) -> dict[str, Any]:
-    """Attributes of every output: what was computed, by what."""
-    # Here, as the command line imports this module, which is to start at once.
+    """Attributes of every output: configuration, command and program."""
+    # Imported here, as the command line imports this module and must start at once.
     from mesoslip import _core
 
     now = datetime.now(UTC).isoformat(timespec="seconds")
@@ -70,7 +70,7 @@ def program_attributes(config: Described, command: str) -> dict[str, Any]:
         "history": f"{now} {program}: {asked}",
         "date_created": now,
         "configuration": config.to_toml(),
-        # What the configuration was laid over; of no consequence for the results.
+        # The base of the configuration does not affect the results.
         **({} if base is None else {"base_configuration": base.to_toml()}),
         "program_version": version("mesoslip"),
         "commit": _build.COMMIT,

@@ -1,4 +1,4 @@
-"""What a run hands over to be put into an output."""
+"""The results of a run, as outputs take them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class Rows(Protocol):
 
     def __len__(self) -> int: ...
 
-    def blocks(self, most: int) -> Iterator[Array]:
-        """The rows one after another, at most so many at a time, shape (rows, ...)."""
+    def blocks(self, max_rows: int) -> Iterator[Array]:
+        """The rows in blocks of at most ``max_rows``, shape (rows, ...)."""
         ...
 
 
 class RealizationResults(Protocol):
-    """What came out of a realization.
+    """The results of a realization.
 
     Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
     of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_events",
@@ -63,7 +63,7 @@ class RealizationResults(Protocol):
 
 
 class RunResults(Protocol):
-    """What came out of a run."""
+    """The results of a run."""
 
     @property
     def config(self) -> Config: ...

@@ -31,13 +31,13 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
     path
         The output.
     reads
-        What the command reads, which it must not overwrite.
+        Files that the command reads and must not overwrite.
 
     Raises
     ------
     FileError
-        If the path is no place for a file, is one that is read, or its folder cannot be made or
-        written to.
+        If the path cannot be a file, is one of those, or its folder cannot be created or written
+        to.
     """
     if path.suffix == ".toml":
         raise FileError(f"{path}: is the name of a configuration; give another one to the output")
@@ -75,12 +75,12 @@ def check_output(path: Path, reads: Iterable[str | Path] = ()) -> None:
 
 
 def _target(path: Path) -> Path:
-    """Where a file is to be written: links are followed, what is no regular file is refused.
+    """The path to write a file to: links are followed; only regular files are accepted.
 
     Raises
     ------
     FileError
-        If it is refused.
+        If there is something else at the path.
     """
     if is_directory(path):
         raise FileError(f"{path}: cannot be written: is a directory; give the name of a file in it")
@@ -95,10 +95,10 @@ def _target(path: Path) -> Path:
 
 
 def _not_written(path: Path, target: Path, error: Exception) -> FileError:
-    """What to say of a file that could not be written."""
+    """The error of a file that could not be written."""
     reason = getattr(error, "strerror", None) or error
     is_full = getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}
-    # HDF5 tells a full disk as an error of its own, or as a lack of permission.
+    # HDF5 reports a full disk as an error of its own, or as a lack of permission.
     with suppress(OSError):
         is_full = is_full or shutil.disk_usage(target.parent).free < PROBE_BYTES
     if is_full:
@@ -131,13 +131,13 @@ def _remove_left_behind(path: Path) -> None:
             with suppress(OSError):
                 other.unlink(missing_ok=True)
         except OSError:
-            # Somebody else's, at work.
+            # A process of another user, still running.
             continue
 
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """A file to write in the place of another, whose name appears only when it is whole.
+    """A temporary file that replaces a file when it is complete.
 
     Raises
     ------

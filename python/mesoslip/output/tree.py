@@ -18,15 +18,15 @@ Array = NDArray[Any]
 
 
 def build_tree(results: RunResults) -> xr.DataTree:
-    """Put the results of a run together in memory, as an output file holds them.
+    """The results of a run in memory, with the layout of an output file.
 
     Returns
     -------
     xarray.DataTree
-        Root: the trace, dimensions (realization, time), and figures for each realization. Groups:
+        Root: the trace, dimensions (realization, time), and numbers for each realization. Groups:
         ``slips`` (slip), ``slip_traces`` (sample), ``avalanches`` (avalanche), ``snapshots``
-        (snapshot, row, column), ``energy`` (realization). What an interrupted run did not come to
-        is NaN in the trace.
+        (snapshot, row, column), ``energy`` (realization). The trace of an
+        interrupted run ends with NaN.
     """
     import xarray as xr
 

@@ -48,8 +48,8 @@ def check_signature(path: Path) -> None:
             f"mesoslip run {path}"
         )
     if start != b"\x89HDF\r\n\x1a\n":
-        told = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
-        raise FileError(f"{path}: not an output (netCDF-4){told}")
+        hint = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
+        raise FileError(f"{path}: not an output (netCDF-4){hint}")
 
 
 def _is_table(path: Path) -> bool:
@@ -57,7 +57,7 @@ def _is_table(path: Path) -> bool:
 
 
 def check_layout(tree: xr.DataTree, path: Path) -> None:
-    """Make sure that what commands use of an output is there, as numbers in the right dimensions.
+    """Check that an output has the variables that commands use, as numbers with their dimensions.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the variables of an output mean: units, long name, type, group by group."""
+"""Variables of an output, by group: units, long names, types."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a variable means.
+    """Unit, long name and type of a variable.
 
     Parameters
     ----------
@@ -24,9 +24,9 @@ class Meaning:
     dtype
         Type of its values.
     is_fractional
-        Whether the master equation makes it a real number, as it may have a part of a contact.
+        Whether it is a real number in the master equation, which has fractions of contacts.
     further
-        More attributes.
+        Further attributes.
     """
 
     units: str
@@ -51,10 +51,10 @@ class Group(dict[str, Meaning]):
         return xr.Variable(dimensions, values, self[name].attributes)
 
 
-# Rows of a catalogue tell their realization as CF's indexed ragged arrays do.
+# Rows of a catalogue have the index of their realization, as in CF's indexed ragged arrays.
 REALIZATION_INDEX = Meaning(
     "1",
-    "place of the row's realization along the dimension realization, from 0",
+    "index of the row's realization along the dimension realization, from 0",
     np.int64,
     further={"instance_dimension": "realization"},
 )
@@ -79,27 +79,25 @@ ROOT = Group(
     breaks=Meaning("1", "breaks of contacts in the run", np.int64, is_fractional=True),
     force_error=Meaning(
         "N",
-        "estimated error of the contact force: the greatest jump between two steps",
+        "estimated error of the contact force: maximum jump between two steps",
     ),
-    energy_residual=Meaning(
-        "1", "what the energy balance lacks, relative to the work of the drive"
-    ),
+    energy_residual=Meaning("1", "residual of the energy balance over the work of the drive"),
     kernel_seconds=Meaning("s", "computing time of the kernel"),
     avalanche_count=Meaning("1", "number of avalanches in the run", np.int64),
     avalanche_slip=Meaning(
-        "m", "displacement of the slider in avalanches, the drive standing still"
+        "m", "displacement of the slider in avalanches, during which the drive stands still"
     ),
     end_displacement=Meaning("m", "displacement of the slider at the end of the run"),
 )
 
 SLIPS = Group(
     realization_index=REALIZATION_INDEX,
-    start_time=Meaning("s", "time of the greatest spring force before the slip"),
-    end_time=Meaning("s", "time of the least spring force after the slip"),
+    start_time=Meaning("s", "time of the maximum spring force before the slip"),
+    end_time=Meaning("s", "time of the minimum spring force after the slip"),
     force_before=Meaning("N", "spring force at the start of the slip"),
     force_after=Meaning("N", "spring force at the end of the slip"),
     force_drop=Meaning("N", "drop of the spring force in the slip"),
-    peak_velocity=Meaning("m s-1", "greatest velocity of the slider in the slip"),
+    peak_velocity=Meaning("m s-1", "maximum velocity of the slider in the slip"),
     contacts_broken=Meaning(
         "1",
         "breaks in the slip; a contact that attaches again may break again",
@@ -111,8 +109,8 @@ SLIPS = Group(
 STAGES = Group(
     realization_index=REALIZATION_INDEX,
     stage_number=Meaning("1", "number of the stage of the drive, from 0", np.int64),
-    stage_start_time=Meaning("s", "time at which the stage began"),
-    stage_end_time=Meaning("s", "time at which it ended"),
+    stage_start_time=Meaning("s", "start of the stage"),
+    stage_end_time=Meaning("s", "end of the stage"),
     drive_start_velocity=Meaning("m s-1", "velocity of the drive at the start of the stage"),
     drive_end_velocity=Meaning("m s-1", "velocity of the drive at the end of the stage"),
     start_force=Meaning("N", "spring force at the start of the stage"),
@@ -120,14 +118,14 @@ STAGES = Group(
     start_displacement=Meaning("m", "displacement of the slider at the start of the stage"),
     end_displacement=Meaning("m", "displacement of the slider at the end of the stage"),
     drive_start_displacement=Meaning("m", "displacement of the drive at the start of the stage"),
-    greatest_force=Meaning("N", "greatest spring force in the stage"),
-    greatest_force_time=Meaning("s", "time of the greatest spring force"),
+    greatest_force=Meaning("N", "maximum spring force in the stage"),
+    greatest_force_time=Meaning("s", "time of the maximum spring force"),
     greatest_force_displacement=Meaning(
-        "m", "displacement of the slider at the greatest spring force"
+        "m", "displacement of the slider at the maximum spring force"
     ),
-    least_force=Meaning("N", "least spring force in the stage"),
-    least_force_time=Meaning("s", "time of the least spring force"),
-    least_force_displacement=Meaning("m", "displacement of the slider at the least spring force"),
+    least_force=Meaning("N", "minimum spring force in the stage"),
+    least_force_time=Meaning("s", "time of the minimum spring force"),
+    least_force_displacement=Meaning("m", "displacement of the slider at the minimum spring force"),
     mean_force=Meaning("N", "mean of the spring force over the time of the stage"),
 )
 
@@ -149,10 +147,10 @@ AVALANCHES = Group(
     area=Meaning("1", "contacts that broke in the avalanche, each counted once", np.int64),
     width=Meaning("1", "columns of the smallest rectangle around the avalanche", np.int64),
     height=Meaning("1", "rows of the smallest rectangle around the avalanche", np.int64),
-    generations=Meaning(
-        "1", "steps in which the contacts of the avalanche pushed over each other", np.int64
+    generations=Meaning("1", "steps in which contacts of the avalanche triggered others", np.int64),
+    spans=Meaning(
+        "1", "whether the avalanche breaks contacts in every column or every row", np.int8
     ),
-    spans=Meaning("1", "whether the avalanche leaves no column, or no row, untouched", np.int8),
 )
 
 SNAPSHOTS = Group(
@@ -168,8 +166,8 @@ SNAPSHOTS = Group(
     generation=Meaning(
         "1", "step of the avalanche in which the contact broke, 0 if it did not", np.int32
     ),
-    x=Meaning("m", "place of the contact along a row"),
-    y=Meaning("m", "place of the contact across the rows"),
+    x=Meaning("m", "position of the contact along a row"),
+    y=Meaning("m", "position of the contact across the rows"),
 )
 
 ENERGY = Group(

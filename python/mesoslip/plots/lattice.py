@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
+from mesoslip.quantities import with_unit
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,8 @@ def draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
         axes, snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
     )
     axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label="force over threshold")
-    axes.set_title(f"{snapshot['snapshot_time'].item():.6g} s; grey: detached", loc="left")
+    time = with_unit(snapshot["snapshot_time"].item(), "s", 6)
+    axes.set_title(f"snapshot at {time}; grey: detached", loc="left")
 
 
 def draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:

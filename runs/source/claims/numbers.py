@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mesoslip.quantities import with_unit
 from mesoslip.theory.derived import derived
 from mesoslip.theory.force_curve import ForceCurve
 from outputs import configuration
@@ -35,7 +36,7 @@ def derived_numbers(trees: Sequence[xr.DataTree]) -> Finding:
     return Finding(
         (
             *(
-                measured(name, found[name], unit, f"{value:.4g}")
+                measured(name, found[name], unit, with_unit(value, unit))
                 for name, (value, unit) in source.items()
             ),
             measured("alpha", alpha, "1", "2.21"),
@@ -79,7 +80,7 @@ def instability(trees: Sequence[xr.DataTree]) -> Finding:
     slope = np.polyfit(np.log(widths), np.log(exact), 1)[0]
     return Finding(
         (
-            measured("K* at Delta f_s/f_s = 0.01", exact[1], "N/m", "4.34e4"),
+            measured("K* at Delta f_s/f_s = 0.01", exact[1], "N/m", "43.4 kN/m"),
             *(
                 measured(f"K* over S48 at {width:g}", one, "1", "about 1")
                 for width, one in zip(widths, ratio, strict=True)

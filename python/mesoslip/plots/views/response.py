@@ -202,7 +202,10 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
         else:
             record = figure.subplots()
         draw_force(record, tree, options)
-        record.set_title(plain(tree.attrs.get("title", "")), loc="left", pad=22)
+        title = plain(tree.attrs.get("title", ""))
+        if any(stage.is_hold for stage in experiment.stages):
+            title += "\nblue: holds and their durations"
+        record.set_title(title, loc="left", pad=22)
         if draws_steady:
             draw_steady(figure.add_subplot(panels[1, 0]), steady)
         if draws_healing:

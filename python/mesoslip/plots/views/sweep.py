@@ -159,6 +159,7 @@ def _draw_map(
     mesh = axes.pcolormesh(*edges, shown, cmap=colors, norm=norm)
     bar = axes.figure.colorbar(mesh, ax=axes, ticks=range(len(choices)))
     bar.ax.set_yticklabels(choices)
+    bar.minorticks_off()
 
 
 def _mean(values: Array) -> Array:

@@ -350,3 +350,14 @@ def test_a_name_too_long_for_the_system_is_one_message(arguments, command):
 def test_messages_do_not_steer_the_terminal(capsys):
     say("out\x1b[2J.nc: a slip\nand another one")
     assert capsys.readouterr().err == "out\\x1b[2J.nc: a slip\nand another one\n"
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe: \x80\n", b"text.usetex: True\n"])
+@pytest.mark.parametrize("module", ["plots.style", "reports.content"])
+def test_a_matplotlibrc_of_the_current_folder_is_not_read(module, content, tmp_path):
+    (tmp_path / "matplotlibrc").write_bytes(content)
+    code = f"import mesoslip.{module}, matplotlib; assert not matplotlib.rcParams['text.usetex']"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")

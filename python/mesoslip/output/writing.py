@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Variables with fewer values are not worth compressing.
-LEAST_COMPRESSED = 1000
+MIN_COMPRESSED = 1000
 
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
 
@@ -38,7 +38,7 @@ def write(tree: xr.DataTree, path: Path) -> None:
         group.path: {
             str(name): COMPRESSION
             for name, data in group.data_vars.items()
-            if data.size > LEAST_COMPRESSED
+            if data.size > MIN_COMPRESSED
         }
         for group in tree.subtree
     }
@@ -98,7 +98,7 @@ def _create_group(
 
 def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
     """Compression of a variable, and chunks that hold a block of rows."""
-    if math.prod(shape) <= LEAST_COMPRESSED or entry.is_coordinate:
+    if math.prod(shape) <= MIN_COMPRESSED or entry.is_coordinate:
         return {}
     # One realization at a time; of long dimensions after the first no more than a block's worth.
     chunks = [1, *shape[1:]] if entry.is_padded else list(shape)

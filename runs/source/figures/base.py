@@ -22,7 +22,7 @@ class SourceFigure:
     shows: str
 
 
-# What a caption tells of the runs, if it is the same in all of them.
+# Parameters in a caption, those that all its runs share.
 PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
     lambda config: f"$N$ = {config.contacts.count}" if config.contact_kind.is_discrete else None,
     lambda config: f"$F_s$ = {config.contacts.static_force * 1e6:g} µN",
@@ -50,8 +50,8 @@ CAPTION_CHARACTERS = 19
 def caption(name: str, shows: str, trees: Sequence[xr.DataTree]) -> str:
     """What a figure shows, and the parameters that all its runs have in common."""
     configs = [configuration(tree) for tree in trees]
-    told = [{parameter(config) for config in configs} for parameter in PARAMETERS]
-    common = [text for texts in told if len(texts) == 1 for text in texts if text is not None]
+    all_texts = [{parameter(config) for config in configs} for parameter in PARAMETERS]
+    common = [text for texts in all_texts if len(texts) == 1 for text in texts if text is not None]
     return f"{name}: {shows}. {', '.join(common)}."
 
 

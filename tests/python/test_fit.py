@@ -14,8 +14,8 @@ from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.inference import checks, likelihood
 from mesoslip.inference.fit import prepare
 from mesoslip.inference.plan import Plan
-from mesoslip.inference.prior import Free, Prior
-from mesoslip.inference.rounds import close_in
+from mesoslip.inference.prior import FreeParameter, Prior
+from mesoslip.inference.rounds import estimate_posterior
 from mesoslip.inference.sampler import draw, r_hat
 from mesoslip.inference.simulations import Simulations
 from mesoslip.inference.summaries import Feature, Summarizer
@@ -82,7 +82,7 @@ def linear_problem(seed, total=400):
     truth = rng.random(2)
     made = Linear(matrix, 0.1, seed)
     observed = made.simulate(truth[None])[0]
-    estimate = close_in(made, observed, total, np.random.default_rng(seed))
+    estimate = estimate_posterior(made, observed, total, np.random.default_rng(seed))
     covariance = 0.1**2 * np.linalg.inv(matrix.T @ matrix)
     mean = np.linalg.lstsq(matrix, observed, rcond=None)[0]
     return truth, estimate, mean, np.sqrt(np.diag(covariance))
@@ -233,7 +233,11 @@ def test_summaries_that_few_simulations_have_lower_the_likelihood_where_they_hav
 
 def test_priors_go_to_the_unit_cube_and_back():
     prior = Prior(
-        (Free("a", 1e-6, 1e-4, True), Free("b", -1.0, 3.0), Free("c", 1, 9, False, "1", True))
+        (
+            FreeParameter("a", 1e-6, 1e-4, True),
+            FreeParameter("b", -1.0, 3.0),
+            FreeParameter("c", 1, 9, False, "1", True),
+        )
     )
     unit = np.random.default_rng(0).random((5, 3))
     values = prior.values(unit)
@@ -257,7 +261,7 @@ def test_summaries_do_not_depend_on_direction_or_later_phase():
     np.testing.assert_allclose(summarizer(tree, direction=-1.0)(-force), values)
     # Without its start, a trace moved by some slips has nearly the same statistics.
     moved = summarizer(tree, has_start=False)
-    kept = np.flatnonzero(np.isin(moved.names, ["mean_peak", "mean_drop", "wave_+0.50"]))
+    kept = np.flatnonzero(np.isin(moved.names, ["mean_peak", "mean_drop", "waveform_+0.50"]))
     whole = moved(force)[kept]
     tail = Summarizer(tree["time"].values[:-500], NOISE, 0.0245, 18e-6, has_start=False)
     np.testing.assert_allclose(tail(force[500:])[kept], whole, rtol=0.25, atol=0.05)
@@ -268,7 +272,7 @@ def test_a_trace_without_slips_has_no_summaries_of_slips():
     one = summarizer(tree)
     values = dict(zip(one.names, one(1e-5 * (1 - np.exp(-tree["time"].values))), strict=True))
     assert np.isnan(values["mean_drop"])
-    assert np.isnan(values["first_wave_+0.50"])
+    assert np.isnan(values["first_waveform_+0.50"])
     assert np.isfinite(values["mean_force"])
     assert values["slip_count"] == np.log(0.5)
 
@@ -340,7 +344,7 @@ def test_simulations_of_another_fit_are_refused(small_fit):
 
 
 def test_another_mass_is_no_part_of_the_model():
-    """The wave of slips of a trace of four times the mass is told to disagree."""
+    """The waveform of slips of a trace of four times the mass disagrees."""
     tree = experiment(slider__mass=4 * 1.47e-3)
     posterior = mesoslip.fit(tree, fit_tables())
     assert posterior.attrs["agreement_probability"] < checks.REJECTED
@@ -368,7 +372,7 @@ def test_what_predictions_never_have_is_told():
     assert off.worst[0].feature.name == "s2"
     lacking = checks.compare(features, simulated, predicted, np.array([0, np.nan, 0, 0, 0]))
     assert lacking.is_rejected
-    assert "the trace has not" in str(lacking.worst[0])
+    assert "but not for the trace" in str(lacking.worst[0])
     predicted[:, 3] = np.nan
     extra = checks.compare(features, simulated, predicted, np.zeros(5))
     assert extra.is_rejected
@@ -376,7 +380,14 @@ def test_what_predictions_never_have_is_told():
 
 
 def test_warnings_tell_what_is_not_determined():
-    prior = Prior((Free("a", 0, 1), Free("b", 0, 1), Free("c", 0, 1), Free("d", 0, 1)))
+    prior = Prior(
+        (
+            FreeParameter("a", 0, 1),
+            FreeParameter("b", 0, 1),
+            FreeParameter("c", 0, 1),
+            FreeParameter("d", 0, 1),
+        )
+    )
     rng = np.random.default_rng(2)
     first = 0.5 + 0.02 * rng.standard_normal(4000)
     draws = np.stack(
@@ -411,7 +422,7 @@ def test_the_command_fits_and_draws(tmp_path, command):
     status, told, _ = command("fit", output, config, "-o", posterior, "--quiet")
     assert status == 0
     assert "contacts.static_force" in told
-    assert "uN" in told
+    assert "µN" in told
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
         ["trace.csv", "trace.nc", "fit.toml", "posterior.nc"]
     )
@@ -467,7 +478,7 @@ def test_a_fit_needs_a_table_and_a_trace(tmp_path, command):
 
 def test_a_configuration_that_contradicts_the_trace_is_refused():
     tree = experiment(slider__stiffness=140.0)
-    with pytest.raises(ConfigError, match="the trace says 140"):
+    with pytest.raises(ConfigError, match="is 140 in the trace"):
         prepare(tree, Plan.from_dict(fit_tables()))
     free = FREE | {"slider.stiffness": {"from": 50, "to": 300}}
     simulator, _ = prepare(tree, Plan.from_dict(fit_tables(free=free)))
@@ -509,9 +520,7 @@ def test_a_trace_of_several_stages_may_start_at_any_time():
     # In the hold the force changes by ringing and noise only; before and after, by the drive.
     held = (tree["time"].values > 2.2) & (tree["time"].values < 2.5)
     assert np.ptp(made[held]) < 15 * NOISE
-    with pytest.raises(
-        FileError, match=r"takes 5 s, and the run of the configuration ends after 4"
-    ):
+    with pytest.raises(FileError, match=r"has a duration of 5 s, the stages of \[drive\] only 4 s"):
         prepare(experiment(run__duration=5.0), plan)
 
 

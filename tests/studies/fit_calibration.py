@@ -21,7 +21,7 @@ import numpy as np
 from mesoslip.errors import RunError
 from mesoslip.inference.fit import prepare
 from mesoslip.inference.plan import Plan
-from mesoslip.inference.rounds import close_in
+from mesoslip.inference.rounds import estimate_posterior
 from mesoslip.inference.simulations import Simulations
 
 ROOT = Path(__file__).parents[2]
@@ -66,7 +66,9 @@ def experiment(number: int, simulations: int | None = None, workers: int = 1) ->
     made = Simulations(simulator, expected=plan.simulations, executor=workers)
     row: dict[str, object] = {"experiment": number, "status": "fitted"}
     try:
-        estimate = close_in(made, observed, plan.simulations, np.random.default_rng(number))
+        estimate = estimate_posterior(
+            made, observed, plan.simulations, np.random.default_rng(number)
+        )
     except RunError:
         return row | {"status": "failed"}
     draws = estimate.draws

@@ -51,15 +51,18 @@ SUMMARY = {
     "exponent_error": ("1", "standard error of the exponent, with that of the form"),
     "cutoff_shape": ("1", "c of the best form's cutoff exp(-(s/s_c)^c); 0: no cutoff"),
     "correction_power": ("1", "b of the best form's correction exp(a s^(-b)); 0: no correction"),
-    "cutoff": ("1", "cutoff s_c of the sizes; none if not resolved"),
+    "cutoff": ("1", "cutoff s_c of the sizes, if it is resolved"),
     "cutoff_error": ("1", "standard error of the cutoff"),
     "min_fitted_size": ("1", "minimum size that the law is fitted to"),
     "fitted_count": ("1", "avalanches that the law is fitted to"),
     "fitted_share": ("1", "share of the avalanches that the law is fitted to"),
     "fit_distance": ("1", "maximum distance between the law's distribution and theirs"),
-    "fit_p_value": ("1", "probability that sizes of the law fit as badly"),
-    "tested_count": ("1", "avalanches that this was tested with"),
-    "fit_rejected": ("1", f"1 if that is below {REJECTED:g}: the sizes do not follow the law"),
+    "fit_p_value": ("1", "probability of a distance as large if the sizes follow the law"),
+    "tested_count": ("1", "avalanches in this test"),
+    "fit_rejected": (
+        "1",
+        f"1 if the p-value is below {REJECTED:g}: the sizes do not follow the law",
+    ),
     "local_exponent": ("1", "exponent of the pure law nearest to sizes from s to 10 s, the first"),
     "local_exponent_error": ("1", "standard error of the first local exponent"),
     "last_local_exponent": ("1", "the same for the last factor of ten with 50 sizes or more"),
@@ -131,15 +134,14 @@ def avalanche_summary(
     min_force_ratio: float | None = None,
     min_size: int | None = None,
 ) -> dict[str, float | None]:
-    """Statistics of the avalanches of an output, in SI, by the names that ``mesoslip avalanches``
-    explains.
+    """Statistics of the avalanches of an output, in SI, with the names of ``mesoslip avalanches``.
 
     Parameters
     ----------
     output, after, min_force_ratio
         See `avalanches`.
     min_size
-        Smallest size in the fit of the size distribution; chosen by default, see
+        Minimum size in the fit of the size distribution; chosen by default, see
         `mesoslip.analysis.avalanche_sizes.fit_power_law`.
 
     Returns
@@ -232,7 +234,7 @@ def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
         return np.zeros(data.sizes["avalanche"], dtype=bool)
     everything = group_of(tree, "avalanches")
     last = np.full(tree.sizes["realization"], np.inf)
-    # Rows are in the order of time: of those of a realization the last one stays.
+    # Rows are in the order of time, so that the last one of each realization stays.
     last[everything["realization_index"].values] = everything["start_time"].values
     is_last = data["start_time"].values == last[data["realization_index"].values]
     is_broken = tree.to_dataset()["breaks"].values == config.contacts.count

@@ -1,4 +1,4 @@
-"""Traces at equal intervals, and the direction in which they were driven."""
+"""Traces at equal intervals, and the initial velocity of the drive."""
 
 from __future__ import annotations
 
@@ -15,35 +15,34 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Intervals that differ by less, relative to the usual one, count as equal.
-EVEN = 1e-3
+# Maximum relative difference of intervals that count as equal.
+INTERVAL_TOLERANCE = 1e-3
 
 
 def even_trace(tree: xr.DataTree, realization: int = 0) -> tuple[Array, Array]:
     """Times [s] and spring force [N] of a trace at equal intervals.
 
-    Times whose intervals differ are replaced by even ones, with forces on straight lines between.
+    Forces at unequal intervals are interpolated linearly.
     """
     root = tree.to_dataset()
     time = root["time"].values
     force = root["spring_force"].values[realization].astype(float)
-    there = np.isfinite(force)
-    return evenly_sampled(time[there], force[there])
+    is_known = np.isfinite(force)
+    return evenly_sampled(time[is_known], force[is_known])
 
 
-def evenly_sampled(time: Array, force: Array) -> tuple[Array, Array]:
-    """Times [s] and forces at equal intervals, on straight lines between samples where needed."""
+def evenly_sampled(time: Array, values: Array) -> tuple[Array, Array]:
+    """Times [s] and values at equal intervals, interpolated linearly where intervals differ."""
     steps = np.diff(time)
     interval = float(np.median(steps))
-    if np.all(np.abs(steps - interval) <= EVEN * interval):
-        return time, force
+    if np.all(np.abs(steps - interval) <= INTERVAL_TOLERANCE * interval):
+        return time, values
     even = time[0] + interval * np.arange(math.floor((time[-1] - time[0]) / interval) + 1)
-    return even, np.interp(even, time, force)
+    return even, np.interp(even, time, values)
 
 
 def first_velocity(config: Config) -> float:
-    """The first velocity of a drive that is not 0 [m/s], or the rate of its force [N/s]; 0 if there
-    is none."""
+    """The first nonzero velocity of the drive [m/s], or rate of its force [N/s]; 0 for none."""
     parts = config.drive_parts
     velocities = (one for part in parts for one in (part.start_velocity, part.end_velocity))
     return next((one for one in velocities if one), 0.0)

@@ -1,19 +1,20 @@
 """Slips in sampled, noisy traces of the spring force.
 
-The rule, which `docs/fit.md` explains. With a noise of standard deviation sigma:
+The rule, explained in `docs/fit.md`, for noise of standard deviation sigma:
 
-- A **fall** leads from a maximum of the force to the least value before the next maximum; maxima
-  are those that stand out by more than `PROMINENCE` sigma on both sides.
-- Falls that begin within half a period of the setup of the end of one, and lead lower, are one.
-- A fall is a **slip** if it is deeper than twice what the force had regained in the last three
-  quarters of a period, which is what ringing gives back, and if it is steep: its greatest rate is
-  at least that of a slider at the least slip velocity of a run, 0.02 Omega_S F_s, the greatest
-  force of the trace standing for F_s.
-- It starts where the force is last near its maximum, and ends at its least value. What falls from
-  the first sample on has no start.
+- A **fall** is the decrease from a maximum of the force to the minimum before the next maximum.
+  Maxima have a prominence of more than `PROMINENCE` sigma.
+- A fall that begins within half a period of the setup after the end of another, and reaches a lower
+  force, belongs to it.
+- A fall is a **slip** if it is deep and steep: deeper than twice the increase of the force in the
+  three quarters of a period before it, which ringing causes, and with a maximum rate of at least
+  0.02 Omega_S F_s, the rate at the minimum slip velocity of a run. F_s is the maximum force of the
+  trace.
+- It starts where the force is last near its maximum and ends at its minimum. A fall from the first
+  sample on has no start and does not count.
 
-It is the rule by which a run makes its own catalogue, without what only a simulation knows: breaks
-of contacts, and the velocity of the slider.
+Runs make their catalogues by the same rule, with two more criteria that only a simulation has:
+breaks of contacts, and the velocity of the slider.
 """
 
 from __future__ import annotations
@@ -26,39 +27,39 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Height over the noise by which a maximum must stand out: at 8 standard deviations a million
-# samples of noise have none.
+# Minimum prominence of a maximum, in standard deviations of the noise: a million samples of noise
+# have no such maximum.
 PROMINENCE = 8.0
-# A fall makes a slip if it is deeper than this many times what ringing had regained.
-LEAST_FALL = 2.0
-# Time in which ringing comes from a minimum to a maximum, in half periods of the setup.
-LONGEST_RISE = 1.5
-# What noise adds to the difference of a maximum and a minimum, in standard deviations.
+# Minimum depth of a slip over the increase by ringing before it.
+MIN_FALL_RATIO = 2.0
+# Maximum time from a minimum to a maximum in ringing, in half periods of the setup.
+MAX_RISE = 1.5
+# Contribution of noise to the difference of a maximum and a minimum, in standard deviations.
 EXTREME_NOISE = 4.0
-# Least rate of fall, in Omega_S times the greatest force.
-LEAST_RATE = 0.02
-# Least height of a maximum and depth of a slip, in parts of the greatest force.
-LEAST_HEIGHT = 0.002
-# Part of the depth of a fall at either end that does not count for its duration.
+# Minimum rate of fall, in Omega_S times the maximum force.
+MIN_RATE = 0.02
+# Minimum prominence of a maximum and depth of a slip, over the maximum force.
+MIN_HEIGHT = 0.002
+# Fraction of the depth of a fall at either end that is excluded from its duration.
 MARGIN = 0.1
-# Orders of differences of which one tells the noise.
+# Orders of differences for the estimate of the noise.
 ORDERS = range(1, 8)
-# Median of the size of a standard normal deviate.
+# Median of the absolute value of a standard normal deviate.
 NORMAL_MEDIAN = 0.6744897501960817
 
 
 @dataclass(frozen=True)
 class FoundSlips:
-    """Slips in a trace, one number a slip.
+    """Slips in a trace, each array of shape (slips,).
 
     Attributes
     ----------
     start_time, end_time
-        Times of the maximum before, and of the minimum after [s].
+        Times of the maximum before and of the minimum after [s].
     force_before, force_after
-        Force there, with the noise averaged out as far as the trace allows [N].
+        Forces at these times, averaged over the noise as far as the trace allows [N].
     fall_rate
-        Greatest rate of fall [N/s].
+        Maximum rate of fall [N/s].
     first, last
         Samples of the maximum and of the minimum.
     """
@@ -78,10 +79,10 @@ class FoundSlips:
 def noise_level(force: Array) -> float:
     """Standard deviation of white noise on a trace [N].
 
-    Of the differences of the trace of each order the median size tells it, as slips are few; what
-    is smooth adds less the higher the order, as long as it is sampled well, so the least of all
-    orders is taken. A digitized trace has at least the noise of its steps. Noise that is correlated
-    from sample to sample, as behind a filter, is underestimated.
+    The estimate is the median absolute difference of the trace, on which the few slips have no
+    influence, at the order 1 to 7 for which it is smallest: a smooth, well sampled signal
+    contributes less at higher orders. A digitized trace has at least the noise of its resolution.
+    Noise that is correlated from sample to sample, as behind a filter, is underestimated.
 
     Parameters
     ----------
@@ -102,11 +103,11 @@ def noise_level(force: Array) -> float:
 
 
 def estimated_period(time: Array, force: Array, noise: float) -> float:
-    """Period of the setup [s], guessed from the deep falls of a trace; infinite if there are none.
+    """Period of the setup [s], estimated from the deepest falls of a trace; infinite without falls.
 
-    A slider without contacts falls for half a period, along half a wave; contacts that attach make
-    that shorter. Noise blurs the ends of a fall, so the time between 90 and
-    10 % of the depth counts, the median of all falls at least half as deep as the deepest.
+    The force of a slider without contacts falls for half a period of a sine; contacts that attach
+    shorten the fall. As noise blurs the ends of a fall, its duration is that between 90 and 10 % of
+    the depth. The estimate is from the median over the falls at least half as deep as the deepest.
     """
     tops, bottoms = _falls(force, _height(force, noise))
     if tops.size == 0:
@@ -119,7 +120,7 @@ def estimated_period(time: Array, force: Array, noise: float) -> float:
         part = (force[top : bottom + 1] - force[bottom]) / (force[top] - force[bottom])
         high = int(np.flatnonzero(part >= 1 - MARGIN)[-1])
         low = high + int(np.flatnonzero(part[high:] <= MARGIN)[0])
-        # Between the samples on both sides of either crossing.
+        # Interpolated between the samples around each crossing.
         above = high + (part[high] - (1 - MARGIN)) / (part[high] - part[high + 1])
         below = low - (MARGIN - part[low]) / (part[low - 1] - part[low])
         durations.append((below - above) * interval)
@@ -159,18 +160,18 @@ def find_slips(
     height = _height(force, noise)
     tops, bottoms = _falls(force, height)
     if tops.size == 0 or not math.isfinite(period):
-        nothing, none = np.empty(0), np.empty(0, dtype=int)
-        return FoundSlips(nothing, nothing, nothing, nothing, nothing, none, none)
+        empty, no_samples = np.empty(0), np.empty(0, dtype=int)
+        return FoundSlips(empty, empty, empty, empty, empty, no_samples, no_samples)
     half = max(1, round(period / 2 / interval))
-    # Wide enough to average, narrow enough to follow what rings faster than the setup.
+    # Wide enough to average over noise, narrow enough for ringing faster than that of the setup.
     width = 2 * max(1, half // 8) + 1
     rate = savgol_filter(force, max(width, 3), 1, deriv=1, delta=interval, mode="nearest")
-    regain = max(1, round(LONGEST_RISE * half))
-    least_rate = LEAST_RATE * 2 * math.pi / period * float(np.max(np.abs(force)))
+    regain = max(1, round(MAX_RISE * half))
+    min_rate = MIN_RATE * 2 * math.pi / period * float(np.max(np.abs(force)))
     rows = []
-    at = 0
-    while at < len(tops):
-        top, bottom, after = int(tops[at]), int(bottoms[at]), at + 1
+    number = 0
+    while number < len(tops):
+        top, bottom, after = int(tops[number]), int(bottoms[number]), number + 1
         regained = force[top] - force[max(0, top - regain) : top + 1].min()
         while (
             after < len(tops)
@@ -182,11 +183,11 @@ def find_slips(
             after += 1
         drop = force[top] - force[bottom]
         steepest = float(-rate[top : bottom + 1].min())
-        # Noise adds to both, as extremes are taken.
+        # Noise increases both, as they are differences of extremes.
         excess = min(drop, EXTREME_NOISE * noise)
-        if drop - excess > LEAST_FALL * max(regained - excess, 0.0) and steepest > least_rate:
+        if drop - excess > MIN_FALL_RATIO * max(regained - excess, 0.0) and steepest > min_rate:
             rows.append((*_ends(time, force, top, bottom, noise, half), steepest))
-        at = after
+        number = after
     start, end, before, behind, steepest_rate = np.array(rows).reshape(-1, 5).T
     first, last = start.astype(int), end.astype(int)
     return FoundSlips(
@@ -201,15 +202,15 @@ def find_slips(
 
 
 def _height(force: Array, noise: float) -> float:
-    """Height by which maxima must stand out [N]."""
-    return max(PROMINENCE * noise, LEAST_HEIGHT * float(np.max(np.abs(force))))
+    """Minimum prominence of maxima [N]."""
+    return max(PROMINENCE * noise, MIN_HEIGHT * float(np.max(np.abs(force))))
 
 
 def _falls(force: Array, height: float) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Samples of maxima that stand out, and of the least force before the next of them."""
+    """Samples of prominent maxima, and of the minimum before the next of them."""
     from scipy.signal import find_peaks
 
-    # Ends of the trace may be maxima too.
+    # The ends of the trace may be maxima too.
     padded = np.concatenate([[-np.inf], force, [-np.inf]])
     tops = find_peaks(padded, prominence=height)[0] - 1
     if tops.size == 0:
@@ -220,7 +221,7 @@ def _falls(force: Array, height: float) -> tuple[NDArray[np.int_], NDArray[np.in
             for top, after in zip(tops, [*tops[1:], len(force)], strict=True)
         ]
     )
-    # A trace that begins with a fall does not tell where that began.
+    # The start of a fall at the first sample is not recorded.
     deep = (force[tops] - force[bottoms] > height) & (tops > 0)
     return tops[deep], bottoms[deep]
 
@@ -228,18 +229,19 @@ def _falls(force: Array, height: float) -> tuple[NDArray[np.int_], NDArray[np.in
 def _ends(
     time: Array, force: Array, top: int, bottom: int, noise: float, half: int
 ) -> tuple[float, float, float, float]:
-    """Samples of start and end of a slip, and the forces there with noise averaged out."""
-    # While it sticks the force grows slowly, so its greatest sample is any of the last ones: the
-    # level is that of the line through them, and the start where means of some samples leave it.
+    """Samples of start and end of a slip, and the forces there, averaged over the noise."""
+    # The force grows slowly before a slip, so that noise decides which sample is the maximum. The
+    # level is that of a line through the samples before, and the slip starts where means over
+    # some samples fall below it.
     wide = max(1, min(half // 4, (bottom - top) // 3))
     low = max(0, top - max(4, half))
     level = force[top]
     if noise > 0 and top - low >= 3:
-        # Without the greatest sample, which is so by its noise.
+        # Without the maximum, which is biased by its noise.
         span = slice(low, top)
         slope, fitted = np.polyfit(time[span] - time[top], force[span], 1)
         residual = np.std(force[span] - fitted - slope * (time[span] - time[top]))
-        # Where it rings before the slip a straight line tells nothing.
+        # Ringing before the slip does not follow a straight line.
         if residual < 2 * noise:
             level = float(fitted)
     means = np.convolve(force[top : bottom + wide], np.full(wide, 1 / wide), "valid")

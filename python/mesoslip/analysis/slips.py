@@ -36,9 +36,9 @@ def slips(output: OutputLike) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        The group ``slips`` of the output, with the coordinate ``realization_index``, and with
-        ``duration`` and ``waiting_time``, the time since the start of the slip before; NaN for the
-        first slip of a realization.
+        The group ``slips`` of the output with the coordinate ``realization_index``, the
+        ``duration``, and the ``waiting_time`` since the start of the slip before, NaN for the first
+        slip of a realization.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def slips(output: OutputLike) -> xr.Dataset:
     if data.sizes["slip"]:
         waiting[np.diff(data["realization_index"].values, prepend=-1) != 0] = np.nan
     return data.assign(
-        duration=duration.assign_attrs(units="s", long_name="duration of the drop"),
+        duration=duration.assign_attrs(units="s", long_name="duration of the slip"),
         waiting_time=xr.Variable(
             "slip", waiting, {"units": "s", "long_name": "time since the start of the slip before"}
         ),
@@ -61,9 +61,9 @@ def slips(output: OutputLike) -> xr.Dataset:
 
 
 def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
-    """Mean, standard deviation, minimum and maximum of each column, in SI; and the number of slips.
+    """Number of slips; mean, standard deviation, minimum and maximum of each column, in SI.
 
-    The first slip of a run from relaxed contacts is larger than the others and is part of this.
+    The first slip of a run counts too.
     """
     data = slips(tree)
     result: dict[str, dict[str, float]] = {"slips": {"count": float(data.sizes["slip"])}}
@@ -80,7 +80,7 @@ def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
 
 
 def rows(tree: xr.DataTree) -> list[dict[str, Any]]:
-    """The catalogue, a dictionary for each slip; waiting time None for a realization's first."""
+    """The catalogue, a dictionary for each slip; None for unknown values."""
     data = slips(tree)
     columns = [data[name].values.tolist() for name in COLUMNS]
     return [

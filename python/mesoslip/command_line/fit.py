@@ -91,7 +91,7 @@ def fit(
                         "interval_90": [row.percentiles[0], row.percentiles[4]],
                         "shrinkage": row.shrinkage,
                         "verdict": row.verdict,
-                        "informed_by": row.informed_by,
+                        "most_informative": row.most_informative,
                     }
                     for row in rows
                 },
@@ -135,7 +135,7 @@ def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:
                 scale.name,
                 row.verdict,
                 f"{row.shrinkage:.2f}",
-                row.informed_by,
+                row.most_informative,
             ]
         )
     print_table(cells)

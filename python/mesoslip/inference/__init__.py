@@ -1,1 +1,1 @@
-"""Parameters from a trace, with their uncertainty."""
+"""Bayesian estimates of parameters from a trace."""

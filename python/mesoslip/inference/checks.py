@@ -1,4 +1,4 @@
-"""Whether the model describes the trace, and what the trace says of each parameter."""
+"""Posterior checks: agreement of model and trace, and information on each parameter."""
 
 from __future__ import annotations
 
@@ -14,29 +14,31 @@ from mesoslip.inference.summaries import Feature
 
 Array = NDArray[np.float64]
 
-# Probability below which the model is said not to describe the trace.
+# Probability below which the model is rejected.
 REJECTED = 0.02
-# Parts of predicted traces that have, or have not, a summary for the trace to be unlike them.
+# Fractions of predicted traces with a summary above, or below, which a trace without it, or with
+# it, disagrees.
 NEARLY_ALL, HARDLY_ANY = 0.95, 0.05
-# Spreads beyond which a deviation is cut off, and what is added to a covariance, in parts of the
-# mean variance.
-LARGEST_DEVIATION = 30.0
+# Maximum deviation, in spreads, and regularization of a covariance, in mean variances.
+MAX_DEVIATION = 30.0
 RIDGE = 1e-3
 # Standard deviation of the prior on the unit cube.
 PRIOR_DEVIATION = 12**-0.5
-# Shrinkage from prior to posterior below which a parameter is not determined, and from which it is.
+# Shrinkage below which a parameter is not determined, and from which it is determined.
 UNDETERMINED, DETERMINED = 0.25, 0.75
-# Correlation from which two parameters are only determined together.
-TOGETHER = 0.9
-# Part of the draws in an outer part of the range that tells that the range is too narrow.
-EDGE, AT_EDGE = 0.02, 0.1
-# Summaries that are named.
-NAMED = 3
+# Correlation above which two parameters are only determined together.
+MAX_CORRELATION = 0.9
+# Width of the margin at the ends of a range, and maximum fraction of the draws in it.
+MARGIN, MAX_IN_MARGIN = 0.02, 0.1
+# Maximum R-hat of converged chains.
+MAX_R_HAT = 1.05
+# Maximum number of disagreements in a warning.
+MAX_NAMED = 3
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A summary in which the trace is unlike what the model predicts.
+    """A summary in which the trace disagrees with the predictions.
 
     Attributes
     ----------
@@ -44,7 +46,7 @@ class Disagreement:
         The summary.
     score
         Deviation of the trace from the median prediction, in spreads of the predictions; infinite
-        if only one of them has it.
+        if the summary is defined only for one of them.
     """
 
     feature: Feature
@@ -54,23 +56,23 @@ class Disagreement:
         if np.isfinite(self.score):
             return f"{self.feature.name} ({self.feature.meaning}) is off by {self.score:+.1f} sigma"
         if self.score > 0:
-            return f"the trace has {self.feature.name}, and hardly any prediction has"
-        return f"nearly all predictions have {self.feature.name}, and the trace has not"
+            return f"{self.feature.name} is defined for the trace, but for hardly any prediction"
+        return f"{self.feature.name} is defined for nearly all predictions, but not for the trace"
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How the trace compares with predictions.
+    """Comparison of the trace with predictions.
 
     Attributes
     ----------
     probability
-        Part of predicted traces that are at least as unlike the others as the trace is.
+        Fraction of predicted traces that deviate from the others at least as much as the trace.
     scores
         Deviation of each summary from the median prediction, in spreads of the predictions; NaN
-        where it cannot be compared.
+        if they cannot be compared.
     worst
-        Of the groups of summaries that disagree most, the summary that is farthest off.
+        The summary with the largest deviation of each of the groups that disagree most.
     """
 
     probability: float
@@ -79,7 +81,7 @@ class Agreement:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether the model does not describe the trace."""
+        """Whether the model is rejected."""
         return self.probability < REJECTED
 
 
@@ -88,10 +90,10 @@ def compare(
 ) -> Agreement:
     """Compare a trace with predictions of the posterior.
 
-    Each group of summaries gives a distance, that of Mahalanobis with the covariance of simulations
-    near the posterior, so that a trace is unlike the others if its summaries do not go together as
-    theirs do. Distances are judged by those of the predictions: no law is assumed. The group that
-    disagrees most counts, and is judged by the groups of the predictions that disagree most.
+    The distance of each group of summaries is Mahalanobis', with the covariance of simulations near
+    the posterior, so that unusual combinations of summaries disagree too. Distances are ranked
+    among those of the predictions, without assuming a distribution. The group with the largest
+    disagreement counts, compared with the largest one of each prediction.
 
     Parameters
     ----------
@@ -100,16 +102,16 @@ def compare(
     simulated
         Summaries of simulations near the posterior, shape (simulations, summaries).
     predicted
-        Summaries of traces that the posterior predicts, shape (traces, summaries).
+        Summaries of traces predicted by the posterior, shape (traces, summaries).
     observed
         Summaries of the trace.
     """
-    has = np.isfinite(predicted).mean(axis=0)
-    there = np.isfinite(observed)
-    missing = (has >= NEARLY_ALL) & ~there
-    extra = (has <= HARDLY_ANY) & there
+    defined = np.isfinite(predicted).mean(axis=0)
+    is_observed = np.isfinite(observed)
+    missing = (defined >= NEARLY_ALL) & ~is_observed
+    extra = (defined <= HARDLY_ANY) & is_observed
     scores = np.full(len(features), np.nan)
-    compared = there & (has >= NEARLY_ALL)
+    compared = is_observed & (defined >= NEARLY_ALL)
     centre = np.full(len(features), np.nan)
     spread = np.full(len(features), np.nan)
     centre[compared] = np.nanmedian(predicted[:, compared], axis=0)
@@ -120,43 +122,43 @@ def compare(
     names = np.array([one.group for one in features])
     groups = [one for one in dict.fromkeys(names) if np.any(compared & (names == one))]
     own, trace = np.zeros((len(predicted), len(groups))), np.zeros(len(groups))
-    for place, group in enumerate(groups):
+    for index, group in enumerate(groups):
         inside = compared & (names == group)
         reference, others, mine = (
             np.clip(
                 np.nan_to_num((one[..., inside] - centre[inside]) / spread[inside]),
-                -LARGEST_DEVIATION,
-                LARGEST_DEVIATION,
+                -MAX_DEVIATION,
+                MAX_DEVIATION,
             )
             for one in (simulated, predicted, observed)
         )
         covariance = np.cov(reference.T).reshape(len(mine), -1)
-        # What is hardly ever different in simulations is taken to differ a little.
+        # Regularized, for summaries that hardly vary in simulations.
         covariance += RIDGE * np.mean(np.diag(covariance)) * np.eye(len(mine))
         inverse = np.linalg.inv(covariance)
-        own[:, place] = np.einsum("ij,jk,ik->i", others, inverse, others)
-        trace[place] = mine @ inverse @ mine
-    # Of each prediction the part of all that are at least as far off, group by group.
+        own[:, index] = np.einsum("ij,jk,ik->i", others, inverse, others)
+        trace[index] = mine @ inverse @ mine
+    # For each prediction and group, the fraction of predictions at the same distance or more.
     count = len(predicted)
     ranks = (count - np.argsort(np.argsort(own, axis=0), axis=0)) / count
     parts = (1 + np.sum(own >= trace, axis=0)) / (1 + count)
-    least = ranks.min(axis=1, initial=1.0)
-    probability = (1 + np.sum(least <= parts.min(initial=1.0))) / (1 + count)
+    min_ranks = ranks.min(axis=1, initial=1.0)
+    probability = (1 + np.sum(min_ranks <= parts.min(initial=1.0))) / (1 + count)
     found = []
-    for place in np.argsort(parts):
-        inside = np.where(compared & (names == groups[place]), np.abs(scores), -1.0)
-        farthest = int(np.argmax(inside))
-        found.append(Disagreement(features[farthest], float(scores[farthest])))
+    for index in np.argsort(parts):
+        inside = np.where(compared & (names == groups[index]), np.abs(scores), -1.0)
+        largest = int(np.argmax(inside))
+        found.append(Disagreement(features[largest], float(scores[largest])))
     scores[missing], scores[extra] = -np.inf, np.inf
-    for place in np.flatnonzero(missing | extra)[::-1]:
-        one = Disagreement(features[place], float(scores[place]))
+    for index in np.flatnonzero(missing | extra)[::-1]:
+        one = Disagreement(features[index], float(scores[index]))
         found = [one, *(other for other in found if other.feature.group != one.feature.group)]
         probability = 1 / (1 + count)
-    return Agreement(float(probability), scores, tuple(found[:NAMED]))
+    return Agreement(float(probability), scores, tuple(found[:MAX_NAMED]))
 
 
 def shrinkage(draws: Array) -> Array:
-    """How much narrower the posterior is than the prior, 0 (no narrower) to 1.
+    """Shrinkage from prior to posterior, 1 - (standard deviation)/(that of the prior), from 0 to 1.
 
     Parameters
     ----------
@@ -166,13 +168,13 @@ def shrinkage(draws: Array) -> Array:
     return np.asarray(np.clip(1 - draws.std(axis=0) / PRIOR_DEVIATION, 0, 1))
 
 
-def informed_by(
+def information(
     features: Sequence[Feature],
     parameters: Array,
     summaries: Array,
     observed: Array,
 ) -> dict[str, Array]:
-    """What each group of summaries alone tells of each parameter.
+    """Information of each group of summaries alone on each parameter.
 
     Parameters
     ----------
@@ -186,8 +188,8 @@ def informed_by(
     Returns
     -------
     dict
-        By group, the part of the variance of each parameter over the simulations that the group
-        predicts, 0 to 1.
+        For each group, the fraction of the variance of each parameter over the simulations that the
+        group predicts, 0 to 1.
     """
     result = {}
     for group in dict.fromkeys(one.group for one in features):
@@ -202,34 +204,34 @@ def informed_by(
 
 
 def warnings(prior: Prior, draws: Array, agreement: Agreement, r_hat: Array) -> Iterator[str]:
-    """What a user must know before using the parameters."""
+    """Warnings on the parameters of a fit."""
     if agreement.is_rejected:
-        told = "; ".join(str(one) for one in agreement.worst)
+        reasons = "; ".join(str(one) for one in agreement.worst)
         yield (
             "no parameters in the ranges describe the trace "
-            f"(p = {agreement.probability:.2g}): {told}"
+            f"(p = {agreement.probability:.2g}): {reasons}"
         )
     shrunk = shrinkage(draws)
     for one, part in zip(prior.free, shrunk, strict=True):
         if part < UNDETERMINED:
-            yield f"{one.key} is not determined by this trace: the result is the range given"
-    for place, one in enumerate(prior.free):
-        if shrunk[place] < UNDETERMINED:
+            yield f"{one.key} is not determined by this trace: its posterior is close to its prior"
+    for index, one in enumerate(prior.free):
+        if shrunk[index] < UNDETERMINED:
             continue
         for name, part in (
-            ("from", np.mean(draws[:, place] < EDGE)),
-            ("to", np.mean(draws[:, place] > 1 - EDGE)),
+            ("from", np.mean(draws[:, index] < MARGIN)),
+            ("to", np.mean(draws[:, index] > 1 - MARGIN)),
         ):
-            if part > AT_EDGE:
+            if part > MAX_IN_MARGIN:
                 yield f"{one.key} lies at the end of its range: widen fit.free.{one.key}.{name}"
     correlation = np.corrcoef(draws.T).reshape(len(prior), -1)
     for first in range(len(prior)):
         for second in range(first + 1, len(prior)):
             value = correlation[first, second]
-            if abs(value) > TOGETHER:
+            if abs(value) > MAX_CORRELATION:
                 yield (
                     f"{prior.free[first].key} and {prior.free[second].key} are only determined "
                     f"together (correlation {value:+.2f})"
                 )
-    if np.max(r_hat) > 1.05:
-        yield f"the chains do not agree (R-hat {np.max(r_hat):.2f}); give more fit.simulations"
+    if np.max(r_hat) > MAX_R_HAT:
+        yield f"the chains do not agree (R-hat {np.max(r_hat):.2f}): increase fit.simulations"

@@ -1,4 +1,4 @@
-"""From a trace to the posterior of the parameters, from start to end."""
+"""Fits of a trace: from the trace to the posterior of the parameters."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.execution.store import Store
-from mesoslip.inference.checks import Agreement, compare, informed_by
+from mesoslip.inference.checks import Agreement, compare, information
 from mesoslip.inference.plan import Plan
-from mesoslip.inference.rounds import Estimate, close_in
+from mesoslip.inference.rounds import Estimate, estimate_posterior
 from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
@@ -30,49 +30,49 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Least noise, in parts of the greatest force: traces with less get more, measured and simulated
-# alike, as no summary is to hang on what no experiment resolves.
-LEAST_NOISE = 5e-4
-# Traces that the posterior predicts.
+# Minimum noise over the maximum force. It is added to measured and simulated traces with less, as
+# experiments resolve no smaller differences.
+MIN_NOISE = 5e-4
+# Number of predicted traces.
 PREDICTIONS = 160
-# Samples of a predicted trace that are kept.
-MOST_SAMPLES = 3000
-# Least samples of a trace.
-LEAST_SAMPLES = 200
-# Differences of what a trace and a configuration say, in parts.
-SAME = 0.01
+# Maximum number of stored samples of a predicted trace.
+MAX_SAMPLES = 3000
+# Minimum number of samples of a trace.
+MIN_SAMPLES = 200
+# Maximum relative difference between a trace and its configuration.
+MAX_DIFFERENCE = 0.01
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """What a fit gives.
+class FitResult:
+    """The result of a fit.
 
     Attributes
     ----------
     plan
-        What was fitted.
+        The plan of the fit.
     simulator
-        How the experiment is simulated.
+        The simulator of the experiment.
     time, force
-        The trace, as it was used [s], [N].
+        The trace as used in the fit [s], [N].
     observed
-        Its summaries.
+        Summaries of the trace.
     estimate
         The posterior.
     agreement
-        Whether the model describes the trace.
+        Comparison of the trace with predictions.
     information
-        What each group of summaries alone tells, see `mesoslip.inference.checks.informed_by`.
+        Information of each group of summaries, see `mesoslip.inference.checks.information`.
     observed_slips
         Slips of the trace.
     predicted
         Summaries of predicted traces.
     predicted_force
-        Predicted traces at some of the times, shape (traces, samples) [N].
+        Predicted traces, every `stride`-th sample, shape (traces, samples) [N].
     predicted_slips
-        Their slips.
+        Slips of the predicted traces.
     stride
-        Of the samples that are kept.
+        Distance of the stored samples.
     simulations
         Number of simulations.
     """
@@ -101,33 +101,33 @@ def fit(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
-) -> Fitted:
+) -> FitResult:
     """Fit parameters to a trace.
 
     Parameters
     ----------
     tree
-        An output with a trace; its first realization counts.
+        An output with a trace; its first realization is fitted.
     plan
-        What is free.
+        The free parameters, and the known ones.
     store
-        Folder in which simulations are kept, so that a fit that was stopped can be continued.
+        Folder for finished simulations, so that a stopped fit can be continued; none by default.
     executor
-        Where simulations are computed, or how many threads compute them; as many as there are
-        processors by default. The result does not depend on it.
+        Executor of the simulations, or a number of threads; by default one per processor. The
+        result does not depend on it.
     progress
-        Called now and then with the fraction of the simulations that is done.
+        Called with the fraction of finished simulations.
     stop
-        A request to stop; Ctrl-C is one too.
+        A request to stop; Ctrl-C stops too.
 
     Raises
     ------
     FileError, ConfigError
         If the trace cannot be fitted, or the configuration contradicts it.
     RunError
-        If no simulation is like the trace, or emcee is not installed.
+        If too few simulations resemble the trace, or emcee is not installed.
     mesoslip.execution.stop.StoppedError
-        If it was stopped.
+        If the fit is stopped.
     """
     check_installed()
     simulator, force = prepare(tree, plan)
@@ -146,19 +146,17 @@ def fit(
             progress=progress,
             stop=stop,
         )
-        estimate = close_in(simulations, observed, plan.simulations, rng)
+        estimate = estimate_posterior(simulations, observed, plan.simulations, rng)
         chosen = estimate.draws[rng.choice(len(estimate.draws), PREDICTIONS, replace=False)]
-        stride = max(1, len(force) // MOST_SAMPLES)
+        stride = max(1, len(force) // MAX_SAMPLES)
         forces, slips, predicted = [], [], []
         for one in simulations.forces(chosen):
             forces.append(one[::stride].astype(np.float32))
             slips.append(summarizer.slips(one))
             predicted.append(summarizer(one))
     agreement = compare(summarizer.features, estimate.summaries, np.array(predicted), observed)
-    information = informed_by(
-        summarizer.features, estimate.parameters, estimate.summaries, observed
-    )
-    return Fitted(
+    informed = information(summarizer.features, estimate.parameters, estimate.summaries, observed)
+    return FitResult(
         plan,
         simulator,
         summarizer.time,
@@ -166,7 +164,7 @@ def fit(
         observed,
         estimate,
         agreement,
-        information,
+        informed,
         summarizer.slips(force),
         np.array(predicted),
         np.array(forces),
@@ -177,7 +175,7 @@ def fit(
 
 
 def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
-    """How to simulate an experiment, and its trace at equal intervals, with noise.
+    """The simulator of an experiment, and its trace at equal intervals, with noise.
 
     Raises
     ------
@@ -189,23 +187,23 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
     time = time - time[0]
     interval = float(np.median(np.diff(time)))
     skipped = round(plan.after / interval)
-    if len(force) - skipped < LEAST_SAMPLES:
+    if len(force) - skipped < MIN_SAMPLES:
         raise FileError(
             f"the trace has {max(len(force) - skipped, 0)} samples"
             + (f" after {plan.after:g} s" if skipped else "")
-            + f"; a fit needs at least {LEAST_SAMPLES}"
+            + f"; a fit needs at least {MIN_SAMPLES}"
         )
     if plan.config.drive.parts and plan.config.duration < (len(force) - 1.5) * interval:
         raise FileError(
-            f"the trace takes {(len(force) - 1) * interval:g} s, and the run of the configuration "
-            f"ends after {plan.config.duration:g} s: give [drive] the stages of the whole trace"
+            f"the trace has a duration of {(len(force) - 1) * interval:g} s, the stages of [drive] "
+            f"only {plan.config.duration:g} s: give stages for the whole trace"
         )
     changes: dict[str, Any] = {
         "run": {"engine": "eq", "realizations": 1},
         "output": {"interval": interval},
     }
     if not plan.config.drive.parts:
-        # A little longer, so that rounding does not cost the last sample.
+        # Longer by half an interval, so that rounding does not lose the last sample.
         changes["run"]["duration"] = (len(force) - 0.5) * interval
     tables = plan.config.to_dict()
     tables["output"] = {}
@@ -217,11 +215,11 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
     scale = float(np.max(np.abs(force)))
     if scale == 0:
         raise FileError("the force of the trace is 0 throughout")
-    least = LEAST_NOISE * scale
-    if noise < least:
-        more = np.random.default_rng([plan.seed, 1]).standard_normal(len(force))
-        force = force + math.sqrt(least**2 - noise**2) * more
-        noise = least
+    min_noise = MIN_NOISE * scale
+    if noise < min_noise:
+        added = np.random.default_rng([plan.seed, 1]).standard_normal(len(force))
+        force = force + math.sqrt(min_noise**2 - noise**2) * added
+        noise = min_noise
     velocity = first_velocity(config) or 1.0
     summarizer = Summarizer(
         time[: len(force)],
@@ -235,7 +233,7 @@ def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
 
 
 def _period(plan: Plan, time: Array, force: Array, noise: float) -> float:
-    """The period by which slips are found, the same for every trace [s]."""
+    """The period of the setup for finding slips, the same for every trace [s]."""
     known = 2 * plan.config.slider.quiet_time
     estimated = estimated_period(time, force, noise)
     is_known = not {"slider.mass", "slider.stiffness"} & set(plan.prior.keys)
@@ -245,28 +243,28 @@ def _period(plan: Plan, time: Array, force: Array, noise: float) -> float:
 
 
 def _check_known(tree: xr.DataTree, plan: Plan) -> None:
-    """Make sure that the trace and the configuration do not contradict each other.
+    """Check that the trace and the configuration do not contradict each other.
 
     Raises
     ------
     FileError, ConfigError
-        If there is no trace, or they do.
+        If there is no trace, or a contradiction.
     """
     import tomllib
 
     if "spring_force" not in tree.data_vars:
-        raise FileError("the output has no trace of a spring force")
-    told = tomllib.loads(tree.attrs["configuration"])
+        raise FileError("the output has no trace of the spring force")
+    traced = tomllib.loads(tree.attrs["configuration"])
     free, problems = set(plan.prior.keys), []
-    # Of a simulated trace everything is known; it is not to be used.
+    # Further keys of a simulated trace are not compared: an experiment has none.
     for table, name in (("drive", "velocity"), ("slider", "stiffness")):
-        measured = told.get(table, {}).get(name)
+        measured = traced.get(table, {}).get(name)
         given = getattr(getattr(plan.config, table), name, None)
         key = f"{table}.{name}"
         if measured is None or given is None or key in free:
             continue
-        if abs(measured - given) > SAME * abs(measured):
-            message = f"the trace says {measured:g}; change it, or make it free in [fit.free]"
+        if abs(measured - given) > MAX_DIFFERENCE * abs(measured):
+            message = f"is {measured:g} in the trace; change it, or make it free in [fit.free]"
             problems.append(Problem("configuration", key, message, given))
     if problems:
         raise ConfigError(problems)

@@ -1,16 +1,16 @@
-"""The synthetic likelihood of a trace's summaries, as a function learnt from simulations.
+"""The synthetic likelihood of the summaries of a trace, learnt from simulations.
 
-In two steps, each a regression on simulations near the parameters that matter:
+Two regressions on simulations near the posterior:
 
-1. **Statistics.** The expected parameters given the summaries: one number a parameter, a linear
+1. **Statistics.** The expected parameters given the summaries: one statistic a parameter, a linear
    combination of all summaries, by ridge regression (Fearnhead & Prangle 2012, J. R. Stat. Soc. B
-   74, 419). Being sums of many summaries they are nearly normal, which the summaries are not.
-2. **Synthetic likelihood** (Wood 2010, Nature 466, 1102). The statistics of a trace are normal with
-   a mean that is a polynomial of the parameters, and a covariance that grows or shrinks with them.
+   74, 419). As sums of many summaries they are nearly normal, unlike the summaries themselves.
+2. **Synthetic likelihood** (Wood 2010, Nature 466, 1102). The statistics of a trace are normal,
+   with a mean that is a polynomial of the parameters, and a covariance that depends on them.
 
-A simulation's own statistics are predicted by a regression of all others, and those of the trace by
-one of all simulations, so both scatter alike. The uncertainty of the polynomial is part of the
-covariance; and what the polynomial cannot follow is, as a part of the residuals, too.
+The statistics of a simulation are predicted by the regression of all others, those of the trace by
+the regression of all simulations, so that both have the same scatter. The covariance includes the
+uncertainty of the polynomial, and its misfit as part of the residuals.
 """
 
 from __future__ import annotations
@@ -25,24 +25,25 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Summaries beyond this many spreads of the simulations are cut off there.
-LARGEST_SCORE = 6.0
+# Maximum deviation of a summary, in spreads of the simulations.
+MAX_SCORE = 6.0
+# Penalties of the ridge regression per simulation.
 RIDGES = np.geomspace(1e-6, 1e2, 33)
-# Influence of a simulation on its own statistics, beyond which nothing is left without it.
-LARGEST_LEVERAGE = 1 - 1e-6
-# Simulations for each coefficient before the polynomial is given one more degree.
+# Maximum leverage of a simulation on its own statistics.
+MAX_LEVERAGE = 1 - 1e-6
+# Minimum number of simulations per coefficient of the polynomial.
 SIMULATIONS_PER_TERM = 8
-# Degrees of freedom of tails that are tried, beside normal ones.
+# Degrees of freedom of the distributions that are tried, beside the normal one.
 FREEDOMS = (3.0, 4.0, 6.0, 9.0, 14.0, 25.0)
-# Median of the size of a standard normal deviate.
+# Median of the absolute value of a standard normal deviate.
 NORMAL_MEDIAN = 0.6744897501960817
-# Range of the logarithm of a standard deviation over the region.
-LARGEST_LOG_RANGE = 1.5
+# Maximum change of the logarithm of a standard deviation over one spread of the parameters.
+MAX_LOG_SLOPE = 1.5
 
 
 @dataclass(frozen=True)
 class Projection:
-    """Statistics of summaries: linear functions of them after they were brought to one scale."""
+    """Statistics of summaries: linear functions of the standardized summaries."""
 
     used: NDArray[np.bool_]
     centre: Array
@@ -54,7 +55,7 @@ class Projection:
     def scores(self, summaries: Array) -> Array:
         """Summaries in units of their spread, shape (..., used summaries)."""
         scores = (summaries[..., self.used] - self.centre) / self.spread
-        return np.asarray(np.clip(scores, -LARGEST_SCORE, LARGEST_SCORE))
+        return np.asarray(np.clip(scores, -MAX_SCORE, MAX_SCORE))
 
     def __call__(self, summaries: Array) -> Array:
         """Statistics, shape (..., parameters)."""
@@ -69,19 +70,18 @@ def _with_squares(scores: Array, has_squares: bool) -> Array:
 
 
 def usable(summaries: Array, observed: Array) -> NDArray[np.bool_]:
-    """Summaries that the trace has, and nearly all simulations.
+    """Whether each summary is defined for the trace and for most simulations.
 
     Parameters
     ----------
     summaries
-        Of simulations, shape (simulations, summaries); NaN for what one has not.
+        Of simulations, shape (simulations, summaries); NaN if undefined.
     observed
-        Of the trace, shape (summaries,).
+        Summaries of the trace, shape (summaries,).
     """
     finite = np.isfinite(summaries)
-    most = finite.mean(axis=0) > 0.5
-    # A trace that has what few simulations have is compared with those that have it.
-    return np.asarray(np.isfinite(observed) & most)
+    is_common = finite.mean(axis=0) > 0.5
+    return np.asarray(np.isfinite(observed) & is_common)
 
 
 def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Projection, Array]:
@@ -99,15 +99,15 @@ def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Proje
     Returns
     -------
     projection, statistics
-        The statistics; and those of each simulation, shape (simulations, parameters), by the
-        regression of all others.
+        The projection, and the statistics of each simulation by the regression of all others, shape
+        (simulations, parameters).
     """
     used = usable(summaries, observed)
     values = summaries[:, used]
     centre = np.median(values, axis=0)
     low, high = np.percentile(values, [16, 84], axis=0)
     spread = (high - low) / 2
-    # What does not vary says nothing.
+    # Constant summaries carry no information.
     varies = spread > 1e-9 * (1 + np.abs(centre))
     used = used.copy()
     used[np.flatnonzero(used)[~varies]] = False
@@ -121,12 +121,12 @@ def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Proje
 
 
 def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array, Array]:
-    """Ridge regression; the penalty of each parameter by leaving out one simulation at a time.
+    """Ridge regression; the penalty of each parameter is chosen by leave-one-out validation.
 
     Returns
     -------
     weights, offset, left_out
-        Of the regression; and what it predicts of each simulation when it is not in it.
+        Coefficients of the regression, and its prediction for each simulation left out.
     """
     middle, mean = scores.mean(axis=0), parameters.mean(axis=0)
     left, sizes, right = np.linalg.svd(scores - middle, full_matrices=False)
@@ -135,43 +135,44 @@ def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array, Array]:
     weights = np.empty((scores.shape[1], parameters.shape[1]))
     left_out = np.empty_like(parameters)
     shrunk = sizes**2 / (sizes**2 + count * RIDGES[:, None])
-    # Influence of each simulation on what is predicted of itself, shape (simulations, ridges).
-    leverage = np.minimum(1 / count + left**2 @ shrunk.T, LARGEST_LEVERAGE)
-    for place in range(parameters.shape[1]):
-        predicted = mean[place] + left @ (shrunk * along[:, place]).T
-        without = predicted - parameters[:, [place]]
-        without = without / (1 - leverage) + parameters[:, [place]]
-        best = int(np.argmin(np.sum((without - parameters[:, [place]]) ** 2, axis=0)))
-        left_out[:, place] = without[:, best]
-        weights[:, place] = right.T @ (shrunk[best] / np.maximum(sizes, 1e-300) * along[:, place])
+    # Leverage of each simulation on its own prediction, shape (simulations, ridges).
+    leverage = np.minimum(1 / count + left**2 @ shrunk.T, MAX_LEVERAGE)
+    for index in range(parameters.shape[1]):
+        predicted = mean[index] + left @ (shrunk * along[:, index]).T
+        without = predicted - parameters[:, [index]]
+        without = without / (1 - leverage) + parameters[:, [index]]
+        best = int(np.argmin(np.sum((without - parameters[:, [index]]) ** 2, axis=0)))
+        left_out[:, index] = without[:, best]
+        weights[:, index] = right.T @ (shrunk[best] / np.maximum(sizes, 1e-300) * along[:, index])
     return weights, mean - middle @ weights, left_out
 
 
 @dataclass(frozen=True)
 class Surrogate:
-    """The synthetic likelihood, within the region of the simulations that it was learnt from.
+    """The synthetic likelihood, valid in the region of the simulations it was learnt from.
 
     Attributes
     ----------
     powers
-        Factors of each term of the polynomial: numbers of parameters.
+        Factors of each term of the polynomial: indices of parameters.
     centre, spread
-        By which parameters are brought to one scale.
+        Centre and spread of the parameters, for standardization.
     coefficients
-        Of the polynomial, shape (terms, statistics).
+        Coefficients of the polynomial, shape (terms, statistics).
     inverse
-        (X^T X)^-1 of the regression, which tells the uncertainty of the polynomial.
+        (X^T X)^-1 of the regression, for the uncertainty of the polynomial.
     log_scale
         Coefficients of the logarithm of the standard deviations, shape (1 + parameters,
         statistics).
     log_range
-        Least and greatest logarithm in the simulations, shape (2, statistics).
+        Minimum and maximum of that logarithm over the simulations, shape (2, statistics).
     root
         Cholesky factor of the correlation.
     freedom
-        Degrees of freedom of the tails; infinite for normal ones.
+        Degrees of freedom of the t distribution; infinite for a normal one.
     validity
-        Coefficients of the log odds that a simulation has the summaries of the trace.
+        Coefficients of the log odds that the summaries of the trace are defined for a simulation;
+        None if they always are.
     """
 
     powers: tuple[tuple[int, ...], ...]
@@ -187,7 +188,7 @@ class Surrogate:
 
     @cached_property
     def _unmix(self) -> Array:
-        """What makes correlated deviations independent."""
+        """Transformation of correlated deviations to independent ones."""
         return np.asarray(np.linalg.inv(self.root).T)
 
     def mean(self, parameters: Array) -> Array:
@@ -199,8 +200,8 @@ class Surrogate:
         return _terms((parameters - self.centre) / self.spread, self.powers)
 
     def standardized(self, statistics: Array, parameters: Array) -> tuple[Array, Array]:
-        """Deviations from what is expected in independent standard units, and the logarithm of the
-        determinant of what they were divided by."""
+        """Independent deviations from the mean in standard units, and the log determinant of their
+        scales."""
         scaled = (parameters - self.centre) / self.spread
         terms = _terms(scaled, self.powers)
         leverage = np.sum((terms @ self.inverse) * terms, axis=-1)
@@ -213,12 +214,12 @@ class Surrogate:
         return deviations @ self._unmix, log_scale.sum(axis=-1)
 
     def log_likelihood(self, statistics: Array, parameters: Array) -> Array:
-        """Logarithm of the synthetic likelihood but for a constant, shape (...,).
+        """Logarithm of the synthetic likelihood up to a constant, shape (...,).
 
         Parameters
         ----------
         statistics
-            Of the trace, shape (statistics,).
+            Statistics of the trace, shape (statistics,).
         parameters
             Shape (..., parameters).
         """
@@ -241,11 +242,12 @@ def learn(statistics: Array, parameters: Array, all_parameters: Array) -> Surrog
     Parameters
     ----------
     statistics
-        Of the simulations that have the summaries of the trace, shape (simulations, statistics).
+        Statistics of the simulations for which the summaries of the trace are defined, shape
+        (simulations, statistics).
     parameters
         Their parameters, shape (simulations, parameters).
     all_parameters
-        Parameters of all simulations of the region, those first that have the summaries.
+        Parameters of all simulations of the region, those with the summaries first.
     """
     centre, spread = all_parameters.mean(axis=0), all_parameters.std(axis=0) + 1e-12
     scaled = (parameters - centre) / spread
@@ -256,32 +258,32 @@ def learn(statistics: Array, parameters: Array, all_parameters: Array) -> Surrog
     scale_terms = np.concatenate([np.ones((count, 1)), scaled], axis=1)
     log_scale = np.zeros((1 + size, statistics.shape[1]))
     coefficients = np.empty((len(powers), statistics.shape[1]))
-    # Deviations tell the weights, weights the polynomial.
+    # Alternate: the polynomial with the weights, the weights from its residuals.
     for _ in range(3):
-        for place in range(statistics.shape[1]):
-            root = np.sqrt(weight[:, place])
-            coefficients[:, place] = np.linalg.lstsq(
-                terms * root[:, None], statistics[:, place] * root, rcond=None
+        for index in range(statistics.shape[1]):
+            root = np.sqrt(weight[:, index])
+            coefficients[:, index] = np.linalg.lstsq(
+                terms * root[:, None], statistics[:, index] * root, rcond=None
             )[0]
         residuals = statistics - terms @ coefficients
         residuals *= math.sqrt(count / max(count - len(powers), 1))
         sizes = np.log(np.abs(residuals) + 1e-12)
-        # Of a standard normal deviate the logarithm of the size is -0.635 in the mean.
+        # The mean logarithm of the absolute value of a standard normal deviate is -0.635.
         fitted = np.linalg.lstsq(scale_terms, sizes + 0.6351814, rcond=None)[0]
-        slope = np.maximum(np.sum(np.abs(fitted[1:]), axis=0) / LARGEST_LOG_RANGE, 1)
+        slope = np.maximum(np.sum(np.abs(fitted[1:]), axis=0) / MAX_LOG_SLOPE, 1)
         fitted[1:] /= slope
         log_scale = fitted
         weight = np.exp(-2 * (scale_terms @ log_scale))
         weight /= weight.mean(axis=0)
     logs = scale_terms @ log_scale
     standard = residuals / np.exp(logs)
-    # Medians, as a few far ones do not tell the width of the others.
+    # By the median, which a few large deviations do not change.
     deviation = np.median(np.abs(standard), axis=0) / NORMAL_MEDIAN
     log_scale[0] += np.log(deviation)
     logs = logs + np.log(deviation)
-    standard = np.clip(standard / deviation, -LARGEST_SCORE, LARGEST_SCORE)
+    standard = np.clip(standard / deviation, -MAX_SCORE, MAX_SCORE)
     correlation = np.corrcoef(standard, rowvar=False).reshape(statistics.shape[1], -1)
-    # A little towards independence, so that it stays positive.
+    # Regularized, so that it stays positive definite.
     correlation = 0.98 * correlation + 0.02 * np.eye(statistics.shape[1])
     root = np.linalg.cholesky(correlation)
     distance = np.sum(np.linalg.solve(root, standard.T) ** 2, axis=0)
@@ -303,7 +305,7 @@ def learn(statistics: Array, parameters: Array, all_parameters: Array) -> Surrog
 
 
 def _powers(size: int, count: int) -> tuple[tuple[int, ...], ...]:
-    """Terms of the polynomial of as high a degree as the simulations allow."""
+    """Terms of the polynomial of the highest degree that the number of simulations allows."""
     powers: list[tuple[int, ...]] = [()]
     for degree in (1, 2, 3):
         more = list(combinations_with_replacement(range(size), degree))
@@ -318,10 +320,10 @@ def _powers(size: int, count: int) -> tuple[tuple[int, ...], ...]:
 
 def _terms(scaled: Array, powers: tuple[tuple[int, ...], ...]) -> Array:
     terms = np.empty((*scaled.shape[:-1], len(powers)))
-    place = {one: number for number, one in enumerate(powers)}
+    index = {one: number for number, one in enumerate(powers)}
     for number, one in enumerate(powers):
-        # The product of one factor and a term that is there already.
-        rest = place.get(one[1:])
+        # The product of one factor and an earlier term.
+        rest = index.get(one[1:])
         known = terms[..., rest] if rest is not None else np.prod(scaled[..., list(one[1:])], -1)
         terms[..., number] = scaled[..., one[0]] * known if one else 1.0
     return terms
@@ -340,7 +342,7 @@ def _tails(distance: Array, size: int) -> tuple[float, float]:
     Returns
     -------
     freedom, width
-        Infinite for a normal distribution; and by what lengths are to be divided.
+        Degrees of freedom, infinite for a normal distribution, and scale of the deviations.
     """
     from scipy.special import gammaln
 
@@ -371,7 +373,7 @@ def _normal(size: int) -> float:
 def _validity(
     parameters: Array, all_parameters: Array, centre: Array, spread: Array
 ) -> Array | None:
-    """Logistic regression of whether a simulation has the summaries of the trace."""
+    """Logistic regression of whether the summaries of the trace are defined for a simulation."""
     from scipy.optimize import minimize
 
     count, whole = len(parameters), len(all_parameters)

@@ -1,4 +1,4 @@
-"""What is to be fitted: the table [fit] of a configuration file."""
+"""The plan of a fit: the table [fit] of a configuration file."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from mesoslip.configuration.files import Change, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.inference.prior import Free, Prior
+from mesoslip.inference.prior import FreeParameter, Prior
 
 KEYS = ("free", "noise", "after", "simulations", "seed")
 RANGE_KEYS = ("from", "to", "prior")
-# What says nothing of the experiment.
+# Tables that do not describe the experiment.
 NOT_FITTED = ("run.", "output.", "curve.")
 PRIORS = ("uniform", "logarithmic")
-LEAST_SIMULATIONS = 300
+MIN_SIMULATIONS = 300
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A fit.
+    """The plan of a fit.
 
     Attributes
     ----------
     config
-        What is known, with values of the free keys that do not matter.
+        The known parameters; its values of the free keys are not used.
     prior
-        The free keys.
+        The free parameters.
     noise
-        Standard deviation of the noise of the force [N]; None to have it estimated.
+        Standard deviation of the noise of the force [N]; None to estimate it.
     after
-        Time from which the trace counts [s]; with 0 its first loading and slip are used as well.
+        Time from which the trace is used [s]; at 0 the first loading and slip are used too.
     simulations
         Number of simulations.
     seed
-        Of all random numbers of the fit.
+        Seed of all random numbers of the fit.
     """
 
     config: Config
@@ -60,7 +60,7 @@ class Plan:
         FileError
             If a file cannot be read.
         ConfigError
-            If anything in it is wrong.
+            If the configuration is invalid; all errors at once.
         """
         path = Path(path)
         return cls._checked(override(read_toml(path), overrides).tables, str(path))
@@ -91,7 +91,7 @@ class Plan:
             prior,
             reader.quantity(table, "noise", "N", "0.1 uN"),
             reader.quantity(table, "after", "s", "2 s") or 0.0,
-            reader.whole(table, "simulations", cls.simulations, LEAST_SIMULATIONS),
+            reader.whole(table, "simulations", cls.simulations, MIN_SIMULATIONS),
             reader.whole(table, "seed", cls.seed, 0),
         )
         if reader.problems:
@@ -100,7 +100,7 @@ class Plan:
 
 
 class _Reader:
-    """Reads the table, and gathers everything that is wrong with it."""
+    """Reads the table, and collects all errors in it."""
 
     def __init__(self, source: str) -> None:
         self.source = source
@@ -116,7 +116,7 @@ class _Reader:
     def quantity(
         self, table: Mapping[str, Any], name: str, unit: str, example: str
     ) -> float | None:
-        """A quantity that is not negative; None if it is not given."""
+        """A quantity that is not negative; None by default."""
         if name not in table:
             return None
         value = self._si(f"fit.{name}", table[name], unit, example)
@@ -124,10 +124,10 @@ class _Reader:
             self.wrong(f"fit.{name}", "must not be negative", table[name])
         return value
 
-    def whole(self, table: Mapping[str, Any], name: str, default: int, least: int) -> int:
+    def whole(self, table: Mapping[str, Any], name: str, default: int, minimum: int) -> int:
         value = table.get(name, default)
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**31:
-            self.wrong(f"fit.{name}", f"must be a whole number of at least {least}", value)
+        if isinstance(value, bool) or not isinstance(value, int) or not minimum <= value < 2**31:
+            self.wrong(f"fit.{name}", f"must be a whole number of at least {minimum}", value)
             return default
         return value
 
@@ -138,8 +138,8 @@ class _Reader:
             self.wrong(key, str(error), value)
             return None
 
-    def free(self, table: object, config: Config) -> Iterable[Free]:
-        """The free keys."""
+    def free(self, table: object, config: Config) -> Iterable[FreeParameter]:
+        """The free parameters."""
         if not isinstance(table, Mapping) or not table:
             self.wrong(
                 "fit.free",
@@ -148,62 +148,68 @@ class _Reader:
             )
             return
         for key, ranges in _flat(table):
-            place = f"fit.free.{key}"
+            full_key = f"fit.free.{key}"
             kind = key_kind(key)
             takes_number = kind is not None and kind.cf_units is not None and kind.is_single
             if kind is None or not takes_number or key.startswith(NOT_FITTED):
                 near = [one for one in nearest_keys(key) if one != key]
                 hint = f"; did you mean {near[0]!r}?" if near else ""
-                self.wrong(place, f"is no key that can be fitted{hint}")
+                self.wrong(full_key, f"is no key that can be fitted{hint}")
                 continue
-            one = self._range(place, key, ranges, kind)
+            one = self._range(full_key, key, ranges, kind)
             if one is not None:
-                self._try(place, one, config)
+                self._try(full_key, one, config)
                 yield one
 
-    def _range(self, place: str, key: str, ranges: object, kind: KeyKind) -> Free | None:
+    def _range(
+        self, full_key: str, key: str, ranges: object, kind: KeyKind
+    ) -> FreeParameter | None:
         unit = kind.unit or "1"
         if not isinstance(ranges, Mapping):
-            self.wrong(place, 'must be a table such as { from = "5 uN", to = "100 uN" }', ranges)
+            self.wrong(full_key, 'must be a table such as { from = "5 uN", to = "100 uN" }', ranges)
             return None
         for name in ranges:
             if name not in RANGE_KEYS:
-                self.unknown(f"{place}.{name}", name, RANGE_KEYS)
+                self.unknown(f"{full_key}.{name}", name, RANGE_KEYS)
         ends = []
         for name in ("from", "to"):
             if name not in ranges:
-                self.wrong(f"{place}.{name}", "missing; it has no default")
+                self.wrong(f"{full_key}.{name}", "missing; it has no default")
                 return None
-            ends.append(self._si(f"{place}.{name}", ranges[name], unit, f"1 {unit}".strip(" 1")))
+            ends.append(self._si(f"{full_key}.{name}", ranges[name], unit, f"1 {unit}".strip(" 1")))
         low, high = ends
         if low is None or high is None:
             return None
         prior = ranges.get("prior", PRIORS[0])
         if prior not in PRIORS:
-            self.wrong(f"{place}.prior", "must be 'uniform' or 'logarithmic'", prior)
+            self.wrong(f"{full_key}.prior", "must be 'uniform' or 'logarithmic'", prior)
             return None
         if not low < high:
-            self.wrong(f"{place}.to", "must be greater than 'from'", ranges["to"])
+            self.wrong(f"{full_key}.to", "must be greater than 'from'", ranges["to"])
             return None
         if prior == "logarithmic" and low <= 0:
             self.wrong(
-                f"{place}.from", "must be greater than 0 with a logarithmic prior", ranges["from"]
+                f"{full_key}.from",
+                "must be greater than 0 with a logarithmic prior",
+                ranges["from"],
             )
             return None
-        return Free(key, low, high, prior == "logarithmic", unit, kind.is_whole)
+        return FreeParameter(key, low, high, prior == "logarithmic", unit, kind.is_whole)
 
-    def _try(self, place: str, one: Free, config: Config) -> None:
-        """Make sure that both ends of a range can be run."""
+    def _try(self, full_key: str, one: FreeParameter, config: Config) -> None:
+        """Check that both ends of a range are valid."""
         for name, value in (("from", one.low), ("to", one.high)):
             try:
                 config.replace({one.key: int(value) if one.is_whole else value})
             except ConfigError as error:
                 first = error.problems[0]
-                self.wrong(f"{place}.{name}", f"cannot be run: {first.key}: {first.message}", value)
+                self.wrong(
+                    f"{full_key}.{name}", f"cannot be run: {first.key}: {first.message}", value
+                )
 
 
 def _flat(table: Mapping[str, Any], outer: str = "") -> Iterable[tuple[str, Any]]:
-    """Dotted keys of a table whose keys may be dotted or nested."""
+    """The entries of a table with dotted keys, given dotted or nested."""
     for key, value in table.items():
         name = f"{outer}{key}"
         is_range = not isinstance(value, Mapping) or not all(

@@ -1,4 +1,4 @@
-"""What comes out of a fit: a posterior as a tree that ArviZ opens, and a table of it."""
+"""The posterior of a fit as a tree that ArviZ opens, and as a table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.configuration.units import cf_units
 from mesoslip.inference.checks import DETERMINED, UNDETERMINED, shrinkage, warnings
-from mesoslip.inference.fit import Fitted
+from mesoslip.inference.fit import FitResult
 from mesoslip.inference.sampler import r_hat
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
@@ -26,13 +26,29 @@ Array = NDArray[np.float64]
 PERCENTILES = (5.0, 25.0, 50.0, 75.0, 95.0)
 VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
-# Digits of values in a table at the least.
-LEAST_DIGITS = 3
+# Minimum significant digits of values in a table.
+MIN_DIGITS = 3
 
 
 @dataclass(frozen=True)
 class Row:
-    """A parameter in the table of a fit, in SI."""
+    """A parameter in the table of a fit, in SI.
+
+    Attributes
+    ----------
+    key, unit
+        Dotted key and SI unit.
+    percentiles
+        `PERCENTILES` of the posterior.
+    low, high
+        Ends of the range.
+    shrinkage
+        Shrinkage from prior to posterior, 0 to 1.
+    verdict
+        One of `VERDICTS`.
+    most_informative
+        The group of summaries with the most information on it; "none" if it is not determined.
+    """
 
     key: str
     unit: str
@@ -41,24 +57,24 @@ class Row:
     high: float
     shrinkage: float
     verdict: str
-    informed_by: str
+    most_informative: str
 
     @property
     def digits(self) -> int:
-        """Digits that tell the ends of the 90 % interval apart."""
+        """Significant digits that distinguish the ends of the 90 % interval."""
         low, high = self.percentiles[0], self.percentiles[-1]
         size = max(abs(low), abs(high))
         if size == 0 or high <= low:
-            return LEAST_DIGITS
-        return max(LEAST_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
+            return MIN_DIGITS
+        return max(MIN_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
 
 
-def build_tree(fitted: Fitted) -> xr.DataTree:
+def build_tree(fitted: FitResult) -> xr.DataTree:
     """A posterior as a tree.
 
     Groups ``posterior`` (dimensions chain, draw), ``prior``, ``observed_data``,
-    ``posterior_predictive`` as ArviZ has them; ``observed_slips``, ``predicted_slips`` (slip);
-    ``summaries`` (summary): those of the trace and predicted ones; ``parameters`` (parameter): the
+    ``posterior_predictive``, named as in ArviZ; ``observed_slips``, ``predicted_slips`` (slip);
+    ``summaries`` (summary) of the trace and the predictions; ``parameters`` (parameter), the
     table.
     """
     import xarray as xr
@@ -73,10 +89,10 @@ def build_tree(fitted: Fitted) -> xr.DataTree:
             {
                 one.key: (
                     ("chain", "draw"),
-                    draws[..., place],
+                    draws[..., index],
                     {"units": cf_units(one.unit), "long_name": one.key},
                 )
-                for place, one in enumerate(prior.free)
+                for index, one in enumerate(prior.free)
             },
             coordinates,
         )
@@ -88,7 +104,7 @@ def build_tree(fitted: Fitted) -> xr.DataTree:
     time = ("time", fitted.time + plan.after, {"units": "s", "long_name": "time"})
     predictions = len(fitted.predicted_force)
     notes = list(warnings(prior, estimate.draws, fitted.agreement, r_hat(estimate.chains)))
-    told: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         "seed": plan.seed,
         "complete": "true",
         "comment": "",
@@ -103,7 +119,7 @@ def build_tree(fitted: Fitted) -> xr.DataTree:
     }
     return xr.DataTree.from_dict(
         {
-            "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | told),
+            "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
             "/posterior": group(values, chains),
             "/prior": group(from_prior, {"chain": np.arange(1), "draw": np.arange(1000)}),
             "/observed_data": xr.Dataset(
@@ -139,22 +155,30 @@ def _slips(found: Sequence[FoundSlips], start: float) -> xr.Dataset:
     return xr.Dataset(data)
 
 
-def _summaries(fitted: Fitted) -> xr.Dataset:
+def _summaries(fitted: FitResult) -> xr.Dataset:
     import xarray as xr
 
     features = fitted.simulator.summarizer.features
     low, middle, high = np.full((3, len(features)), np.nan)
-    there = np.isfinite(fitted.predicted).any(axis=0)
-    low[there], middle[there], high[there] = np.nanpercentile(
-        fitted.predicted[:, there], [5, 50, 95], axis=0
+    defined = np.isfinite(fitted.predicted).any(axis=0)
+    low[defined], middle[defined], high[defined] = np.nanpercentile(
+        fitted.predicted[:, defined], [5, 50, 95], axis=0
     )
     one = {"units": "1"}
     return xr.Dataset(
         {
-            "observed": ("summary", fitted.observed, one | {"long_name": "of the trace"}),
-            "predicted_05": ("summary", low, one | {"long_name": "predicted, 5 % quantile"}),
-            "predicted_50": ("summary", middle, one | {"long_name": "predicted, median"}),
-            "predicted_95": ("summary", high, one | {"long_name": "predicted, 95 % quantile"}),
+            "observed": ("summary", fitted.observed, one | {"long_name": "summary of the trace"}),
+            "predicted_05": (
+                "summary",
+                low,
+                one | {"long_name": "5 % quantile of the predictions"},
+            ),
+            "predicted_50": ("summary", middle, one | {"long_name": "median of the predictions"}),
+            "predicted_95": (
+                "summary",
+                high,
+                one | {"long_name": "95 % quantile of the predictions"},
+            ),
             "score": (
                 "summary",
                 fitted.agreement.scores,
@@ -167,7 +191,7 @@ def _summaries(fitted: Fitted) -> xr.Dataset:
     )
 
 
-def _parameters(fitted: Fitted) -> xr.Dataset:
+def _parameters(fitted: FitResult) -> xr.Dataset:
     import xarray as xr
 
     prior, draws = fitted.plan.prior, fitted.estimate.draws
@@ -184,7 +208,7 @@ def _parameters(fitted: Fitted) -> xr.Dataset:
             "information": (
                 ("parameter", "feature_group"),
                 np.array([fitted.information[one] for one in groups]).T,
-                {"long_name": "part of the variance that a group of summaries alone predicts"},
+                {"long_name": "fraction of the variance predicted by a group of summaries alone"},
             ),
         },
         {
@@ -196,11 +220,11 @@ def _parameters(fitted: Fitted) -> xr.Dataset:
 
 
 def table(tree: xr.DataTree) -> list[Row]:
-    """The table of a fit, a row a parameter."""
+    """The table of a fit, a row for each parameter."""
     data = tree["parameters"].to_dataset()
     rows = []
-    for place, key in enumerate(data["parameter"].values.tolist()):
-        one = data.isel(parameter=place)
+    for index, key in enumerate(data["parameter"].values.tolist()):
+        one = data.isel(parameter=index)
         part = one["shrinkage"].item()
         verdict = VERDICTS[int(part >= UNDETERMINED) + int(part >= DETERMINED)]
         best = int(np.argmax(one["information"].values))
@@ -213,7 +237,7 @@ def table(tree: xr.DataTree) -> list[Row]:
                 one["high"].item(),
                 part,
                 verdict,
-                str(data["feature_group"].values[best]) if part >= UNDETERMINED else "nothing",
+                str(data["feature_group"].values[best]) if part >= UNDETERMINED else "none",
             )
         )
     return rows

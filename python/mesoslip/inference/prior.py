@@ -1,4 +1,4 @@
-"""What a fit starts from: free keys of a configuration, and their ranges."""
+"""Priors of a fit: the free keys of a configuration and their ranges."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Free:
-    """A free parameter: the key of a configuration, and its range.
+class FreeParameter:
+    """A free parameter: a key of a configuration, and its range.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Free:
     unit
         SI unit, such as "N/m"; "1" for plain numbers.
     is_whole
-        Whether it is a whole number.
+        Whether the parameter is a whole number.
     """
 
     key: str
@@ -39,9 +39,9 @@ class Free:
 
 @dataclass(frozen=True)
 class Prior:
-    """Independent priors of all free parameters: uniform on the unit cube of their ranks."""
+    """Independent priors of the free parameters, uniform on the unit cube of their quantiles."""
 
-    free: tuple[Free, ...]
+    free: tuple[FreeParameter, ...]
 
     def __len__(self) -> int:
         return len(self.free)
@@ -52,18 +52,18 @@ class Prior:
         return tuple(one.key for one in self.free)
 
     def values(self, unit: Array) -> Array:
-        """Parameters in SI, shape (..., parameters), at points of the unit cube."""
+        """Parameters in SI at points of the unit cube, shape (..., parameters)."""
         columns = []
-        for one, place in zip(self.free, np.moveaxis(np.asarray(unit), -1, 0), strict=True):
+        for one, quantile in zip(self.free, np.moveaxis(np.asarray(unit), -1, 0), strict=True):
             if one.is_logarithmic:
-                value = one.low * (one.high / one.low) ** place
+                value = one.low * (one.high / one.low) ** quantile
             else:
-                value = one.low + (one.high - one.low) * place
+                value = one.low + (one.high - one.low) * quantile
             columns.append(np.round(value) if one.is_whole else value)
         return np.stack(columns, axis=-1)
 
     def unit(self, values: Array) -> Array:
-        """Points of the unit cube of parameters in SI, shape (..., parameters)."""
+        """Points of the unit cube for parameters in SI, shape (..., parameters)."""
         columns = []
         for one, value in zip(self.free, np.moveaxis(np.asarray(values), -1, 0), strict=True):
             if one.is_logarithmic:
@@ -73,7 +73,7 @@ class Prior:
         return np.stack(columns, axis=-1)
 
     def changes(self, values: Array) -> dict[str, Any]:
-        """Changes of a configuration that set the parameters."""
+        """Changes of the configuration that set the parameters."""
         return {
             one.key: int(value) if one.is_whole else float(value)
             for one, value in zip(self.free, values, strict=True)

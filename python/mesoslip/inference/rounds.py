@@ -1,10 +1,10 @@
-"""A posterior by rounds of simulations that close in on the parameters that matter.
+"""The posterior by rounds of simulations that converge on it.
 
-The first round is spread over the prior. After each the synthetic likelihood is learnt from the
-simulations of the region, and the next are drawn around its posterior, twice as wide; the region
-is where they lie. When the posterior is no longer much narrower than the region, all that is left
-of the simulations goes there. What a likelihood learnt over a wide region cannot follow is noise to
-it, so early posteriors are too wide rather than wrong.
+The first round covers the prior. After each round the synthetic likelihood is learnt from the
+simulations of the region, and the next round is drawn from its posterior, widened by a factor of
+two; the new region contains it. When the posterior is not much narrower than the region, the
+remaining simulations are made there. The misfit of a likelihood learnt over a wide region counts as
+noise, so that early posteriors are too wide rather than biased.
 """
 
 from __future__ import annotations
@@ -21,28 +21,30 @@ from mesoslip.inference.simulations import Simulations
 
 Array = NDArray[np.float64]
 
-# Parts of the simulations in the first round, in the next ones, and of all until the region stands.
+# Fractions of the simulations in the first round and in each of the next ones, minimum numbers, and
+# the maximum fraction until the region is final.
 FIRST, NEXT = 0.16, 0.12
-LEAST_FIRST, LEAST_NEXT = 100, 60
-MOST_CLOSING = 0.65
-# Width of the region over that of the posterior.
+MIN_FIRST, MIN_NEXT = 100, 60
+MAX_SEARCH = 0.65
+# Width of a round over that of the posterior.
 WIDTH = 2.0
-# Ratio of the widths at which the region stands, and rounds before it may.
-CLOSE = 3.2
-LEAST_ROUNDS = 3
-# Part of the draws that lies in the region.
+# Maximum width of the region over that of the posterior for a final region, and minimum number of
+# rounds.
+MAX_RATIO = 3.2
+MIN_ROUNDS = 3
+# Fraction of a round inside the region.
 INSIDE = 0.98
-# Draws of each chain: until the region stands, and at the end.
+# Draws of each chain during the search and at the end, and chains at the end.
 ROUGH, FINE = 500, 1000
 CHAINS = 4
-# Points that a chain may start from.
+# Number of starting points of a chain.
 STARTS = 40
-# Least simulations of a likelihood.
-LEAST_VALID = 40
-# By what the limit of a region grows that has too few of them.
+# Minimum number of simulations for a likelihood.
+MIN_VALID = 40
+# Factor by which the limit of a region with fewer simulations is increased.
 GROWTH = 1.5
-# Least width of the region on the unit cube, beyond which nothing is resolved.
-NARROWEST = 1e-6
+# Minimum width of the region on the unit cube.
+MIN_WIDTH = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Region:
     limit: float
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
-        """Which of the points, shape (points, parameters), lie in it."""
+        """Whether each point lies in the region; points of shape (points, parameters)."""
         inside = self.distance(points) <= self.limit
         return np.asarray(inside & np.all((points >= 0) & (points <= 1), axis=1))
 
@@ -65,9 +67,9 @@ class Region:
 
     @classmethod
     def around(cls, points: Array) -> Region:
-        """The ellipsoid around most of some points."""
+        """The ellipsoid that contains a fraction `INSIDE` of the points."""
         covariance = np.cov(points.T).reshape(points.shape[1], -1)
-        covariance += NARROWEST**2 * np.eye(points.shape[1])
+        covariance += MIN_WIDTH**2 * np.eye(points.shape[1])
         whole = cls(points.mean(axis=0), np.asarray(np.linalg.inv(covariance)), np.inf)
         limit = float(np.quantile(whole.distance(points), INSIDE))
         return cls(whole.centre, whole.inverse, limit)
@@ -75,7 +77,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What is known of the parameters after a round.
+    """The posterior after a round.
 
     Attributes
     ----------
@@ -84,11 +86,11 @@ class Estimate:
     projection, surrogate, statistics
         The synthetic likelihood, and the statistics of the trace.
     coverage
-        Parts of the simulations that lie within the 50 and the 90 % regions of the likelihood.
+        Fractions of the simulations inside the 50 % and the 90 % regions of the likelihood.
     parameters, summaries
-        Of the simulations that it was learnt from.
+        Those of the simulations it was learnt from.
     ratio
-        Width of their region over that of the posterior, the greatest of all parameters.
+        Width of their region over that of the posterior, the maximum over the parameters.
     """
 
     chains: Array
@@ -106,7 +108,7 @@ class Estimate:
         return self.chains.reshape(-1, self.chains.shape[-1])
 
 
-def close_in(
+def estimate_posterior(
     simulations: Simulations, observed: Array, total: int, rng: np.random.Generator
 ) -> Estimate:
     """The posterior after all rounds.
@@ -114,44 +116,43 @@ def close_in(
     Parameters
     ----------
     simulations
-        To which more are added.
+        The simulations so far; more are added.
     observed
         Summaries of the trace.
     total
-        Simulations in all.
+        Total number of simulations.
     rng
         Random numbers.
 
     Raises
     ------
     RunError
-        If hardly any simulation is like the trace.
+        If too few simulations resemble the trace.
     """
     from scipy.stats import qmc
 
     size = len(simulations.simulator.prior)
-    first = max(LEAST_FIRST, round(FIRST * total))
-    each = max(LEAST_NEXT, round(NEXT * total))
+    first = max(MIN_FIRST, round(FIRST * total))
+    each = max(MIN_NEXT, round(NEXT * total))
     simulations.add(qmc.LatinHypercube(size, rng=rng).random(first))
     region: Region | None = None
     while (
-        _inside(simulations.parameters, simulations.summaries, observed, None)[0].sum()
-        < LEAST_VALID
-        and len(simulations) + each <= MOST_CLOSING * total
+        _inside(simulations.parameters, simulations.summaries, observed, None)[0].sum() < MIN_VALID
+        and len(simulations) + each <= MAX_SEARCH * total
     ):
         simulations.add(qmc.LatinHypercube(size, rng=rng).random(each))
     count = 1
     while True:
         estimate = fit_region(simulations, observed, region, rng)
         left = total - len(simulations)
-        stands = count >= LEAST_ROUNDS and estimate.ratio < CLOSE
-        if stands or len(simulations) + each > MOST_CLOSING * total:
+        is_final = count >= MIN_ROUNDS and estimate.ratio < MAX_RATIO
+        if is_final or len(simulations) + each > MAX_SEARCH * total:
             break
         points = around(estimate.draws, min(each, left), rng)
         region = Region.around(points)
         simulations.add(points)
         count += 1
-    # In two goes, so that the region is that of the better posterior.
+    # In two rounds, the second from the improved posterior.
     for part in (0.5, 1.0):
         left = total - len(simulations)
         points = around(estimate.draws, max(1, round(part * left)), rng)
@@ -163,9 +164,9 @@ def close_in(
 
 
 def around(draws: Array, count: int, rng: np.random.Generator) -> Array:
-    """Points around a posterior, `WIDTH` times as wide, on the unit cube."""
+    """Points on the unit cube from a posterior widened by the factor `WIDTH`."""
     size = draws.shape[1]
-    covariance = np.cov(draws.T).reshape(size, size) + NARROWEST**2 * np.eye(size)
+    covariance = np.cov(draws.T).reshape(size, size) + MIN_WIDTH**2 * np.eye(size)
     points = np.empty((0, size))
     while len(points) < count:
         more = draws[rng.choice(len(draws), 2 * count)]
@@ -185,19 +186,19 @@ def fit_region(
     chain_count: int = 1,
     draws: int = ROUGH,
 ) -> Estimate:
-    """The posterior by the simulations of a region; of the whole cube without one.
+    """The posterior from the simulations of a region; None for the whole cube.
 
     Raises
     ------
     RunError
-        If hardly any simulation is like the trace.
+        If too few simulations resemble the trace.
     """
     parameters, summaries = simulations.parameters, simulations.summaries
     valid, parameters, summaries, region = _inside(parameters, summaries, observed, region)
-    if valid.sum() < LEAST_VALID:
+    if valid.sum() < MIN_VALID:
         raise RunError(
-            f"only {int(valid.sum())} of {len(valid)} simulations have what the trace has, such as "
-            "its slips: no parameters in the ranges of [fit.free] seem to describe it"
+            f"only {int(valid.sum())} of {len(valid)} simulations have the features of the trace, "
+            "such as its slips: no parameters in the ranges of [fit.free] seem to describe it"
         )
     order = np.argsort(~valid, kind="stable")
     parameters, summaries = parameters[order], summaries[order]
@@ -225,25 +226,25 @@ def fit_region(
         _coverage(np.sum(deviations**2, axis=1), statistics.shape[1], surrogate.freedom),
         parameters[:count],
         summaries[:count],
-        float(np.max(parameters.std(axis=0) / np.maximum(spread, NARROWEST))),
+        float(np.max(parameters.std(axis=0) / np.maximum(spread, MIN_WIDTH))),
     )
 
 
 def _inside(
     parameters: Array, summaries: Array, observed: Array, region: Region | None
 ) -> tuple[NDArray[np.bool_], Array, Array, Region | None]:
-    """Simulations of a region, which is made larger if too few in it have what the trace has.
+    """Simulations of a region, which is enlarged until enough have the summaries of the trace.
 
     Returns
     -------
     valid, parameters, summaries, region
-        Which of the simulations have the summaries of the trace; the simulations; the region.
+        Whether each simulation has the summaries of the trace; the simulations; the region.
     """
     while True:
         inside = np.full(len(parameters), True) if region is None else region.contains(parameters)
         used = usable(summaries[inside], observed)
         valid = np.all(np.isfinite(summaries[inside][:, used]), axis=1) & used.any()
-        if region is None or inside.all() or valid.sum() >= LEAST_VALID:
+        if region is None or inside.all() or valid.sum() >= MIN_VALID:
             return valid, parameters[inside], summaries[inside], region
         region = replace(region, limit=GROWTH * region.limit)
 

@@ -1,4 +1,4 @@
-"""Draws from a posterior on the unit cube, whose density costs next to nothing."""
+"""Sampling of a posterior on the unit cube with a cheap density."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from mesoslip.errors import RunError
 
 Array = NDArray[np.float64]
 
-# Walkers of an ensemble, steps before the first draw of them, and between two.
+# Walkers of an ensemble, burn-in, and steps between draws.
 WALKERS, BURN_IN, THIN = 100, 120, 15
 
 
 def check_installed() -> None:
-    """Make sure that emcee is there, before anything is simulated.
+    """Check that emcee is installed, before any simulation.
 
     Raises
     ------
     RunError
-        If it is not.
+        If emcee is not installed.
     """
     if find_spec("emcee") is None:
         raise RunError("a fit needs the package emcee: pip install 'mesoslip[fit]', or make setup")
@@ -43,13 +43,13 @@ def draw(
     log_density
         Logarithm of the density of points of shape (points, parameters); -inf outside its support.
     start
-        Points to start near, where the density is not 0, shape (points, parameters).
+        Starting points with a density above 0, shape (points, parameters).
     rng
         Random numbers.
     chains
-        Ensembles, which know nothing of each other.
+        Number of independent ensembles.
     draws
-        Draws of each.
+        Number of draws of each.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The simulations of a fit: on any executor, each kept when it is finished."""
+"""The simulations of a fit, on any executor, each stored when it is finished."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mesoslip.simulation.tables import TRACE_COLUMNS
 
 Array = NDArray[np.float64]
 
-# Breaks after which a simulation is given up: far more than the trace can have.
+# Maximum number of breaks in a simulation, far more than a trace can have.
 MAX_BREAKS = 3e7
 
 # The number of a simulation, and its parameters on the unit cube.
@@ -39,15 +39,15 @@ class Simulator:
     Attributes
     ----------
     config
-        The known parameters.
+        Configuration of the known parameters.
     prior
-        The free ones.
+        Priors of the free parameters.
     summarizer
         Reduces a trace to its summaries.
     noise
         Standard deviation of the noise of the force [N].
     skipped
-        Samples at the start that do not count.
+        Number of samples discarded at the start.
     seed
         Seed of the fit.
     """
@@ -65,7 +65,7 @@ class Simulator:
         Parameters
         ----------
         piece
-            The number of the simulation, which its random numbers follow from, and its parameters.
+            The number of the simulation, which determines its random numbers, and its parameters.
         stop
             A request to stop.
 
@@ -102,7 +102,7 @@ class Simulator:
         return self.summarizer(force)
 
     def fingerprint(self, observed: Array) -> str:
-        """A hash of everything that the simulations of a fit follow from."""
+        """A hash of everything that determines the simulations of a fit."""
         known = (self.config.to_toml(), self.prior, self.noise, self.skipped, self.seed)
         times = self.summarizer.time
         state = np.concatenate([np.nan_to_num(observed), times[[0, -1]], [len(times)]])
@@ -112,8 +112,8 @@ class Simulator:
 class Simulations:
     """Simulations one after another, each with its number.
 
-    They follow from the seed and the trace alone. So a fit that is started again asks for the same
-    ones, and finds those that its store has kept.
+    They are determined by the seed and the trace, so that a fit that is started again requests the
+    same simulations and finds those in its store.
 
     Parameters
     ----------

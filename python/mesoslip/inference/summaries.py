@@ -1,9 +1,8 @@
-"""What a trace is summed up by: numbers that do not depend on the phase of its slips.
+"""Summaries of a trace, independent of the phase of its slips.
 
-After some slips the trace of a slipping slider depends on single contacts, so two runs with the
-same parameters are alike in their statistics only. Its start is not: the first loading, peak and
-slip of N contacts differ from those of the master equation by N^(-1/2) only, and are summed up
-point by point, along the wave of the slip.
+After some slips a trace depends on single contacts: two runs with the same parameters have the same
+statistics only. The first loading, peak and slip of N contacts differ from those of the master
+equation by N^(-1/2) only, and are summarized point by point, along the waveform of the slip.
 """
 
 from __future__ import annotations
@@ -19,26 +18,28 @@ from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
 
 Array = NDArray[np.float64]
 
-# Points of the wave of a slip, in periods of the setup since the force had fallen by half.
-WAVE = np.arange(-10, 51) / 20
-# Parts of the force at the first peak between which the slope of the loading is taken.
+# Points of the waveform of a slip, in periods of the setup since the force fell by half.
+WAVEFORM = np.arange(-10, 51) / 20
+# Range of the force for the slope of the loading, over the first peak.
 LOADING = (0.1, 0.6)
-# Parts of the time to the first peak at which the force is compared with straight loading.
+# Times of the comparison with linear loading, over the time of the first peak.
 LAGS = (0.8, 0.9, 0.95, 0.97, 0.985)
+# Quantiles of the force [%].
 QUANTILES = (1, 5, 25, 50, 75, 95, 99)
-# Bands of frequency, from a fraction of the setup's to the greatest that is sampled.
+# Frequency bands, from a fraction of the frequency of the setup to the Nyquist frequency, and
+# length of the segments of the spectrum in periods of the setup.
 BANDS = 12
-LOWEST_BAND = 0.1
+MIN_FREQUENCY = 0.1
 SEGMENT_PERIODS = 40
-# Slips after the first that statistics of slips need.
-LEAST_SLIPS = 3
-# What makes logarithms of 0 finite.
+# Minimum number of slips for their statistics.
+MIN_SLIPS = 3
+# Minimum arguments of logarithms.
 TINY = 1e-12
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A summary: its name, what it belongs to, and what it is."""
+    """A summary: its name, its group, and its meaning."""
 
     name: str
     group: str
@@ -47,7 +48,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Summarizer:
-    """Sums up traces of one sampling, all by the same fixed rule.
+    """Computes the summaries of traces with the same sampling.
 
     Attributes
     ----------
@@ -56,9 +57,9 @@ class Summarizer:
     noise
         Standard deviation of the noise of the force [N].
     period
-        Period of the setup by which slips are found [s]; the same for every trace.
+        Period of the setup for finding slips [s], the same for every trace.
     scale
-        Force in which forces are measured [N], such as the greatest of the measured trace.
+        Unit of the forces [N], such as the maximum of the measured trace.
     direction
         Sign of the drive's velocity.
     has_start
@@ -95,22 +96,26 @@ class Summarizer:
                 Feature("first_peak", "first peak", "force at the first peak"),
                 Feature("first_peak_time", "first peak", "logarithm of the time of the first peak"),
                 *(
-                    Feature(f"softening_{one:g}", "first peak", "force lacking to straight loading")
+                    Feature(f"softening_{one:g}", "first peak", "force relative to linear loading")
                     for one in LAGS
                 ),
-                Feature("first_drop", "first slip", "logarithm of the first drop"),
-                Feature("first_rate", "first slip", "logarithm of its rate"),
+                Feature("first_drop", "first slip", "logarithm of the first force drop"),
+                Feature(
+                    "first_rate", "first slip", "logarithm of the maximum rate of the first slip"
+                ),
                 *(
-                    Feature(f"first_wave_{one:+.2f}", "first slip", "force along the first slip")
-                    for one in WAVE
+                    Feature(
+                        f"first_waveform_{one:+.2f}", "first slip", "force along the first slip"
+                    )
+                    for one in WAVEFORM
                 ),
             ]
         for name, meaning in (
             ("peak", "force at the start of slips"),
             ("bottom", "force at the end of slips"),
-            ("drop", "logarithm of drops"),
+            ("drop", "logarithm of force drops"),
             ("duration", "logarithm of durations"),
-            ("rate", "logarithm of the greatest rate of fall"),
+            ("rate", "logarithm of the maximum rate of fall"),
             ("waiting_time", "logarithm of waiting times"),
         ):
             found += [
@@ -119,8 +124,11 @@ class Summarizer:
                 Feature(f"spread_{name}", "slips", f"logarithm of the spread of the {meaning}"),
             ]
         found += [
-            Feature("return_map", "slips", "correlation of a drop with the next"),
-            *(Feature(f"wave_{one:+.2f}", "slips", "mean force along slips") for one in WAVE),
+            Feature("return_map", "slips", "correlation of each force drop with the next"),
+            *(
+                Feature(f"waveform_{one:+.2f}", "slips", "mean force along slips")
+                for one in WAVEFORM
+            ),
         ]
         return tuple(found)
 
@@ -130,13 +138,13 @@ class Summarizer:
         return tuple(one.name for one in self.features)
 
     def slips(self, force: Array) -> FoundSlips:
-        """The slips of a trace, by which it is summed up."""
+        """The slips of a trace."""
         return find_slips(
             self.time, force, noise=self.noise, period=self.period, direction=self.direction
         )
 
     def __call__(self, force: Array) -> Array:
-        """Sum up a trace of the force [N], shape (samples,): an array, NaN for what it has not."""
+        """The summaries of a trace of the force [N], shape (samples,); NaN if undefined."""
         found = self.slips(force)
         force = self.direction * force / self.scale
         values: dict[str, float] = {"slip_count": math.log(len(found) + 0.5)}
@@ -174,15 +182,16 @@ class Summarizer:
             for one in LAGS:
                 near = slice(*np.searchsorted(time, [(one - 0.01) * end, (one + 0.01) * end]))
                 if near.stop > near.start:
-                    lacking = force[near] - level - slope * time[near]
-                    values[f"softening_{one:g}"] = float(np.mean(lacking)) / peak
+                    deviation = force[near] - level - slope * time[near]
+                    values[f"softening_{one:g}"] = float(np.mean(deviation)) / peak
         if len(found):
             drop = self.direction * (found.force_before[0] - found.force_after[0]) / self.scale
             values["first_drop"] = math.log(max(drop, TINY))
             values["first_rate"] = math.log(found.fall_rate[0] / self.scale)
-            wave = self._wave(force, int(found.first[0]), int(found.last[0]))
+            waveform = self._waveform(force, int(found.first[0]), int(found.last[0]))
             values |= {
-                f"first_wave_{place:+.2f}": value for place, value in zip(WAVE, wave, strict=True)
+                f"first_waveform_{at:+.2f}": value
+                for at, value in zip(WAVEFORM, waveform, strict=True)
             }
         return values
 
@@ -197,11 +206,11 @@ class Summarizer:
         }
         for one, value in zip(QUANTILES, np.percentile(force, QUANTILES), strict=True):
             values[f"force_quantile_{one}"] = float(value)
-        longest = round(SEGMENT_PERIODS * self.period / self._interval)
+        length = round(SEGMENT_PERIODS * self.period / self._interval)
         frequency, power = welch(
-            force, fs=1 / self._interval, nperseg=max(64, min(longest, force.size))
+            force, fs=1 / self._interval, nperseg=max(64, min(length, force.size))
         )
-        edges = np.geomspace(LOWEST_BAND / self.period, frequency[-1] * (1 + 1e-9), BANDS + 1)
+        edges = np.geomspace(MIN_FREQUENCY / self.period, frequency[-1] * (1 + 1e-9), BANDS + 1)
         for band in range(BANDS):
             inside = (frequency >= edges[band]) & (frequency < edges[band + 1])
             if inside.any():
@@ -209,9 +218,9 @@ class Summarizer:
         return values
 
     def _statistics(self, force: Array, found: FoundSlips) -> dict[str, float]:
-        # The first slip of a run is larger than the others.
+        # The first slip of a run from its initial state differs from the others.
         later = slice(1 if self.has_start else 0, None)
-        if len(found.start_time[later]) < LEAST_SLIPS:
+        if len(found.start_time[later]) < MIN_SLIPS:
             return {}
         unit = self.direction / self.scale
         before, after = unit * found.force_before, unit * found.force_after
@@ -236,25 +245,25 @@ class Summarizer:
         else:
             values["return_map"] = 0.0
         ends = zip(found.first[later], found.last[later], strict=True)
-        waves = [self._wave(force, int(first), int(last)) for first, last in ends]
-        mean = np.mean(waves, axis=0)
+        waveforms = [self._waveform(force, int(first), int(last)) for first, last in ends]
+        mean = np.mean(waveforms, axis=0)
         return values | {
-            f"wave_{place:+.2f}": value for place, value in zip(WAVE, mean, strict=True)
+            f"waveform_{at:+.2f}": value for at, value in zip(WAVEFORM, mean, strict=True)
         }
 
-    def _wave(self, force: Array, first: int, last: int) -> Array:
-        """Force at the points `WAVE` of a slip."""
+    def _waveform(self, force: Array, first: int, last: int) -> Array:
+        """Force at the points `WAVEFORM` of a slip."""
         half = (force[first] + force[last]) / 2
         below = first + int(np.argmax(force[first : last + 1] <= half))
         above = max(below - 1, 0)
         step = force[above] - force[below]
-        place = self.time[above]
+        start = self.time[above]
         if step > 0:
-            place += (force[above] - half) / step * self._interval
-        wave: Array = np.interp(place + WAVE * self.period, self.time, force)
-        return wave
+            start += (force[above] - half) / step * self._interval
+        waveform: Array = np.interp(start + WAVEFORM * self.period, self.time, force)
+        return waveform
 
 
 def _loaded(force: Array) -> int:
-    """Where a trace without slips is loaded: where it first comes near its greatest force."""
+    """The end of the loading in a trace without slips: the first sample near the maximum."""
     return int(np.argmax(force >= 0.95 * np.max(force)))

@@ -1,1 +1,1 @@
-"""Measured traces: read from tables, with the slips found in them, as outputs."""
+"""Measured traces as outputs: tables of measurements, and the slips in them."""

@@ -1,4 +1,4 @@
-"""Tables of measurements: columns of numbers with units in their headers, checked line by line."""
+"""Tables of measurements: columns of numbers, with units in their headers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mesoslip.errors import FileError, shown
 
 Array = NDArray[np.float64]
 
-# Columns by the names that headers may have.
+# Columns by the names allowed in headers.
 COLUMNS = {
     "time": Quantity("time", "s", "time [s]"),
     "force": Quantity("force", "N", "force [uN]"),
@@ -23,15 +23,15 @@ COLUMNS = {
     "drive": Quantity("drive", "m", "drive [nm]"),
     "drive_displacement": Quantity("drive", "m", "drive [nm]"),
 }
-# An interval between two samples is a gap if it is longer than this many usual ones.
-GAP = 1.5
-# Size of the longest file that is read [bytes].
+# Minimum interval of a gap, over the median interval.
+MIN_GAP = 1.5
+# Maximum size of a file [bytes].
 MAX_BYTES = 2**31
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """What was measured.
+    """Measured samples.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Measurements:
     force
         Force of the spring [N].
     displacement, drive
-        Displacements of the slider and of the drive [m]; None if they were not measured.
+        Displacements of the slider and of the drive [m]; None if not measured.
     """
 
     time: Array
@@ -58,51 +58,52 @@ def read_table(
 ) -> Measurements:
     """Read a table of measurements, see `mesoslip.configuration.columns`.
 
-    Between semicolons, tabs or blanks decimal commas are read, unless they may group digits.
+    Decimal commas are allowed between semicolons, tabs or blanks, unless they could group digits.
 
     Parameters
     ----------
     path
         The file.
     columns
-        Headers, such as "time [s], force [uN], -", in the place of those of the file.
+        Headers instead of those of the file, such as "time [s], force [uN], -".
     rate
-        Samples in a second [1/s], if the file has no times.
+        Sampling rate [1/s], for a file without times.
     max_gap
-        Longest time without values [s] that is filled by straight lines; none by default.
+        Maximum length [s] of gaps, which are interpolated linearly; by default gaps are errors.
 
     Raises
     ------
     FileError
-        If the file cannot be read, or anything in it is wrong: the message names the line.
+        If the file cannot be read or is invalid; the message names the line.
     """
     cells = cells_of(_text(path), str(path))
     if not cells.has_header and columns is None:
         raise FileError(
             f"{path}: line {cells.lines[0][0]}: has no header such as 'time [s], force [uN]'; "
-            "write one, or give one with --columns"
+            "add one, or give headers with --columns"
         )
     headers = cells.first if columns is None else [one.strip() for one in columns.split(",")]
     if len(headers) != len(cells.first):
         raise FileError(
             f"{path}: --columns names {len(headers)} columns, the file has {len(cells.first)}; "
-            f"'{IGNORED}' stands for one that is not read"
+            f"'{IGNORED}' stands for a column to ignore"
         )
     places = find_columns(headers, COLUMNS, str(path))
-    there = ", ".join(shown(header) for header in headers)
+    found = ", ".join(shown(header) for header in headers)
     if "force" not in places:
         raise FileError(
-            f"{path}: has no column of the force, such as 'force [uN]'; it has {there}; "
-            "--columns gives them other headers"
+            f"{path}: has no column of the force, such as 'force [uN]'; its columns are {found}; "
+            "give other headers with --columns"
         )
     if "time" not in places and rate is None:
         raise FileError(
-            f"{path}: has no column of the time, such as 'time [s]'; it has {there}; give "
-            "--columns with other headers, or a sampling rate with --rate"
+            f"{path}: has no column of the time, such as 'time [s]'; its columns are {found}; give "
+            "other headers with --columns, or a sampling rate with --rate"
         )
     if "time" in places and rate is not None:
         raise FileError(
-            f"{path}: has times, so no rate must be given; '{IGNORED}' in --columns leaves them out"
+            f"{path}: has a column of the time, and a sampling rate is given; give no rate, or "
+            f"'{IGNORED}' instead of the time in --columns"
         )
     values = {
         name: np.array(column)
@@ -117,25 +118,25 @@ def read_table(
 
 
 def _text(path: Path) -> str:
-    """Text of a file of measurements."""
+    """The text of a table of measurements."""
     try:
         return text_of(path, "a table of measurements", MAX_BYTES)
     except FileError as error:
         if path.suffix == ".nc":
-            raise FileError(f"{path}: is an output already, not a table of measurements") from error
+            raise FileError(f"{path}: is an output, not a table of measurements") from error
         raise
 
 
 def _checked(
     path: Path, values: dict[str, Array], numbers: NDArray[np.int_], max_gap: float | None
 ) -> Measurements:
-    """Measurements whose times increase without gaps."""
+    """Measurements, checked for increasing times without gaps; allowed gaps are filled."""
     whole = np.isfinite(list(values.values())).all(axis=0)
     values = {name: column[whole] for name, column in values.items()}
     numbers = numbers[whole]
     time = values["time"]
     if len(time) < 4:
-        raise FileError(f"{path}: has {len(time)} samples; a trace needs more")
+        raise FileError(f"{path}: has {len(time)} samples; a trace needs at least 4")
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if back.size:
@@ -145,13 +146,13 @@ def _checked(
             f"{time[at]:g} s on line {numbers[at]}; times must increase"
         )
     usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > GAP * usual)
+    gaps = np.flatnonzero(steps > MIN_GAP * usual)
     for at in gaps:
         if max_gap is None or steps[at] > max_gap:
             raise FileError(
                 f"{path}: line {numbers[at + 1]}: a gap of {steps[at]:g} s after {time[at]:g} s, "
-                f"where samples are {usual:g} s apart; cut the file there, or fill it with "
-                "--max-gap"
+                f"where the sampling interval is {usual:g} s; cut the file there, or fill it "
+                "with --max-gap"
             )
     if gaps.size:
         counts = [round(steps[at] / usual) for at in gaps]

@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Known:
-    """What is known of an experiment without a whole configuration of it."""
+class PartialConfig:
+    """The known part of the configuration of an experiment."""
 
     title: str
     drive_velocity: float | None
@@ -36,7 +36,7 @@ class Known:
     base: None = None
 
     def to_toml(self) -> str:
-        """The part of a configuration that is known."""
+        """The known keys as TOML."""
         import tomli_w
 
         tables: dict[str, Any] = {"title": self.title}
@@ -59,11 +59,11 @@ def read_trace(
     noise: float | None = None,
     period: float | None = None,
 ) -> xr.DataTree:
-    """Read a measured trace from a table: an output like that of a run, with the slips found in it.
+    """Read a measured trace from a table, as an output like that of a run, with its slips.
 
-    What the table does not hold follows from what is known: the displacement of the drive from its
-    velocity, that of the slider from the drive's and the stretch of the spring, the velocity from
-    the displacement. What does not follow is NaN, such as detached contacts.
+    Missing columns are computed where possible: the displacement of the drive from its velocity,
+    that of the slider from the drive and the stretch of the spring, the velocity of the slider from
+    its displacement. Other variables, such as the detached contacts, are NaN.
 
     Parameters
     ----------
@@ -73,20 +73,20 @@ def read_trace(
     columns
         Headers instead of those of the file, such as "time [s], force [uN], -".
     rate
-        Sampling rate [1/s], if the table has no times.
+        Sampling rate [1/s], for a table without times.
     max_gap
-        Longest time without values [s] that is filled by straight lines; none by default.
+        Maximum length [s] of gaps, which are interpolated linearly; by default gaps are errors.
     drive_velocity
         Velocity of the drive [m/s].
     stiffness
         Spring constant [N/m].
     config
-        Configuration of the experiment as far as it is known, drive and spring included. The output
-        takes it over, so that every command works on it.
+        Configuration of the experiment as far as it is known, with drive and spring. The output
+        contains it, so that every command works on the output.
     noise
         Standard deviation of the noise of the force [N]; estimated by default.
     period
-        Period of the setup [s]; from the configuration, or else estimated.
+        Period of the setup [s]; by default that of the configuration, or an estimate.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def read_trace(
     Raises
     ------
     FileError
-        If the table cannot be read or is wrong; the message names the line.
+        If the table cannot be read or is invalid; the message names the line.
     ConfigError
-        If what is known contradicts itself.
+        If the arguments contradict each other.
     """
     path = as_path(file)
     if config is not None:
@@ -107,16 +107,16 @@ def read_trace(
     measured = read_table(path, columns=columns, rate=rate, max_gap=max_gap)
     if config is not None and (drive_velocity is not None or stiffness is not None):
         name = "drive_velocity" if drive_velocity is not None else "stiffness"
-        message = "the configuration tells drive and spring; change them there"
+        message = "is given in the configuration; change it there"
         raise ConfigError([Problem("", name, message)])
     if noise is not None and noise < 0:
         raise ConfigError([Problem("", "noise", "must not be negative", noise)])
     if period is not None and period <= 0:
         raise ConfigError([Problem("", "period", "must be greater than 0", period)])
     title = f"Measured: {path.name}"
-    described: Config | Known = Known(title, drive_velocity, stiffness)
+    known: Config | PartialConfig = PartialConfig(title, drive_velocity, stiffness)
     if config is not None:
-        described = _as_measured(config, measured, title)
+        known = _as_measured(config, measured, title)
         stiffness = config.spring_stiffness
         if period is None and config.slider.quiet_time > 0:
             period = 2 * config.slider.quiet_time
@@ -132,30 +132,30 @@ def read_trace(
         "origin": "measured",
         "measured_file": path.name,
         "complete": "true",
-        "comment": "; ".join(_doubts(direction * force, noise, period)),
+        "comment": "; ".join(_comments(direction * force, noise, period)),
         "noise": noise,
         "setup_period": period,
         "setup_period_origin": "estimated" if estimated else "given",
     }
-    attributes = program_attributes(described, "trace") | details
+    attributes = program_attributes(known, "trace") | details
     return _tree(measured, drive, displacement, found, velocity, stiffness, period, attributes)
 
 
-def _doubts(force: Array, noise: float, period: float) -> Iterator[str]:
-    """What makes a force along the drive unlike one that friction gives."""
+def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
+    """Signs that a force along the drive is not a friction force with slips."""
     if float(np.median(force)) < -noise:
         yield (
-            "the force is against the drive most of the time; if the cell counts it the other way, "
-            "give a velocity of the other sign, here or in the configuration"
+            "the force is against the drive most of the time; if the sensor has the opposite sign, "
+            "give a velocity of the opposite sign, here or in the configuration"
         )
     if not math.isfinite(period):
-        yield "no fall of the force stands out of the noise: there is no slip, and no period"
+        yield "no fall of the force exceeds the noise: no slips, and no period of the setup"
 
 
 def _as_measured(config: Config, measured: Measurements, title: str) -> Config:
-    """The configuration of an experiment, with the duration and the interval of its trace."""
+    """The configuration of an experiment with the duration and sampling interval of its trace."""
     time = measured.time
-    # As people write them, without the rounding of differences.
+    # Rounded, as differences of times have rounding errors.
     duration, interval = (
         float(f"{one:.9g}") for one in (time[-1] - time[0], np.median(np.diff(time)))
     )
@@ -174,7 +174,7 @@ def _drive(
     config: Config | None,
     stiffness: float | None,
 ) -> tuple[Array | None, float | None]:
-    """Displacement of the drive [m], and its first velocity that is not zero [m/s], if known."""
+    """Displacement of the drive [m] and its first nonzero velocity [m/s], as far as known."""
     time = measured.time - measured.time[0]
     start = 0.0
     if stiffness is not None and 0 < stiffness < math.inf:
@@ -182,7 +182,7 @@ def _drive(
         start = measured.force[0] / stiffness
     if config is not None and config.drive.force_rate is None:
         velocity = first_velocity(config)
-        drive = start + _way(config, time)
+        drive = start + _drive_displacement(config, time)
     elif velocity is not None:
         drive = start + velocity * time
     else:
@@ -194,19 +194,19 @@ def _drive(
     return drive, velocity
 
 
-def _way(config: Config, time: Array) -> Array:
-    """Displacement of a drive since its start [m]."""
+def _drive_displacement(config: Config, time: Array) -> Array:
+    """Displacement of the configured drive since its start [m]."""
     duration, start, end, _ = np.array(config.drive_parts).T
     begin = np.cumsum(duration) - duration
-    ways = np.cumsum(0.5 * (start + end) * duration)
-    place = np.searchsorted(begin, time, "right") - 1
-    since = time - begin[place]
-    # Beyond its last part, which ends with the run, the drive goes on.
-    within = np.minimum(since, duration[place])
-    ramp = 0.5 * (end - start)[place] / duration[place] * within**2
-    before = np.concatenate([[0.0], ways])[place]
-    way: Array = before + start[place] * within + ramp + end[place] * (since - within)
-    return way
+    ends = np.cumsum(0.5 * (start + end) * duration)
+    part = np.searchsorted(begin, time, "right") - 1
+    since = time - begin[part]
+    # The drive continues after its last part.
+    within = np.minimum(since, duration[part])
+    ramp = 0.5 * (end - start)[part] / duration[part] * within**2
+    before = np.concatenate([[0.0], ends])[part]
+    displacement: Array = before + start[part] * within + ramp + end[part] * (since - within)
+    return displacement
 
 
 def _displacement(
@@ -272,7 +272,7 @@ def _tree(
 
 
 def _velocity(time: Array, displacement: Array, period: float) -> Array:
-    """Derivative of the displacement, straight lines through a sixteenth of a period [m/s]."""
+    """Derivative of the displacement [m/s], by linear fits over a sixteenth of a period."""
     from scipy.signal import savgol_filter
 
     interval = float(np.median(np.diff(time)))

@@ -42,4 +42,4 @@ def _row(parameter: posterior.Row) -> tuple[str, ...]:
     low, lower, median, upper, high = (shown.text(one) for one in parameter.percentiles)
     intervals = (f"{lower} to {upper}", f"{low} to {high}")
     key = shown.head(parameter.key)
-    return (key, median, *intervals, parameter.verdict, parameter.informed_by)
+    return (key, median, *intervals, parameter.verdict, parameter.most_informative)

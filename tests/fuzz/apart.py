@@ -115,6 +115,8 @@ class Told:
     seconds: float
     cpu_after_signal: float | None = None
     """Computing time that it went on after it was asked to stop [s]; None if it was not."""
+    memory: int = 0
+    """Its largest resident memory, if it had a process of its own [bytes]."""
 
 
 def call(arguments: Sequence[object], folder: Path, seconds: float = 4.0) -> Told:
@@ -250,7 +252,17 @@ class Command:
             time.sleep(0.005)
         texts = [path.read_text(errors="replace") for path in self._paths]
         code = os.waitstatus_to_exitcode(status)
-        return Told(code, *texts, used.ru_utime + used.ru_stime)
+        seconds = used.ru_utime + used.ru_stime
+        return Told(code, *texts, seconds, memory=used.ru_maxrss * 1024)
+
+    def work(self, work: float) -> Told | None:
+        """What it said, if it ends within a computing time [s]; None if it is still at work."""
+        end = self.cpu_seconds() + work
+        while self.cpu_seconds() < end:
+            told = self.wait(0.01)
+            if told is not None:
+                return told
+        return None
 
     def kill(self) -> None:
         os.kill(self.pid, signal.SIGKILL)

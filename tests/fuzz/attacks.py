@@ -460,7 +460,7 @@ def disks(name: str, folder: Path) -> Report:
     """A disk that is full before or in the midst of a command."""
     random, store = Random(name), Path(os.environ["FUZZ_STORE"])
     size = int(10 ** random.uniform(3.6, 6.8))
-    is_mounted = os.geteuid() == 0 and _mount(folder, size)
+    is_mounted = os.geteuid() == 0 and mount(folder, size)
     try:
         return _on_small_disk(random, store, folder, size, is_mounted)
     finally:
@@ -468,7 +468,8 @@ def disks(name: str, folder: Path) -> Report:
             subprocess.run(["umount", "--lazy", folder], check=False)
 
 
-def _mount(folder: Path, size: int) -> bool:
+def mount(folder: Path, size: int) -> bool:
+    """Put a disk of a size in the place of a folder [bytes]; whether that was possible."""
     line = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     return subprocess.run(line, check=False, capture_output=True).returncode == 0
 

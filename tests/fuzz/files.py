@@ -9,17 +9,23 @@ import ctypes
 import os
 import resource
 import shutil
+import subprocess
 from pathlib import Path
 from random import Random
 
+import numpy as np
 import tomli_w
 from apart import Command, call, limit_memory
-from attacks import OUTCOMES, STANDARD, Attack, Report, advanced, read, wrong_words
+from attacks import OUTCOMES, STANDARD, Attack, Report, advanced, mount, read, wrong_words
 from conftest import klein_tables
 from invariants import differences
 from kinds import FAST, KINDS
-from mesoslip import Config
+from mesoslip import Config, MesoslipError
+from mesoslip.output.tree import build_tree
+from mesoslip.output.writing import write
 from mesoslip.simulation.checkpoint import checkpoint_folder
+from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.tables import TABLES
 
 # Time that a command has [s].
 SECONDS = 20.0
@@ -117,40 +123,58 @@ def neighbours(name: str, folder: Path) -> Report:
     return report
 
 
-def bits(name: str, folder: Path) -> Report:
-    """Bytes of a small checkpoint, a piece of it in each case: the run is the same, or refused."""
-    limit_memory()
-    random, store = Random(name), Path(os.environ["FUZZ_STORE"])
-    case, output = folder / "case.toml", folder / "out.nc"
-    case.write_text((store / "0.toml").read_text())
+# Kinds of run whose checkpoints are damaged, and cases that together change each byte of one.
+BIT_KINDS = ("rigid", "rigid, lattice", "rigid, me", "quasistatic, lattice")
+BIT_CASES = 25
 
-    place = checkpoint_folder(output)
-    advanced(Config.load(case), place, 200, [])
-    expected = read(store / "0.nc")
+
+def bits(name: str, folder: Path) -> Report:
+    """Each byte of a small checkpoint, a part in each case: the run is the same, or refused.
+
+    `BIT_CASES` cases for each kind, first with one state, then with the one before as well.
+    """
+    limit_memory()
+    random = Random(name)
+    group, part = divmod(int(name.rpartition(":")[2]), BIT_CASES)
+    kind = BIT_KINDS[group % len(BIT_KINDS)]
+    changes = FAST | KINDS[kind] | {"title": kind}
+    if "interaction" not in changes:
+        changes["contacts__count"] = 3
+    config = Config.from_dict(klein_tables(**changes))
+    place = checkpoint_folder(folder / "out.nc")
+    for _ in range(1 if group < len(BIT_KINDS) else 2):
+        advanced(config, place, 60, [])
+    expected = _numbers(run_realizations(config, executor=1))
     kept = {path: path.read_bytes() for path in sorted(place.iterdir())}
-    lengths = [len(data) for data in kept.values()]
-    pieces = 100
-    first = int(name.rpartition(":")[2]) % pieces
+    all_bytes = [(path, at) for path, data in kept.items() for at in range(len(data))]
     report = Report("finished")
-    for byte in range(first, sum(lengths), pieces * random.choice([3, 5, 7])):
-        shutil.rmtree(place, ignore_errors=True)
+    for path, at in all_bytes[part::BIT_CASES]:
+        for one in folder.iterdir():
+            shutil.rmtree(one)
         place.mkdir()
-        at = byte
-        for path, data in kept.items():
-            changed = bytearray(data)
-            if 0 <= at < len(data):
-                changed[at] ^= 1 << random.randrange(8)
-            at -= len(data)
-            path.write_bytes(changed)
-        told = call(["run", case, "-o", output, "--resume", "--quiet"], folder, SECONDS)
-        report.problems += wrong_words(told)
-        if told.status == 0:
-            found = differences(read(output), expected)
-            report.problems += [f"byte {byte}: {one} differs" for one in found]
-        output.unlink(missing_ok=True)
-        if report.problems:
-            break
+        for one, data in kept.items():
+            one.write_bytes(data)
+        changed = bytearray(kept[path])
+        changed[at] ^= 1 << random.randrange(8)
+        path.write_bytes(changed)
+        try:
+            results, _ = advanced(config, place, None, [])
+            found = "" if _numbers(results) == expected else "another result"
+        except MesoslipError:
+            continue
+        except Exception as error:
+            found = f"{type(error).__name__}: {error}"
+        if found:
+            report.problems.append(f"{kind}, byte {at} of {path.name}: {found}")
     return report
+
+
+def _numbers(results: Results) -> list[bytes]:
+    """All that realizations have recorded, and their balances of energy."""
+    tables = [one.rows(table) for one in results.realizations for table in TABLES]
+    recorded = [rows.read() if len(rows) else np.empty(0) for rows in tables]
+    energies = [np.array(list(one.energy_terms.values())) for one in results.realizations]
+    return [values.tobytes() for values in (*recorded, *energies)]
 
 
 def stores(name: str, folder: Path) -> Report:
@@ -201,30 +225,62 @@ def stores(name: str, folder: Path) -> Report:
 
 
 def small_disks(name: str, folder: Path) -> Report:
-    """No room for a sweep or a trace: one message, and with room the same as ever."""
+    """No room for a sweep, a trace or a fit: one message, and with room the same as ever.
+
+    The disk is full, or files may not become longer than a limit.
+    """
     random = Random(name)
-    case, output = folder / "case.toml", folder / "out.nc"
+    disk = folder / "disk"
+    disk.mkdir()
+    case, output = folder / "case.toml", disk / "out.nc"
     size = int(10 ** random.uniform(2.0, 5.0))
     table = folder / "table.csv"
     rows = "".join(f"{0.01 * row:.2f},{row % 50}\n" for row in range(random.choice([200, 5000])))
     table.write_text("time [s],force [uN]\n" + rows)
     case.write_text(_short() + SWEEP)
-    arguments: list[object] = random.choice(
-        [
-            ["sweep", case, "-o", output, "--quiet", "--pool", "threads"],
-            ["sweep", case, "-o", output, "--quiet", "--workers", 1],
-            ["trace", table, "--velocity", "1 um/s", "-o", output],
-        ]
-    )
+    commands: list[list[object]] = [
+        ["sweep", case, "-o", output, "--quiet", "--pool", "threads"],
+        ["sweep", case, "-o", output, "--quiet", "--workers", 1],
+        ["trace", table, "--velocity", "1 um/s", "-o", output],
+        ["fit"],
+    ]
+    arguments = random.choice(commands)
+    if arguments == ["fit"]:
+        size = int(10 ** random.uniform(2.0, 6.3))
+        arguments = [*small_fit(folder), "-o", output]
+    is_mounted = os.geteuid() == 0 and random.random() < 0.5 and mount(disk, max(size, 4096))
+    try:
+        return _without_room(arguments, folder, output, random, None if is_mounted else size)
+    finally:
+        if is_mounted:
+            subprocess.run(["umount", "--lazy", disk], check=False)
+
+
+def small_fit(folder: Path) -> list[object]:
+    """The command of a fit that takes some seconds, with its trace and configuration."""
+    changes = {"run__duration": 2.0, "contacts__count": 50, "output__interval": 2e-3}
+    tables = klein_tables(**changes, contacts__threshold__relative_width=0.05)
+    write(build_tree(run_realizations(Config.from_dict(tables), executor=1)), folder / "run.nc")
+    free = {"contacts.static_force": {"from": "5 uN", "to": "40 uN", "prior": "logarithmic"}}
+    tables["fit"] = {"free": free, "simulations": 300, "noise": 5e-8}
+    (folder / "fit.toml").write_text(tomli_w.dumps(tables))
+    return ["fit", folder / "run.nc", folder / "fit.toml", "--quiet"]
+
+
+def _without_room(
+    arguments: list[object], folder: Path, output: Path, random: Random, limit: int | None
+) -> Report:
+    """Try a command on a full disk, or where no file may be longer than a limit [bytes]."""
     is_old = random.random() < 0.5
     if is_old:
         output.write_bytes(b"mine")
     before = look_of(folder)
 
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+    def limit_files() -> None:
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    process = Command(arguments, folder, limit)
+    process = Command(arguments, folder, limit_files)
     told = process.wait(60.0)
     if told is None:
         process.kill()
@@ -235,10 +291,16 @@ def small_disks(name: str, folder: Path) -> Report:
     if told.status != 0 and output.exists() != is_old:
         report.problems.append("half written")
     if told.status != 0:
-        again = call(arguments, folder, 60.0)
+        if limit is None:
+            line = ["mount", "-o", "remount,size=64m", str(output.parent)]
+            subprocess.run(line, check=True)
+        again = Command(arguments, folder).wait(60.0)
+        if again is None:
+            return Report("other", [f"hang with room: {arguments[0]}"])
         report.problems += [f"with room: {one}" for one in wrong_words(again)]
         if again.status != 0:
             report.problems.append(f"with room: status {again.status}: {again.err[-300:]}")
+    report.problems = [f"{arguments[0]}: {one}" for one in report.problems]
     return report
 
 
@@ -387,7 +449,7 @@ def numbers(name: str, folder: Path) -> Report:
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
     "neighbours": (neighbours, 100),
-    "bits": (bits, 20),
+    "bits": (bits, BIT_CASES),
     "stores": (stores, 40),
     "small_disks": (small_disks, 40),
     "links": (links, 60),

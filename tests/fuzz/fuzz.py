@@ -26,13 +26,16 @@ os.environ["MPLBACKEND"] = "agg"
 
 import attacks  # noqa: E402
 import files  # noqa: E402
+import limits  # noqa: E402
 from apart import Apart, result_of, wait_for_any  # noqa: E402
 from attacks import Report, check_configuration, prepare  # noqa: E402
 
-ATTACKS = attacks.ATTACKS | files.ATTACKS
+ATTACKS = attacks.ATTACKS | files.ATTACKS | limits.ATTACKS
 
 # Time that a case has [s]; what is interrupted in it takes less.
 CASE_SECONDS = 120.0
+# That of cases which take long on any machine [s].
+LONG_SECONDS = {"many": 1200.0}
 # Trials for the smallest configuration that shows what was found, and time for them [s].
 MOST_TRIALS = 150
 SMALLEST_SECONDS = 20.0
@@ -40,7 +43,7 @@ SMALLEST_SECONDS = 20.0
 MOST_SMALLEST = 2
 
 # Attacks that start from outputs which are made before.
-NEED_OUTPUTS = {"outputs", "signals", "disks", "terminals", "bits", "links"}
+NEED_OUTPUTS = {"outputs", "signals", "disks", "terminals", "links"}
 
 NUMBER = re.compile(rb"(?<== )-?[0-9.]+(e-?[0-9]+)?$")
 
@@ -174,7 +177,8 @@ def fuzz(
         while waiting or running:
             while waiting and free:
                 name, place = waiting.pop(), folder / str(free[-1])
-                one = Apart(partial(run_case, name, place), CASE_SECONDS, place.with_suffix(".log"))
+                seconds = LONG_SECONDS.get(name.partition(":")[0], CASE_SECONDS)
+                one = Apart(partial(run_case, name, place), seconds, place.with_suffix(".log"))
                 running[one] = (name, free.pop())
             wait_for_any(list(running))
             for one, (name, number) in list(running.items()):

@@ -189,6 +189,52 @@ def test_foreign_files_are_never_touched(tmp_path):
     assert (theirs / "lock").read_text() == "theirs"
 
 
+@pytest.mark.parametrize("name", ["manifest.json", "00000a.nc", ".00000a.json.part", "lock"])
+def test_a_store_takes_no_file_of_its_names_for_its_own(name, tmp_path):
+    """In a folder that holds files of others, such as .gitignore; an empty lock is one of them."""
+    (tmp_path / ".gitignore").write_text("*")
+    (tmp_path / name).write_text("")
+    with pytest.raises(FileError, match="was not made by this program"):
+        Store(tmp_path, "points", "one")
+    assert {one.name for one in tmp_path.iterdir()} == {".gitignore", name}
+    assert (tmp_path / name).read_text() == ""
+
+
+def test_a_store_in_a_folder_of_others_is_found_again_and_removed(tmp_path):
+    (tmp_path / ".gitignore").write_text("*")
+    with Store(tmp_path, "points", "one") as store:
+        store.write("00000a", {})
+    with Store(tmp_path, "points", "one") as store:
+        assert store.names() == {"00000a"}
+        store.remove()
+    assert [one.name for one in tmp_path.iterdir()] == [".gitignore"]
+
+
+@pytest.mark.parametrize("count", range(6))
+def test_a_store_is_its_own_however_much_of_it_was_removed(count, tmp_path, monkeypatch):
+    """As when the program is killed after the output of a fit is there."""
+    path, unlink, removed = tmp_path / "simulations", Path.unlink, []
+
+    def killed(self, **more):
+        if len(removed) == count:
+            raise KeyboardInterrupt
+        removed.append(self.name)
+        unlink(self, **more)
+
+    store = Store(path, "simulations", "one")
+    for number in range(4):
+        store.write(f"{number:08d}", {})
+    monkeypatch.setattr(Path, "unlink", killed)
+    with pytest.raises(KeyboardInterrupt):
+        store.remove()
+    monkeypatch.undo()
+    store.close()
+    with Store(path, "simulations", "one") as store:
+        assert len(store.names()) == max(4 - count, 0)
+        store.remove()
+    assert not path.exists()
+
+
 def test_a_folder_of_files_of_known_names_is_not_one_of_ours(tmp_path):
     (tmp_path / "state.npz").write_text("theirs")
     with pytest.raises(FileError, match="was not made by this program"):

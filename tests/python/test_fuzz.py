@@ -25,7 +25,7 @@ ANSWER_SECONDS = 3.0
 
 def test_attack():
     """A few cases of most attacks, each in a process of its own; make fuzz tries thousands."""
-    counts = "configurations=2 mutations=10 checkpoints=2 numbers=2"
+    counts = "configurations=2 mutations=10 checkpoints=2 numbers=2 versions=1 calls=10"
     line = [sys.executable, ROOT / "tests" / "fuzz" / "fuzz.py", *counts.split(), "--jobs", "1"]
     line += ["--seed", "2026", "--no-keep"]
     result = subprocess.run(line, capture_output=True, text=True, check=False)

@@ -1,17 +1,22 @@
-"""Kill runs of all kinds at random moments, take them up, and compare every byte.
+"""Kill runs of all kinds at random moments, resume them, and compare every byte.
 
-Usage: kill.py [KILLS]. Prints a line for each kind, and what was lost or differed; exit status 0 if
-nothing did. A short version is in tests/python/test_resume.py.
+Usage: kill.py [KILLS] [--scale FACTOR] [--tally FILE]. Half of the kills are of runs that had been
+resumed. Of each kind it is checked that
+
+- the output is to the bit that of a run that was not killed,
+- a kill costs no more than what came after the last checkpoint,
+- nothing but the output remains.
+
+Prints a line for each kind; exit status 0 if nothing was wrong. A short version is in
+tests/python/test_resume.py, and tests/resume/kill_all.py kills sweeps and fits as well.
 """
 
 from __future__ import annotations
 
+import json
 import os
-import signal
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +25,14 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
 
+from apart import Command
 from conftest import klein_tables
+from invariants import differences
 from kinds import BASE, LAYERED
 from mesoslip import Config
-from test_resume import assert_same, read_whole
+from mesoslip.simulation.checkpoint import PREVIOUS, STATE, checkpoint_folder
+from tally import Tally, arguments
+from test_resume import read_whole
 
 # Runs that take some seconds, so that there is time to be killed; a fast drive, so that much
 # happens in them.
@@ -32,13 +41,13 @@ LONG: dict[str, Any] = {
     "output__interval": 1e-3,
     "output__slip_interval": 1e-4,
 }
-PLACES = {"strength": 0.3, "lattice": "triangular", "columns": 60, "rows": 68}
+SITES = {"strength": 0.3, "lattice": "triangular", "columns": 60, "rows": 68}
 SOFT = {"contacts__stiffness": 200.0, "contacts__threshold__relative_width": 0.3}
 KINDS: dict[str, dict[str, Any]] = {
     "rigid": {"run__duration": 100.0},
     "rigid, realizations": {"run__realizations": 5, "run__duration": 25.0},
     "rigid, me": {"run__engine": "me", "run__duration": 40.0},
-    "rigid, lattice": SOFT | {"interaction": PLACES, "output__snapshot_size": 500},
+    "rigid, lattice": SOFT | {"interaction": SITES, "output__snapshot_size": 500},
     "prescribed": {"slider": {"kind": "prescribed"}, "run__duration": 40.0},
     "layered": {"slider": LAYERED | {"layers": 16, "base": BASE}, "run__duration": 8.0},
     "layered, bdf": {
@@ -49,67 +58,104 @@ KINDS: dict[str, dict[str, Any]] = {
     "quasistatic": {
         "slider": {"kind": "quasistatic", "stiffness": 97.0},
         "run__duration": 100.0,
-        "interaction": PLACES,
+        "interaction": SITES,
     },
 }
 
-
-def start(config: Path, output: Path, *more: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "mesoslip", "run", str(config), "-o", str(output), "--quiet"]
-    return subprocess.Popen([*command, *more], stderr=subprocess.PIPE)
+# Time that a run has [s].
+MAX_SECONDS = 600.0
 
 
-def attack(kind: str, kills: int, folder: Path, random: np.random.Generator) -> tuple[int, int]:
-    """Kill a run so many times at least, again and again from the beginning; kills, differences."""
+def attack(
+    kind: str, kills: int, folder: Path, random: np.random.Generator, *, scale: float = 1.0
+) -> Tally:
+    """Kill a run so many times at least, again and again from the beginning.
+
+    Parameters
+    ----------
+    kind
+        One of `KINDS`.
+    kills
+        Least number of kills of runs that start, and of runs that were resumed.
+    folder
+        An empty one; what the runs print is written beside it.
+    random
+        Gives the moments.
+    scale
+        Factor of the durations.
+    """
+    changes = LONG | KINDS[kind]
+    changes["run__duration"] *= scale
     config = folder / "run.toml"
-    config.write_text(Config.from_dict(klein_tables(**LONG | KINDS[kind])).to_toml())
-    expected = folder / "whole.nc"
-    begun = time.monotonic()
-    process = start(config, expected)
-    process.communicate()
-    assert process.returncode == 0
-    length = time.monotonic() - begun
+    config.write_text(Config.from_dict(klein_tables(**changes)).to_toml())
+    expected, output = folder / "whole.nc", folder / "killed.nc"
+    tally = Tally(["runs", "resumed runs"])
+    end = Command(["run", config, "-o", expected, "--quiet"], folder).wait(MAX_SECONDS)
+    assert end is not None
+    assert end.status == 0, end.err
+    length = end.seconds
     whole = read_whole(expected)
-    done = differences = 0
-    while done < kills:
-        output = folder / "killed.nc"
+    place = checkpoint_folder(output)
+    line = ["run", config, "-o", output, "--resume", "--checkpoint-interval", 0.03, "--quiet"]
+    while min(tally.kills.values()) < kills:
+        status, seconds = -1, 0.0
         # It may even be killed between the last renaming and the removal of its checkpoint.
-        while process.returncode != 0 or not output.exists():
-            process = start(config, output, "--resume", "--checkpoint-interval", "0.1")
-            try:
-                process.wait(float(random.uniform(0.2, 1.0)) * (1.0 + 0.5 * length))
-            except subprocess.TimeoutExpired:
-                process.send_signal(signal.SIGKILL)
-                done += 1
-            _, told = process.communicate()
-            if process.returncode not in {0, -signal.SIGKILL}:
-                print(f"{kind}: exit status {process.returncode}: {told.decode()}")
-                return done, differences + 1
-        try:
-            assert_same(whole, read_whole(output))
-        except AssertionError as error:
-            print(f"{kind}: {error}")
-            differences += 1
+        while status != 0 or not output.exists():
+            is_resumed = saved_seconds(place) > 0
+            process = Command(line, folder)
+            if is_resumed and tally.kills["resumed runs"] >= kills:
+                end = process.wait(MAX_SECONDS)
+            else:
+                end = process.work(float(random.uniform(0.05, 0.7)) * length)
+            if end is None:
+                process.kill()
+                tally.kills["resumed runs" if is_resumed else "runs"] += 1
+                now = saved_seconds(place)
+                if now < seconds and not output.exists():
+                    tally.lose(f"{kind}: the checkpoint was of {seconds:.3f} s, is of {now:.3f} s")
+                seconds = max(seconds, now)
+                # So that a run comes to its end, however little of it is saved.
+                length *= 1.02
+                continue
+            status = end.status
+            if status != 0:
+                tally.lose(f"{kind}: exit status {status}: {end.err}")
+                return tally
+        tally.compare(kind, differences(whole, read_whole(output)))
         left = {path.name for path in folder.iterdir()} - {"run.toml", "whole.nc", "killed.nc"}
         if left:
-            print(f"{kind}: left behind: {left}")
-            differences += 1
+            tally.lose(f"{kind}: left behind: {sorted(left)}")
         output.unlink()
-    return done, differences
+    return tally
+
+
+def saved_seconds(place: Path) -> float:
+    """Wall time of a run up to its checkpoint, which grows with each of them [s]."""
+    for name in (STATE, PREVIOUS):
+        try:
+            with np.load(place / name) as file:
+                return float(json.loads(str(file["header"]))["wall_seconds"])
+        except FileNotFoundError:
+            continue
+    return 0.0
+
+
+def attack_all(kills: int, random: np.random.Generator, *, scale: float = 1.0) -> Tally:
+    """Kill runs of each kind; half of the kills are of resumed runs."""
+    total = Tally(["runs", "resumed runs"])
+    for kind in KINDS:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name) / "folder"
+            folder.mkdir()
+            total.add(attack(kind, -(-kills // (2 * len(KINDS))), folder, random, scale=scale))
+        print(f"{kind:24} {total}", flush=True)
+    return total
 
 
 def main() -> None:
-    kills = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    given = arguments(__doc__, 200)
     random = np.random.default_rng(int(os.environ.get("SEED", "1")))
-    total = wrong = 0
-    for kind in KINDS:
-        with tempfile.TemporaryDirectory() as folder:
-            done, differences = attack(kind, -(-kills // len(KINDS)), Path(folder), random)
-        print(f"{kind:24} {done:5d} kills, {differences} differences", flush=True)
-        total += done
-        wrong += differences
-    print(f"{total} kills, {wrong} differences")
-    sys.exit(wrong > 0)
+    attack_all(given.kills, random, scale=given.scale).end(given.tally)
 
 
 if __name__ == "__main__":

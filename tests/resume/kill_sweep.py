@@ -1,8 +1,8 @@
 """Kill a sweep and its workers at random moments, call it again, and compare every byte.
 
-Usage: kill_sweep.py [KILLS]. A sweep of 300 points is killed, as a whole or one of its workers, and
-called again until it is whole; and again from the beginning until there were so many kills. Of each
-it is checked that
+Usage: kill_sweep.py [KILLS] [--tally FILE]. A sweep of 300 points is killed, as a whole or one of
+its workers, and called again until it is whole; and again from the beginning until there were so
+many kills. Of each it is checked that
 
 - the dataset is to the bit that of a sweep that nobody has killed,
 - no point that was stored is computed or written again,
@@ -22,7 +22,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -33,6 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 
 from conftest import klein_tables
 from mesoslip import Config
+from tally import Tally, arguments
 
 WORKERS = 2
 OWN = '''
@@ -212,26 +212,32 @@ def is_alive(process: int) -> bool:
     return text.rpartition(")")[2].split()[0] not in {"Z", "X"}
 
 
-def main() -> None:
-    kills = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    random = np.random.default_rng(int(os.environ.get("SEED", "1")))
+def attack_in_new_folder(kills: int, random: np.random.Generator) -> Tally:
+    """Kill sweeps and their workers so many times at least, in a folder that is removed."""
+    tally = Tally(["sweeps", "workers of sweeps"])
     with tempfile.TemporaryDirectory() as folder:
         study = Study(Path(folder), 30, random)
         whole = study.expected()
-        number = 0
         while study.sweep_kills + study.worker_kills < kills and not study.wrong:
             left = kills - study.sweep_kills - study.worker_kills
-            study.attack(f"killed{number}", whole, left)
-            number += 1
+            study.attack(f"killed{tally.compared}", whole, left)
+            tally.compared += 1
             print(
-                f"{number} sweeps of {study.points} points: {study.sweep_kills} kills of sweeps, "
-                f"{study.worker_kills} of workers; {study.computed} points computed, of which "
-                f"{study.computed - number * study.points} had been under way",
+                f"{tally.compared} sweeps of {study.points} points: {study.sweep_kills} kills of "
+                f"sweeps, {study.worker_kills} of workers; {study.computed} points computed, of "
+                f"which {study.computed - tally.compared * study.points} had been under way",
                 flush=True,
             )
-    for text, count in Counter(study.wrong).items():
-        print(f"wrong: {text} ({count} times)")
-    sys.exit(bool(study.wrong))
+    tally.kills.update({"sweeps": study.sweep_kills, "workers of sweeps": study.worker_kills})
+    for message in study.wrong:
+        (tally.differing if message.endswith("differs") else tally.lost).append(message)
+    return tally
+
+
+def main() -> None:
+    given = arguments(__doc__, 100)
+    random = np.random.default_rng(int(os.environ.get("SEED", "1")))
+    attack_in_new_folder(given.kills, random).end(given.tally)
 
 
 if __name__ == "__main__":

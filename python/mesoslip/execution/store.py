@@ -36,13 +36,18 @@ class Folder:
     names
         Pattern of the names of its files.
     shared
-        Whether it may hold files of others from the beginning.
+        Whether it may hold files of others from the beginning, though none of these names.
+    last
+        Name of the file that is removed after all others.
     """
 
-    def __init__(self, path: Path, kind: str, names: str, *, shared: bool = False) -> None:
+    def __init__(
+        self, path: Path, kind: str, names: str, *, shared: bool = False, last: str = ""
+    ) -> None:
         self.path = path
         self.kind = kind
         self._shared = shared
+        self._last = last
         self._names = re.compile(names)
         self._lock: int | None = None
 
@@ -63,6 +68,16 @@ class Folder:
         mark = self._mark()
         # An empty lock is that of a process that was killed as it made it.
         return names <= {LOCK} if mark == b"" else mark == self._own_mark
+
+    @property
+    def _is_free(self) -> bool:
+        """Whether this program may make it its own: it is a folder without files of its names."""
+        try:
+            names = [one.name for one in self.path.iterdir()]
+        except OSError:
+            return False
+        parts = (name[1:-5] for name in names if name.startswith(".") and name.endswith(".part"))
+        return LOCK not in names and not any(map(self._names.fullmatch, (*names, *parts)))
 
     @property
     def _own_mark(self) -> bytes:
@@ -91,7 +106,7 @@ class Folder:
         FileError
             If something is there that this program has not made.
         """
-        if self.is_own or (self._shared and self.path.is_dir() and self._mark() == b""):
+        if self.is_own or (self._shared and self._is_free):
             return
         raise FileError(
             f"{self.path}: was not made by this program, which keeps its {self.kind} under this "
@@ -131,7 +146,7 @@ class Folder:
                     break
             os.close(number)
         try:
-            if self.is_own and os.fstat(number).st_size == 0:
+            if os.fstat(number).st_size == 0:
                 os.write(number, self._own_mark)
                 os.fsync(number)
         except OSError:
@@ -155,11 +170,14 @@ class Folder:
         self.remove_parts()
         with suppress(OSError):
             # States before the rows of tables that they need.
-            for one in sorted(self.path.iterdir(), key=lambda one: one.suffix):
+            for one in sorted(self.path.iterdir(), key=self._removal_order):
                 if self._names.fullmatch(one.name):
                     one.unlink()
             self._remove_lock()
         self._close()
+
+    def _removal_order(self, path: Path) -> tuple[bool, str]:
+        return path.name == self._last, path.suffix
 
     def move(self, path: Path) -> None:
         """Give it another name, and leave it to other processes."""
@@ -290,7 +308,9 @@ class Store(Pieces):
 
     def __init__(self, path: Path, kind: str, fingerprint: str = "") -> None:
         super().__init__(path)
-        self._folder = Folder(path, kind, rf"{PIECE}\.(json|nc)|{re.escape(MANIFEST)}", shared=True)
+        # Of a store whose removal was cut short, what is left still belongs to its fingerprint.
+        names = rf"{PIECE}\.(json|nc)|{re.escape(MANIFEST)}"
+        self._folder = Folder(path, kind, names, shared=True, last=MANIFEST)
         try:
             self._folder.lock()
         except OSError as error:

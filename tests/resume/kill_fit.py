@@ -1,0 +1,125 @@
+"""Kill a fit at random moments, call it again, and compare every byte of the posterior.
+
+Usage: kill_fit.py [KILLS] [--tally FILE]. Of each fit it is checked that
+
+- the posterior is to the bit that of a fit that was not killed,
+- no simulation that was stored is lost or written again,
+- nothing but the posterior remains.
+
+Exit status 0 if nothing was wrong. A short version is in tests/python/test_fit_kill.py.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import emcee  # noqa: F401
+import mesoslip.inference.fit_trace  # noqa: F401
+import numpy as np
+import tomli_w
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
+
+from apart import Command
+from invariants import differences
+from mesoslip.output.writing import write
+from tally import Tally, arguments
+from test_fit import experiment, fit_tables
+from test_resume import read_whole
+
+# Time that a fit has [s].
+MAX_SECONDS = 600.0
+
+
+def stored(folder: Path) -> dict[str, tuple[int, int]]:
+    """Files of simulations, and which file and of what moment each is."""
+    states = {}
+    for path in (folder / "posterior.simulations").glob("[0-9]*.json"):
+        try:
+            state = path.stat()
+        except FileNotFoundError:
+            continue
+        states[path.name] = (state.st_ino, state.st_mtime_ns)
+    return states
+
+
+def prepared(folder: Path) -> list[object]:
+    """The command, with a trace and what is to be fitted in a folder."""
+    few = {"contacts__count": 50, "run__duration": 2.0}
+    write(experiment(**few), folder / "trace.nc")
+    tables = fit_tables()
+    tables["contacts"]["count"], tables["run"]["duration"] = few.values()
+    (folder / "fit.toml").write_text(tomli_w.dumps(tables))
+    return ["fit", folder / "trace.nc", folder / "fit.toml", "--quiet"]
+
+
+def attack(kills: int, folder: Path, random: np.random.Generator) -> Tally:
+    """Kill a fit so many times at least, again and again from the beginning.
+
+    Parameters
+    ----------
+    kills
+        Least number of kills.
+    folder
+        An empty one; what the fits print is written beside it.
+    random
+        Gives the moments.
+    """
+    line = prepared(folder)
+    expected, output = folder / "whole.nc", folder / "posterior.nc"
+    tally = Tally(["fits"])
+    end = Command([*line, "-o", expected], folder).wait(MAX_SECONDS)
+    assert end is not None
+    assert end.status == 0, end.err
+    length = end.seconds
+    whole = read_whole(expected)
+    kept = {path.name for path in folder.iterdir()} | {"posterior.nc"}
+    while tally.kills["fits"] < kills:
+        status, there = -1, {}
+        while status != 0 or not output.exists():
+            process = Command([*line, "-o", output], folder)
+            end = process.work(float(random.uniform(0.02, 0.5)) * length)
+            if end is None:
+                process.kill()
+                tally.kills["fits"] += 1
+                now = stored(folder)
+                if not output.exists():
+                    gone = [name for name, state in there.items() if now.get(name) != state]
+                    for name in gone:
+                        tally.lose(f"simulation {name} was lost or written again")
+                there = now
+                # So that a fit comes to its end, however long the part that is not stored takes.
+                length *= 1.01
+                continue
+            status = end.status
+            if status != 0:
+                tally.lose(f"exit status {status}: {end.err}")
+                return tally
+        tally.compare("fit", differences(whole, read_whole(output)))
+        left = {path.name for path in folder.iterdir()} - kept
+        if left:
+            tally.lose(f"left behind: {sorted(left)}")
+        output.unlink()
+    return tally
+
+
+def attack_in_new_folder(kills: int, random: np.random.Generator) -> Tally:
+    """Kill fits in a folder that is removed afterwards; see `attack`."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "folder"
+        folder.mkdir()
+        return attack(kills, folder, random)
+
+
+def main() -> None:
+    given = arguments(__doc__, 75)
+    random = np.random.default_rng(int(os.environ.get("SEED", "1")))
+    attack_in_new_folder(given.kills, random).end(given.tally)
+
+
+if __name__ == "__main__":
+    main()

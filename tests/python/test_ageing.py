@@ -443,3 +443,19 @@ def test_contacts_of_the_start_could_attach_when_they_were_young(klein):
     young = contacts.ageing.threshold(limit, 0.2, 0.0)
     assert young.min() > 0.3
     assert young.min() < 0.31
+
+
+def test_visits_of_contacts_are_work(klein):
+    """Where an advance visits many contacts, a segment of a run has fewer advances."""
+    config = klein(
+        run__duration=1.0,
+        contacts__count=20_000,
+        contacts__coupling="equal",
+        contacts__ageing={"law": "log", "time": 1e-3, "growth": 0.05},
+        output={"interval": 0.01},
+    )
+    with Realization(config, 0) as realization:
+        realization.advance_to(0.7)
+        before = realization.advances
+        realization.advance(work=5000.0)
+        assert 1 <= realization.advances - before < 250

@@ -145,6 +145,7 @@ contains
       lower = self%behind
       end_time = self%detached%next_due
       call follow_motion(self, pose)
+      self%cost = 1.0_wp
       if (self%is_steady) then
          upper = self%queue%first_key
       else

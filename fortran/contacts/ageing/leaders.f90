@@ -19,6 +19,8 @@ module mesoslip_contacts_ageing_leaders
    real(wp), parameter :: max_excess = 1.0e-5_wp
    !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
    integer, parameter :: max_steps = 8
+   !> Visits of contacts that take as long as an advance of a rigid slider
+   real(wp), parameter :: visits_per_cost = 5.0_wp
 
 contains
 
@@ -29,14 +31,16 @@ contains
       !> Coordinate until which no contact breaks [m]
       real(wp), intent(inout) :: upper
 
-      integer :: position, contact
+      integer :: position, contact, visited
       real(wp) :: key
 
+      visited = self%leaders%count
       do position = 1, self%leaders%count
          upper = min(upper, foresee(self, self%leaders%contact(position), pose))
       end do
       do while (self%queue%first_key < upper)
          call self%queue%pop(self%record, contact)
+         visited = visited + 1
          if (self%life(life_motion, contact) < any_motion) then
             call self%order(contact, pose%displacement, pose%time)
             key = ahead_coordinate(self%record(:, contact), self%direction)
@@ -56,6 +60,8 @@ contains
             call remove(self%leaders, position)
          end if
       end do
+      ! A segment of a run must not last long, however many contacts an advance visits.
+      self%cost = 1.0_wp + visited / visits_per_cost
    end subroutine bound_leaders
 
    !> Where a leader is foreseen to break.

@@ -331,8 +331,9 @@ subroutine ask_energy(handle, energy, status, message)
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Work of the drive; energy of the slider and its spring, of the contacts; losses by damping, by
-   !> drag, by breaking; gain by attaching; what the balance lacks [J]
-   real(8), intent(out) :: energy(8)
+   !> drag, by breaking; gain by attaching; work of steps beyond that of the contacts; what the
+   !> balance lacks [J]
+   real(8), intent(out) :: energy(9)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 

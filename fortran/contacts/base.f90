@@ -68,6 +68,9 @@ module mesoslip_contacts_base
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
+      !> Work done on the contact force that was offered, beyond that on the contacts: the error of
+      !> steps [J]; none where contacts are kept one by one
+      type(accumulator_type) :: step_work
       !> Estimated error of the contact force [N]; none where contacts are kept one by one
       real(wp) :: error_estimate = 0.0_wp
       !> Cost of a response over that of one contact that breaks
@@ -275,6 +278,7 @@ contains
       call archive%exchange("breaks", self%breaks)
       call archive%exchange("break_loss", self%break_loss)
       call archive%exchange("birth_gain", self%birth_gain)
+      call archive%exchange("step_work", self%step_work)
       call archive%exchange("error_estimate", self%error_estimate)
       call archive%exchange("cost", self%cost)
    end subroutine exchange_contacts

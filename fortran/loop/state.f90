@@ -20,10 +20,11 @@ module mesoslip_loop_state
    public :: energy_columns, energy_length
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
-   !> contacts; losses by damping, by drag, by breaking; gain by attaching; residual
+   !> contacts; losses by damping, by drag, by breaking; gain by attaching; work of steps beyond that
+   !> of the contacts; residual
    character(len=*), parameter :: energy_columns(*) = [character(len=name_length) :: &
       & "drive_work", "slider_energy", "contact_energy", "damping_loss", "drag_loss", &
-      & "break_loss", "birth_gain", "residual"]
+      & "break_loss", "birth_gain", "step_work", "residual"]
    integer, parameter :: energy_length = size(energy_columns)
 
    !> A slider, which has its drive, on contacts, and what is recorded of it.
@@ -106,8 +107,9 @@ contains
       energy(5) = self%slider%drag_loss%total()
       energy(6) = self%contacts%break_loss%total()
       energy(7) = self%contacts%birth_gain%total()
-      energy(8) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
-         & - energy(4) - energy(5) - energy(6) + energy(7)
+      energy(8) = self%contacts%step_work%total()
+      energy(9) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
+         & - energy(4) - energy(5) - energy(6) + energy(7) - energy(8)
    end function energy_balance
 
    !> A table of what was recorded.

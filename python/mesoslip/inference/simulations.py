@@ -79,7 +79,7 @@ class Simulator:
         changes = self.prior.changes(self.prior.values(unit))
         try:
             config = self.config.replace({**changes, "run.seed": int(words[0] >> np.uint64(2))})
-            run = Realization(config, 0)
+            run = Realization(config, 0, estimates_errors=False)
             while not run.finished and run.breaks < MAX_BREAKS:
                 if stop.is_set():
                     raise StoppedError("the fit was stopped")

@@ -150,6 +150,8 @@ def _root(results: RunResults) -> GroupLayout:
     totals = ["breaks", "energy_residual", "kernel_seconds"]
     if config.contact_kind.force_error_bound > 0:
         totals.append("force_error")
+    if config.contact_kind.step_work_bound > 0:
+        totals.append("slip_time_error")
     if config.has_avalanches:
         totals += ["avalanche_count", "avalanche_slip"]
     for name in totals:
@@ -289,6 +291,8 @@ def _energy(results: RunResults) -> GroupLayout:
     terms = np.array([one.energy for one in results.realizations]).T
     writer = _Form(variables.ENERGY, results.config.contact_kind.is_discrete, {})
     for name, values in zip(tables.ENERGY_COLUMNS, terms, strict=True):
+        if name == "step_work" and not results.config.contact_kind.step_work_bound > 0:
+            continue
         if name in variables.ENERGY:
             writer.add(name, ("realization",), values=values)
     return GroupLayout({}, writer.entries, {})

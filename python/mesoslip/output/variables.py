@@ -79,7 +79,10 @@ ROOT = Group(
     breaks=Meaning("1", "breaks of contacts in the run", np.int64, is_fractional=True),
     force_error=Meaning(
         "N",
-        "estimated error of the contact force: maximum jump between two steps",
+        "estimated error of the contact force, before the first slip if there is one",
+    ),
+    slip_time_error=Meaning(
+        "s", "estimated error of the time at which a slip starts, maximum over all slips"
     ),
     energy_residual=Meaning("1", "residual of the energy balance over the work of the drive"),
     kernel_seconds=Meaning("s", "computing time of the kernel"),
@@ -178,6 +181,9 @@ ENERGY = Group(
     drag_loss=Meaning("J", "energy lost to the drag of detached contacts"),
     break_loss=Meaning("J", "elastic energy lost by breaking contacts"),
     birth_gain=Meaning("J", "elastic energy of contacts at their attaching"),
+    step_work=Meaning(
+        "J", "work on the contact force in steps beyond that on the contacts: the error of steps"
+    ),
 )
 
 CURVE = Group(

@@ -16,14 +16,17 @@ class Audited(Protocol):
     @property
     def energy_residual(self) -> float: ...
     @property
+    def step_work(self) -> float: ...
+    @property
     def force_error(self) -> float: ...
 
 
 def failed_promises(config: Config, realizations: Sequence[Audited]) -> list[str]:
     """What a run should have kept and did not, with what would help; empty if all is well.
 
-    Every run promises to balance its energy: to rounding where it is exact, otherwise as well as
-    its solver or its resolution do. The master equation estimates the error of its force besides.
+    Every run promises to balance its energy: to rounding, or as well as its solver does. The
+    master equation promises besides that its steps do little work of their own, and estimates the
+    error of its force.
     """
     slider, contacts = config.slider, config.contact_kind
     remedies = "; ".join(text for text in (contacts.remedy, slider.remedy) if text)
@@ -35,6 +38,12 @@ def failed_promises(config: Config, realizations: Sequence[Audited]) -> list[str
         failed.append(
             f"the energy balance closes to {abs(residual):.1g} of the work of the drive only, and "
             f"should to {bound:.1g}{remedy}"
+        )
+    work = max((one.step_work for one in realizations), key=abs)
+    if abs(work) > contacts.step_work_bound:
+        failed.append(
+            f"the work of steps is off by {abs(work):.1g} of the work of the drive, and should be "
+            f"by {contacts.step_work_bound:.1g} at most{remedy}"
         )
     error = max(one.force_error for one in realizations) / config.contacts.static_force
     if contacts.force_error_bound > 0 and error > contacts.force_error_bound:

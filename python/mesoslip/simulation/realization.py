@@ -6,6 +6,7 @@ away and taken up again.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
+from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
 from mesoslip.simulation.tables import (
     COLUMNS,
     CONTACT_COLUMNS,
@@ -54,6 +56,8 @@ NEVER = float(np.finfo(np.float64).max)
 # Wall time of a segment, between two looks at progress and signals [s]; work of the first one.
 SEGMENT_SECONDS = 0.25
 SEGMENT_WORK = 100_000.0
+# Work of estimating the errors over that of the run and it.
+COARSE_PART = 0.25
 # No bound on the advances or the work of a segment.
 ANY_NUMBER = 2**62
 # Advances at a time on the way to a time.
@@ -110,6 +114,11 @@ class Realization:
         What to run.
     number
         Number of the realization, from 0; each has its own random numbers.
+    estimates_errors
+        Whether to repeat a run of the master equation with steps twice as long at its end, which
+        tells the errors by its steps.
+    coarsening
+        Length of steps over the configured one, where there are steps.
 
     Raises
     ------
@@ -145,12 +154,22 @@ class Realization:
     displacement
         Displacement of the slider [m].
     force_error
-        Estimated error of the contact force [N]; 0 where contacts are followed one by one.
+        Estimated error of the contact force [N], before the first slip if there is one; 0 where
+        contacts are followed one by one, NaN where it is not known yet.
+    slip_time_error
+        Estimated error of the time at which a slip starts, the greatest of all [s]; the same.
     integrator_counts
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
 
-    def __init__(self, config: Config, number: int = 0) -> None:
+    def __init__(
+        self,
+        config: Config,
+        number: int = 0,
+        *,
+        estimates_errors: bool = True,
+        coarsening: float = 1.0,
+    ) -> None:
         check_memory(config)
         self.config = config
         self.number = number
@@ -164,7 +183,18 @@ class Realization:
         self.avalanche_slip = 0.0
         self.displacement = 0.0
         self.force_error = 0.0
+        self.slip_time_error = 0.0
         self.integrator_counts = np.zeros(3, dtype=np.int64)
+        contacts = config.contact_kind
+        self._parameters = contacts.kernel_parameters(config)
+        self._coarse: Realization | None = None
+        self._lacks_errors = False
+        longer = contacts.coarse_parameters(config, coarsening)
+        self._has_steps = longer is not None
+        if longer is not None:
+            self._parameters = longer
+            self._lacks_errors = estimates_errors
+            self.force_error = self.slip_time_error = math.nan
         self._energy: Array | None = None
         self._kernel: Kernel | None = None
         self._words: Words | None = None
@@ -181,7 +211,7 @@ class Realization:
         kernel = Kernel()
         kernel.set_contacts(
             contacts.kernel_kind,
-            contacts.kernel_parameters(config),
+            self._parameters,
             config.run.seed,
             self.number,
         )
@@ -233,6 +263,9 @@ class Realization:
         """
         if self.finished:
             return
+        if self.ending:
+            self._estimate_errors(advances, work)
+            return
         start = time.perf_counter()
         try:
             kernel = self._open()
@@ -247,6 +280,27 @@ class Realization:
         self.kernel_seconds += seconds
         if advances is None and work is None:
             self._work *= min(2.0, max(0.1, SEGMENT_SECONDS / max(seconds, 1e-9)))
+
+    def _estimate_errors(self, advances: int | None, work: float | None) -> None:
+        """Go on for one segment of the run with longer steps; at its end, errors are known."""
+        if self._coarse is None:
+            self._coarse = Realization(
+                self.config, self.number, estimates_errors=False, coarsening=COARSENING
+            )
+        coarse, before = self._coarse, self._coarse.kernel_seconds
+        try:
+            coarse.advance(advances, work=work)
+            self.kernel_seconds += coarse.kernel_seconds - before
+            if not coarse.finished:
+                return
+            errors = step_errors(self.trace, self.slips, coarse.trace, coarse.slips)
+        except RunError:
+            # Steps too long to go on with tell nothing.
+            errors = StepErrors(math.inf, math.inf)
+        self.force_error, self.slip_time_error = errors
+        self._lacks_errors = False
+        coarse.close()
+        self._coarse = None
 
     def advance_to(self, time: float) -> None:
         """Go on until a time [s] has come, or the run is over.
@@ -291,7 +345,8 @@ class Realization:
             self.avalanche_count = progress.avalanches
             self.avalanche_slip = progress.avalanche_slip
             self.displacement = progress.displacement
-            self.force_error = progress.force_error
+            if not self._has_steps:
+                self.force_error = progress.force_error
             self.integrator_counts = progress.integrator_counts.copy()
             self.ending = ENDINGS[progress.ending]
             self._energy = kernel.energy() if self.ending else None
@@ -301,6 +356,9 @@ class Realization:
         if self._kernel is not None:
             self._kernel.close()
             self._kernel = None
+        if self._coarse is not None:
+            self._coarse.close()
+            self._coarse = None
 
     @property
     def is_open(self) -> bool:
@@ -309,14 +367,21 @@ class Realization:
 
     @property
     def finished(self) -> bool:
-        """Whether the run is over."""
-        return bool(self.ending)
+        """Whether the run is over, and its errors are known if they are to be estimated."""
+        return bool(self.ending) and not self._lacks_errors
 
     @property
     def part_done(self) -> float:
         """Part of the run that is done, 0 to 1."""
         if self.finished:
             return 1.0
+        part = 1.0 if self.ending else self._part_of_run()
+        if self._lacks_errors:
+            coarse = self._coarse.part_done if self._coarse is not None else 0.0
+            part = (1.0 - COARSE_PART) * part + COARSE_PART * coarse
+        return part
+
+    def _part_of_run(self) -> float:
         wanted = self.config.run.avalanches
         by_avalanches = self.avalanche_count / wanted if wanted else 0.0
         far = self.config.run.stops.displacement
@@ -335,11 +400,20 @@ class Realization:
     @property
     def energy_residual(self) -> float:
         """What the energy balance lacks, relative to the work of the drive or its largest term."""
+        return self._part_of_work(self.energy[-1])
+
+    @property
+    def step_work(self) -> float:
+        """Work on the contact force in steps beyond that on the contacts, relative to the work of
+        the drive; 0 where contacts are followed one by one."""
+        return self._part_of_work(self.energy[ENERGY_COLUMNS.index("step_work")])
+
+    def _part_of_work(self, term: float) -> float:
         contacts, energy = self.config.contacts, self.energy
         # A run in which hardly anything happens is measured by what may happen.
         unit = contacts.static_force**2 / contacts.stiffness
         scale = abs(energy[0]) or float(np.max(np.abs(energy)))
-        return float(energy[-1] / max(scale, LEAST_ENERGY * unit))
+        return float(term / max(scale, LEAST_ENERGY * unit))
 
     @property
     def contacts(self) -> dict[str, Array]:
@@ -351,7 +425,7 @@ class Realization:
         RunError
             If the run is over and the memory of the kernel was given back.
         """
-        if self.finished and self._kernel is None:
+        if self.ending and self._kernel is None:
             raise RunError(f"realization {self.number}: the run is over, and its contacts are gone")
         return dict(
             zip(CONTACT_COLUMNS, self._open().contacts(self.config.contacts.count), strict=True)
@@ -450,7 +524,7 @@ class Realization:
     def save(self) -> Saved:
         """What a checkpoint keeps of it; to be called between two segments."""
         words = None
-        if not self.finished and (self._kernel is not None or self._words is not None):
+        if not self.ending and (self._kernel is not None or self._words is not None):
             words = self._words if self._kernel is None else self._kernel.save()
         scalars = {
             "time": self.time,
@@ -463,6 +537,7 @@ class Realization:
             "avalanche_slip": self.avalanche_slip,
             "displacement": self.displacement,
             "force_error": self.force_error,
+            "slip_time_error": self.slip_time_error,
             "integrator_counts": [int(count) for count in self.integrator_counts],
             "energy": None if self._energy is None else [float(term) for term in self._energy],
             "columns": {table: rows.columns for table, rows in self._tables.items()},
@@ -478,5 +553,6 @@ class Realization:
         energy = saved.scalars["energy"]
         self._energy = None if energy is None else np.array(energy)
         self.integrator_counts = np.array(saved.scalars["integrator_counts"], dtype=np.int64)
+        self._lacks_errors = self._lacks_errors and math.isnan(self.force_error)
         self._words = saved.words
         self._tables = tables

@@ -51,6 +51,8 @@ class ContactKind(ABC):
         Maximum number of realizations that differ from each other.
     residual_bound
         Maximum residual of the energy balance, relative to the work of the drive.
+    step_work_bound
+        Maximum work of steps beyond that of the contacts, relative to the same.
     force_error_bound
         Maximum error of the contact force, relative to the static force; 0 if it is exact.
     remedy
@@ -61,6 +63,7 @@ class ContactKind(ABC):
     is_discrete: ClassVar[bool] = True
     max_realizations: ClassVar[int] = 2**31 - 1
     residual_bound: ClassVar[float] = 1e-9
+    step_work_bound: ClassVar[float] = 0.0
     force_error_bound: ClassVar[float] = 0.0
     remedy: ClassVar[str] = ""
 
@@ -82,6 +85,14 @@ class ContactKind(ABC):
     @abstractmethod
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         """Parameters of the contacts in the kernel, in SI; forces and stiffness of one contact."""
+
+    def coarse_parameters(
+        self,
+        config: Setting,  # noqa: ARG002
+        coarsening: float,  # noqa: ARG002
+    ) -> dict[str, float | str] | None:
+        """The same with longer steps; None where the numbers of a run do not depend on steps."""
+        return None
 
     @abstractmethod
     def problems(self, config: Setting) -> Complaints:

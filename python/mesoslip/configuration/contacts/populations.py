@@ -21,7 +21,8 @@ class PopulationContacts(ContactKind):
     on_lattice: ClassVar[bool] = False
     bytes_per_contact: ClassVar[int] = 0
     max_realizations: ClassVar[int] = 1
-    residual_bound: ClassVar[float] = 1e-3
+    residual_bound: ClassVar[float] = 1e-6
+    step_work_bound: ClassVar[float] = 1e-3
     force_error_bound: ClassVar[float] = 0.02
     remedy: ClassVar[str] = "a smaller run.resolution helps: the error falls with its square"
 
@@ -31,6 +32,9 @@ class PopulationContacts(ContactKind):
 
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         return common_parameters(config) | {"resolution": config.run.resolution}
+
+    def coarse_parameters(self, config: Setting, coarsening: float) -> dict[str, float | str]:
+        return self.kernel_parameters(config) | {"resolution": coarsening * config.run.resolution}
 
     def problems(self, config: Setting) -> Complaints:
         run = config.run

@@ -1,11 +1,12 @@
 !> Detached contacts of infinitely many: packets of them, in the order in which they broke.
 !>
 !> A packet is what broke within one step, evenly in time. It attaches as evenly, after the delay.
-module mesoslip_contacts_detached_packets
+module mesoslip_contacts_populations_packets
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_populations_motion, only: position_at
    use mesoslip_interface_law, only: pose_type
    implicit none
    private
@@ -22,7 +23,7 @@ module mesoslip_contacts_detached_packets
    !> A step may last so many times as long as expected
    real(wp), parameter :: patience = 1.5_wp
    !> Packets for which there is room at first
-   integer, parameter :: first_places = 64
+   integer, parameter :: initial_packets = 64
 
    !> What is expected to attach in a step.
    type :: expected_births_type
@@ -49,8 +50,8 @@ module mesoslip_contacts_detached_packets
       !> Part of the first one that is attached again
       real(wp), private :: attached_part = 0.0_wp
       !> Contacts that broke and are too few for a packet of their own: they go with the next
-      real(wp), private :: few(packet_length) = 0.0_wp
-      !> The packets, shape (packet_length, places)
+      real(wp), private :: pending(packet_length) = 0.0_wp
+      !> The packets, shape (packet_length, packets)
       real(wp), allocatable, private :: packet(:, :)
    contains
       !> Take up contacts that broke
@@ -78,7 +79,7 @@ contains
       self%delay = parameters%delay
       self%reattach = parameters%reattach
       self%negligible = negligible_part * parameters%count
-      allocate (self%packet(packet_length, first_places), source=0.0_wp)
+      allocate (self%packet(packet_length, initial_packets), source=0.0_wp)
    end subroutine new_detached_packets
 
    !> Take up contacts that broke evenly from one time to another.
@@ -93,15 +94,15 @@ contains
       call self%number%add(number)
       call self%mass%add(mass)
       if (.not. (self%reattach .and. number > 0.0_wp)) return
-      if (.not. self%few(row_number) > 0.0_wp) self%few(row_start) = start_time
-      self%few(row_end) = end_time
-      self%few(row_number) = self%few(row_number) + number
-      self%few(row_mass) = self%few(row_mass) + mass
-      if (self%few(row_number) < self%negligible) return
+      if (.not. self%pending(row_number) > 0.0_wp) self%pending(row_start) = start_time
+      self%pending(row_end) = end_time
+      self%pending(row_number) = self%pending(row_number) + number
+      self%pending(row_mass) = self%pending(row_mass) + mass
+      if (self%pending(row_number) < self%negligible) return
       if (self%last == size(self%packet, 2)) call self%make_room()
       self%last = self%last + 1
-      self%packet(:, self%last) = self%few
-      self%few = 0.0_wp
+      self%packet(:, self%last) = self%pending
+      self%pending = 0.0_wp
    end subroutine add
 
    !> Whether none waits to attach.
@@ -134,44 +135,44 @@ contains
    end subroutine make_room
 
    !> Times at which a packet attaches, from its first contact that has not yet to its last.
-   pure subroutine due_times(self, place, early, late)
+   pure subroutine due_times(self, index, early, late)
       class(detached_packets_type), intent(in) :: self
-      integer, intent(in) :: place
+      integer, intent(in) :: index
       real(wp), intent(out) :: early, late
 
-      early = self%packet(row_start, place) + self%delay
-      late = self%packet(row_end, place) + self%delay
-      if (place == self%first) early = early + self%attached_part * (late - early)
+      early = self%packet(row_start, index) + self%delay
+      late = self%packet(row_end, index) + self%delay
+      if (index == self%first) early = early + self%attached_part * (late - early)
    end subroutine due_times
 
    !> What will attach in a step, and until when it may last for it.
-   subroutine expect(self, time, duration, most, breaks, births)
+   subroutine expect(self, time, duration, max_births, breaks, births)
       !> The packets
       class(detached_packets_type), intent(in) :: self
       !> When the step starts, and how long it will last if nothing ends it [s]
       real(wp), intent(in) :: time, duration
-      !> Contacts that may attach in one step
-      real(wp), intent(in) :: most
+      !> Contacts that may attach in one step at most
+      real(wp), intent(in) :: max_births
       !> Whether contacts break in the step
       logical, intent(in) :: breaks
       !> What is expected
       type(expected_births_type), intent(out) :: births
 
       real(wp) :: early, late, until, left
-      integer :: place
+      integer :: index
 
       until = time
-      do place = self%first, self%last
-         call self%due_times(place, early, late)
+      do index = self%first, self%last
+         call self%due_times(index, early, late)
          if (early > until) then
             ! Nothing attaches for a while: the step ends where that changes.
             births%end_time = early
             if (births%number > 0.0_wp) births%end_time = until
             return
          end if
-         left = self%packet(row_number, place)
-         if (place == self%first) left = left * (1.0_wp - self%attached_part)
-         call add_even(left, self%packet(row_mass, place) / self%packet(row_number, place))
+         left = self%packet(row_number, index)
+         if (index == self%first) left = left * (1.0_wp - self%attached_part)
+         call add_even(left, self%packet(row_mass, index) / self%packet(row_number, index))
          if (births%end_time < huge(1.0_wp)) return
          if (late >= time + duration) then
             ! What is expected holds for about the time the slider is expected to take.
@@ -203,9 +204,9 @@ contains
             length = max(0.0_wp, time + duration - early)
             more = count * length / (late - early)
          end if
-         if (births%number + more > most) then
-            if (more > 0.0_wp) length = length * (most - births%number) / more
-            more = most - births%number
+         if (births%number + more > max_births) then
+            if (more > 0.0_wp) length = length * (max_births - births%number) / more
+            more = max_births - births%number
             births%end_time = max(early + length, nearest(time, 1.0_wp))
          end if
          births%number = births%number + more
@@ -256,24 +257,6 @@ contains
       if (births > 0.0_wp) call self%number%add(-births)
    end subroutine take_due
 
-   !> Where the slider was at a time of its last motion, by Hermite's interpolation [m].
-   pure function position_at(before, after, time) result(displacement)
-      type(pose_type), intent(in) :: before, after
-      real(wp), intent(in) :: time
-      real(wp) :: displacement
-
-      real(wp) :: length, t, s
-
-      length = after%time - before%time
-      displacement = after%displacement
-      if (.not. length > 0.0_wp) return
-      t = min(1.0_wp, max(0.0_wp, (time - before%time) / length))
-      s = 1.0_wp - t
-      displacement = s**2 * ((1.0_wp + 2.0_wp * t) * before%displacement &
-         & + t * length * before%velocity) &
-         & + t**2 * ((1.0_wp + 2.0_wp * s) * after%displacement - s * length * after%velocity)
-   end function position_at
-
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The packets
@@ -281,13 +264,13 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      real(wp), allocatable :: few(:)
+      real(wp), allocatable :: pending(:)
 
       call archive%section("detached packets")
       call archive%exchange("packet", self%packet)
-      few = self%few
-      call archive%exchange("few", few)
-      if (size(few) == packet_length) self%few = few
+      pending = self%pending
+      call archive%exchange("pending", pending)
+      if (size(pending) == packet_length) self%pending = pending
       call archive%exchange("first", self%first)
       call archive%exchange("last", self%last)
       call archive%exchange("attached_part", self%attached_part)
@@ -295,4 +278,4 @@ contains
       call archive%exchange("mass", self%mass)
    end subroutine exchange
 
-end module mesoslip_contacts_detached_packets
+end module mesoslip_contacts_populations_packets

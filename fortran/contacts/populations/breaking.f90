@@ -1,0 +1,365 @@
+!> What breaks of pinned populations until the slider comes to a displacement.
+!>
+!> It is tried first: the slider is offered a force by what will break. It breaks when the slider has
+!> come there.
+module mesoslip_contacts_populations_breaking
+   use mesoslip_contacts_mechanics, only: broken_threshold
+   use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
+      & column_broken, column_force, column_law, column_origin, column_weight, compliant, lost, &
+      & massive, moments_length, number, population_rows_type, stiff
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: breaking_populations_type, trial_type, tiny_gap, unresolved_part
+
+   !> Part of a population that does not break before others of it, and that does not stay behind
+   !> them: what breaks is a difference of numbers with rounding errors, which are to decide nothing
+   real(wp), parameter :: unresolved_part = 1.0e-12_wp
+   !> Populations that are looked at together for one that breaks
+   integer, parameter :: block = 8
+   !> A gap that counts as none, over the length of a step.
+   real(wp), parameter :: tiny_gap = 1.0e-6_wp
+
+   !> What breaks until a displacement and time in a direction.
+   type :: trial_type
+      !> The displacement [m], time [s] and direction
+      real(wp) :: end = 0.0_wp, time = 0.0_wp, direction = 1.0_wp
+      !> The populations of which contacts break, their forces at attaching along the direction,
+      !> the distances from there, the thresholds below which they will have broken, what the
+      !> moments will be, and twice the energy that is lost; shape (count, or more)
+      integer :: count = 0
+      integer, allocatable :: population(:)
+      real(wp), allocatable :: force(:), distance(:), broken(:), moments(:, :), lost(:)
+      !> Breaks, and their mass; work that need not be done for them [J]
+      real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp
+      !> What the contacts would sum_forces at the end [N], and how far it is [m]
+      real(wp) :: drop = 0.0_wp, reach = 0.0_wp
+      !> Where the next population breaks [m]
+      real(wp) :: next = 0.0_wp
+   end type trial_type
+
+   !> Pinned populations of which contacts break.
+   type, extends(population_rows_type) :: breaking_populations_type
+      !> Maximum displacement in which one population attaches [m]
+      real(wp) :: step = 0.0_wp
+      !> What was found to break
+      type(trial_type) :: trial
+   contains
+      !> Find what breaks until the slider comes to a displacement, whether that is known, forget it
+      procedure, non_overridable :: try
+      procedure, non_overridable :: has_tried
+      procedure, non_overridable :: forget_trial
+      !> Break what was found to break
+      procedure, non_overridable :: break_tried
+      procedure, non_overridable, private :: make_room_to_try, list_breaking, find_thresholds, &
+         & find_moments, sum_breaks, more_lost
+   end type breaking_populations_type
+
+contains
+
+   !> Find what breaks until the slider comes to a displacement.
+   subroutine try(self, before, displacement, time, direction, late, onset)
+      !> The populations
+      class(breaking_populations_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: before
+      !> Where it comes to [m] and when [s], and in which direction it goes
+      real(wp), intent(in) :: displacement, time, direction
+      !> Breaks of populations that start to break in the displacement, and where most of them do
+      !> so [m]
+      real(wp), intent(out) :: late, onset
+
+      real(wp) :: next
+      integer :: column
+
+      column = merge(column_ahead, column_behind, direction > 0.0_wp)
+      call self%make_room_to_try()
+      self%trial%end = displacement
+      self%trial%time = time
+      self%trial%direction = direction
+      self%trial%reach = abs(displacement - before%displacement)
+      call self%list_breaking(displacement, direction, column, self%trial%count, next)
+      self%trial%next = direction * next
+
+      ! Thresholds of all first, then moments, then losses: those of one do not wait for those of
+      ! another.
+      call self%find_thresholds()
+      call self%find_moments()
+      call self%sum_breaks(before, column, late, onset)
+      if (self%trial%count == 0) then
+         if (direction > 0.0_wp) self%ahead = self%trial%next
+         if (direction < 0.0_wp) self%behind = self%trial%next
+      end if
+   end subroutine try
+
+   !> Forces, distances and thresholds of what breaks.
+   subroutine find_thresholds(self)
+      class(breaking_populations_type), intent(inout) :: self
+
+      real(wp) :: distance, force, broken
+      integer :: row, one
+
+      associate (trial => self%trial)
+         do one = 1, trial%count
+            row = trial%population(one)
+            force = trial%direction * self%population(row, column_force)
+            distance = trial%direction * (trial%end - self%population(row, column_origin)) &
+               & / self%stretch
+            if (self%ages) then
+               broken = self%ageing%configured(max(0.0_wp, distance + force), &
+                  & trial%time - self%population(row, column_birth))
+            else
+               broken = broken_threshold(self%parameters%coupling, force, distance)
+            end if
+            trial%force(one) = force
+            trial%distance(one) = distance
+            trial%broken(one) = max(self%population(row, column_broken), broken)
+         end do
+      end associate
+   end subroutine find_thresholds
+
+   !> Moments of what stays pinned.
+   subroutine find_moments(self)
+      class(breaking_populations_type), intent(inout) :: self
+
+      real(wp) :: moments(moments_length)
+      integer :: row, one
+
+      associate (trial => self%trial)
+         do one = 1, trial%count
+            row = trial%population(one)
+            call self%moments(int(self%population(row, column_law)))%interpolate( &
+               & trial%broken(one), moments)
+            if (moments(number) < unresolved_part) moments = 0.0_wp
+            trial%moments(:, one) = min(self%population(row, column_weight) * moments, &
+               & self%left(:, row))
+         end do
+      end associate
+   end subroutine find_moments
+
+   !> Sums over what breaks: contacts, mass, work and force.
+   subroutine sum_breaks(self, before, column, late, onset)
+      class(breaking_populations_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: before
+      !> The column that is about the direction
+      integer, intent(in) :: column
+      !> See try
+      real(wp), intent(out) :: late, onset
+
+      real(wp) :: loss(moments_length), distance, force, most_breaks, edge, breaks, mass, work, drop
+      integer :: row, one
+
+      associate (trial => self%trial)
+         late = 0.0_wp
+         most_breaks = 0.0_wp
+         onset = trial%end
+         edge = trial%direction * before%displacement + tiny_gap * self%step
+         breaks = 0.0_wp
+         mass = 0.0_wp
+         work = 0.0_wp
+         drop = 0.0_wp
+         do one = 1, trial%count
+            row = trial%population(one)
+            force = trial%force(one)
+            distance = trial%distance(one)
+            loss = self%left(:, row) - trial%moments(:, one)
+            if (self%ages) loss(lost) = loss(lost) + loss(number) &
+               & * self%more_lost(before, row, trial%broken(one), distance + force)
+            trial%lost(one) = loss(lost)
+            breaks = breaks + loss(number)
+            mass = mass + loss(massive)
+            drop = drop + loss(stiff) * distance + loss(number) * force
+            work = work + 0.5_wp * (loss(stiff) * distance**2 &
+               & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 &
+               & - loss(lost))
+            if (trial%direction * self%population(row, column) > edge) then
+               late = late + loss(number)
+               if (loss(number) > most_breaks) then
+                  most_breaks = loss(number)
+                  onset = self%population(row, column)
+               end if
+            end if
+         end do
+         trial%breaks = breaks
+         trial%mass = mass
+         trial%work = work * self%parameters%static_force * self%stretch
+         trial%drop = drop * self%parameters%static_force
+      end associate
+   end subroutine sum_breaks
+
+   !> Energy of the contacts of a population that break, beyond that of their configured thresholds:
+   !> twice that of each of them in the mean, if the force at which they break is a line over those.
+   pure function more_lost(self, before, row, last, last_force) result(energy)
+      class(breaking_populations_type), intent(in) :: self
+      type(pose_type), intent(in) :: before
+      integer, intent(in) :: row
+      !> Threshold below which they will have broken, and the force then
+      real(wp), intent(in) :: last, last_force
+      real(wp) :: energy
+
+      real(wp) :: first, start_force, start_broken, part, first_force
+
+      energy = 0.0_wp
+      first = self%population(row, column_broken)
+      if (.not. last > first) return
+      start_force = max(0.0_wp, self%trial%direction * (self%population(row, column_force) &
+         & + (before%displacement - self%population(row, column_origin)) / self%stretch))
+      start_broken = self%ageing%configured(start_force, &
+         & before%time - self%population(row, column_birth))
+      part = 0.0_wp
+      if (start_broken < first) part = (first - start_broken) / (last - start_broken)
+      first_force = start_force + part * (last_force - start_force)
+      if (start_broken > first) first = start_broken
+      energy = ((first_force**2 - first**2) + (first_force * last_force - first * last) &
+         & + (last_force**2 - last**2)) / 3.0_wp
+   end function more_lost
+
+   !> Make room for a trial of all populations.
+   subroutine make_room_to_try(self)
+      class(breaking_populations_type), intent(inout) :: self
+
+      integer :: rows
+
+      rows = size(self%population, 1)
+      if (allocated(self%trial%population)) then
+         if (size(self%trial%population) == rows) return
+         deallocate (self%trial%population, self%trial%force, self%trial%distance, &
+            & self%trial%broken, self%trial%moments, self%trial%lost)
+      end if
+      allocate (self%trial%population(rows), self%trial%force(rows), &
+         & self%trial%distance(rows), self%trial%broken(rows))
+      allocate (self%trial%moments(moments_length, rows), self%trial%lost(rows))
+   end subroutine make_room_to_try
+
+   !> List the populations of which contacts break until the slider comes to a displacement.
+   subroutine list_breaking(self, displacement, direction, column, listed, next)
+      class(breaking_populations_type), intent(inout) :: self
+      !> Where the slider comes to [m], in which direction, and the column that is about this direction
+      real(wp), intent(in) :: displacement, direction
+      integer, intent(in) :: column
+      !> How many they are, and the coordinate along the direction where the next one breaks [m]
+      integer, intent(out) :: listed
+      real(wp), intent(out) :: next
+
+      real(wp) :: here, coordinate, nearest_of(4)
+      integer :: first, row
+      logical :: breaks
+
+      listed = 0
+      next = huge(1.0_wp)
+      here = direction * displacement
+      do first = 1, self%count, block
+         if (first + block - 1 <= self%count) then
+            ! Of most blocks no population breaks.
+            associate (position => self%population(first:first + block - 1, column))
+               nearest_of = min(direction * position(:4), direction * position(5:))
+            end associate
+            coordinate = min(min(nearest_of(1), nearest_of(2)), min(nearest_of(3), nearest_of(4)))
+            if (coordinate > here) then
+               next = min(next, coordinate)
+               cycle
+            end if
+         end if
+         ! In the others which ones do is as good as random: they are listed without a branch.
+         ! Contacts whose thresholds fall may break while the slider rests.
+         do row = first, min(first + block - 1, self%count)
+            coordinate = direction * self%population(row, column)
+            breaks = coordinate < here .or. (self%some_fall .and. .not. coordinate > here)
+            self%trial%population(listed + 1) = row
+            listed = listed + merge(1, 0, breaks)
+            next = min(next, merge(huge(1.0_wp), coordinate, breaks))
+         end do
+      end do
+   end subroutine list_breaking
+
+   !> Whether it is known what breaks until the slider is at a displacement at a time.
+   pure function has_tried(self, displacement, time)
+      !> The populations
+      class(breaking_populations_type), intent(in) :: self
+      !> The displacement [m] and the time [s], on which it depends only if thresholds do
+      real(wp), intent(in) :: displacement, time
+      !> Whether it is
+      logical :: has_tried
+
+      has_tried = self%trial%count > 0 .and. .not. abs(self%trial%end - displacement) > 0.0_wp
+      if (self%ages) has_tried = has_tried .and. .not. abs(self%trial%time - time) > 0.0_wp
+   end function has_tried
+
+   !> Forget what was found to break.
+   pure subroutine forget_trial(self)
+      !> The populations
+      class(breaking_populations_type), intent(inout) :: self
+
+      self%trial%count = 0
+      self%trial%breaks = 0.0_wp
+      self%trial%mass = 0.0_wp
+   end subroutine forget_trial
+
+   !> Break what was found to break.
+   subroutine break_tried(self, break_loss)
+      !> The populations
+      class(breaking_populations_type), intent(inout) :: self
+      !> Elastic energy lost by breaking [J]
+      type(accumulator_type), intent(inout) :: break_loss
+
+      type(accumulator_type) :: stiffness, offset, energy
+      real(wp) :: loss(moments_length), ahead, behind
+      integer :: trial, row
+
+      ! In variables of their own, which stay in registers: each break waits for the one before.
+      stiffness = self%stiffness
+      offset = self%offset
+      energy = break_loss
+      ahead = self%ahead
+      behind = self%behind
+      if (self%trial%direction > 0.0_wp) then
+         ahead = self%trial%next
+      else
+         behind = self%trial%next
+      end if
+      associate (population => self%population, parameters => self%parameters)
+         ! The last population takes the row of one that is removed: it has had its turn.
+         do trial = self%trial%count, 1, -1
+            row = self%trial%population(trial)
+            loss = self%left(:, row) - self%trial%moments(:, trial)
+            call stiffness%add(-parameters%stiffness * loss(stiff))
+            call offset%add(parameters%static_force * loss(number) &
+               & * population(row, column_force) &
+               & - parameters%stiffness * loss(stiff) * population(row, column_origin))
+            call energy%add(0.5_wp * parameters%static_force * self%stretch &
+               & * self%trial%lost(trial))
+            self%left(:, row) = self%trial%moments(:, trial)
+            population(row, column_broken) = self%trial%broken(trial)
+            if (self%left(number, row) > 0.0_wp) then
+               if (self%trial%direction > 0.0_wp) then
+                  population(row, column_ahead) = self%trial%end
+                  population(row, column_behind) = self%next_break(row, -1.0_wp, self%trial%time)
+               else
+                  population(row, column_behind) = self%trial%end
+                  population(row, column_ahead) = self%next_break(row, 1.0_wp, self%trial%time)
+               end if
+               ahead = min(ahead, population(row, column_ahead))
+               behind = max(behind, population(row, column_behind))
+            else
+               population(row, :) = population(self%count, :)
+               self%left(:, row) = self%left(:, self%count)
+               self%count = self%count - 1
+            end if
+         end do
+      end associate
+      self%stiffness = stiffness
+      self%offset = offset
+      break_loss = energy
+      self%ahead = ahead
+      self%behind = behind
+      if (self%count == 0) then
+         self%stiffness = accumulator_type()
+         self%offset = accumulator_type()
+      end if
+   end subroutine break_tried
+
+end module mesoslip_contacts_populations_breaking

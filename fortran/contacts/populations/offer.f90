@@ -1,0 +1,286 @@
+!> The steps of populations: how long they are, and the force that the slider is offered in each.
+!>
+!> A step is so short that its populations are points of a smooth density of origins, and that an
+!> inertial slider hardly changes its acceleration. In a step the contact force changes with the
+!> displacement by what breaks, and with the time by what attaches: a chord of the true force,
+!> shifted so that it does the true work. Chords of successive steps meet, so that the slider is not
+!> shaken. The steps are of second order.
+module mesoslip_contacts_populations_offer
+   use mesoslip_contacts_populations_breaking, only: tiny_gap
+   use mesoslip_contacts_populations_motion, only: distance_in, max_time, time_to_move
+   use mesoslip_contacts_populations_packets, only: expected_births_type
+   use mesoslip_contacts_populations_state, only: population_state_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: offer_step
+
+   !> Part of a step's length below which a slider creeps
+   real(wp), parameter :: creeping_part = 0.01_wp
+   !> Part of a step's length over which breaks are looked for at least
+   real(wp), parameter :: min_part = 1.0e-3_wp
+   !> A step may last so many times as long as expected
+   real(wp), parameter :: patience = 1.5_wp
+   !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates, per
+   !> radian
+   real(wp), parameter :: rate_part = 1.0_wp
+contains
+
+   !> Contact force as a law, and where it holds: until contacts break, or for a step.
+   subroutine offer_step(self, pose, law, window)
+      !> The populations
+      class(population_state_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds
+      type(window_type), intent(out) :: window
+
+      real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack
+      logical :: breaks, moves
+      type(expected_births_type) :: births
+
+      direction = pose%direction
+      if (.not. abs(pose%velocity) > 0.0_wp .and. abs(pose%acceleration) > 0.0_wp) then
+         direction = sign(1.0_wp, pose%acceleration)
+      end if
+      slack = tiny_gap * self%pinned%step
+      if (direction > 0.0_wp) then
+         breaks = self%pinned%ahead - pose%displacement <= slack
+      else
+         breaks = pose%displacement - self%pinned%behind <= slack
+      end if
+      call self%pinned%forget_trial()
+
+      span = time_to_move(pose, direction, self%pinned%step)
+      max_span = max_duration(self, pose)
+      max_births = self%max_attached
+      if (max_span >= max_time .and. .not. distance_in(pose, direction, span) > 0.0_wp) then
+         max_births = self%max_attached_at_rest
+      end if
+      self%max_fall_time = huge(1.0_wp)
+      if (self%pinned%some_fall) self%max_fall_time = time_to_fall(self, pose, span)
+      max_span = min(max_span, self%max_fall_time)
+      span = min(span, max_span)
+      call self%detached%expect(pose%time, span, max_births, &
+         & breaks .and. distance_in(pose, direction, span) > 0.0_wp, births)
+      span = min(span, births%end_time - pose%time)
+      distance = distance_in(pose, direction, span)
+      reach = max(distance, min_part * self%pinned%step)
+      limit = self%pinned%step
+      if (breaks) call look_ahead(self, pose, direction, max_births, span, distance, reach, limit, &
+         & births)
+      breaks = self%pinned%trial%count > 0
+
+      moves = breaks .or. births%number > 0.0_wp
+      window%end_time = births%end_time
+      if (moves .and. max_span < max_time) then
+         window%end_time = min(window%end_time, max(pose%time + max_span, &
+            & nearest(pose%time, huge(1.0_wp))))
+      end if
+      window%upper = max(self%pinned%ahead, pose%displacement)
+      window%lower = min(self%pinned%behind, pose%displacement)
+      if (moves) then
+         ! Contacts break in one direction and attach with a force against it: the step ends where
+         ! the slider turns round.
+         reach = min(limit, max(reach, patience * distance))
+         if (.not. distance > 0.0_wp) reach = limit
+         if (direction > 0.0_wp) then
+            reach = pose%displacement + reach
+            if (breaks) window%upper = reach
+            window%upper = min(window%upper, reach)
+            window%lower = pose%displacement
+            if (.not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
+         else
+            reach = pose%displacement - reach
+            if (breaks) window%lower = reach
+            window%lower = max(window%lower, reach)
+            window%upper = pose%displacement
+            if (.not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
+         end if
+      end if
+
+      law = self%law()
+      self%detached_count = self%detached%number%total()
+      if (moves) call add_changes(self, pose, direction, span, distance, births, law)
+      self%offered = law
+      self%offers = .true.
+   end subroutine offer_step
+
+   !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
+   subroutine look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      !> The direction in which the slider moves, and contacts that may attach in a step
+      real(wp), intent(in) :: direction, max_births
+      !> Duration of the step [s], expected displacement in it, displacement until which breaks are
+      !> found, and largest displacement of the step [m]
+      real(wp), intent(inout) :: span, distance, reach, limit
+      type(expected_births_type), intent(inout) :: births
+
+      real(wp) :: part, wanted
+
+      wanted = reach
+      call try(self, pose, direction, reach)
+      if (reach < wanted) limit = reach
+      associate (trial => self%pinned%trial)
+         if (reach < distance) call shorten(time_to_move(pose, direction, reach))
+         call find_own()
+         if (births%own > 0.0_wp .and. births%number + births%own > max_births) then
+            part = max_births / (births%number + births%own)
+            births%end_time = min(births%end_time, max(pose%time + part * span, &
+               & nearest(pose%time, huge(1.0_wp))))
+            call shorten(part * span)
+            reach = max(distance, min_part * self%pinned%step)
+            wanted = reach
+            call try(self, pose, direction, reach)
+            if (reach < wanted) limit = reach
+            call find_own()
+         end if
+      end associate
+
+   contains
+
+      !> Let the step end earlier.
+      subroutine shorten(time)
+         real(wp), intent(in) :: time
+
+         births%number = births%number * time / span
+         births%mass = births%mass * time / span
+         span = time
+         distance = distance_in(pose, direction, span)
+      end subroutine shorten
+
+      !> Find what breaks and attaches in the step.
+      subroutine find_own()
+         births%own = 0.0_wp
+         if (.not. (self%parameters%reattach .and. self%parameters%delay < span)) return
+         if (.not. distance > 0.0_wp) return
+         births%own = self%pinned%trial%breaks * distance / reach &
+            & * (1.0_wp - self%parameters%delay / span)
+         births%own_mass = 0.0_wp
+         if (births%own > 0.0_wp) births%own_mass = births%own * self%pinned%trial%mass &
+            & / self%pinned%trial%breaks
+      end subroutine find_own
+
+   end subroutine look_ahead
+
+   !> Time in which the motion does not change much [s].
+   pure function max_duration(self, pose) result(duration)
+      class(population_state_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      real(wp) :: duration
+
+      real(wp) :: rate
+
+      rate = sqrt(pose%own_rate**2 + max(0.0_wp, self%pinned%stiffness%total()) &
+         & * pose%inverse_mass) &
+         & + self%parameters%drag * max(0.0_wp, self%detached%mass%total()) * pose%inverse_mass
+      duration = huge(1.0_wp)
+      if (rate > 1.0_wp / max_time) duration = self%resolution * rate_part / rate
+   end function max_duration
+
+   !> Add to a law how the force changes by what breaks and attaches.
+   pure subroutine add_changes(self, pose, direction, span, distance, births, law)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(in) :: direction
+      !> How long the step lasts [s], and how far the slider comes in it [m]
+      real(wp), intent(in) :: span, distance
+      type(expected_births_type), intent(in) :: births
+      type(interface_law_type), intent(inout) :: law
+
+      real(wp) :: slope, rate, middle, mass, number, velocity
+
+      associate (trial => self%pinned%trial, parameters => self%parameters)
+         slope = 0.0_wp
+         rate = 0.0_wp
+         middle = 0.0_wp
+         mass = -births%mass - births%own_mass
+         number = -births%number - births%own
+         if (trial%count > 0) then
+            slope = -trial%drop / trial%reach
+            ! The true force lies between those of the start and of the end. Contacts that attached
+            ! in the step before may be due already, in no distance at all.
+            middle = 0.5_wp * trial%drop - trial%work / trial%reach
+            middle = max(-0.5_wp * abs(trial%drop), min(0.5_wp * abs(trial%drop), middle))
+            mass = mass + trial%mass * distance / trial%reach
+            number = number + trial%breaks * distance / trial%reach
+         end if
+         slope = slope + 0.5_wp * self%pinned%newborn_stiffness * (births%number + births%own)
+         middle = middle - self%pinned%newborn_stiffness * (births%number + births%own) * distance &
+            & / 8.0_wp
+         if (births%own > 0.0_wp) slope = slope + births%own * parameters%static_force &
+            & * parameters%back_force_ratio / distance
+         if (span > 0.0_wp .and. span < max_time) then
+            velocity = max(0.0_wp, direction * (pose%velocity + span * pose%acceleration))
+            rate = (births%number * parameters%static_force * parameters%back_force_ratio &
+               & + parameters%drag * mass * velocity) / span
+         end if
+         law%stiffness = law%stiffness + slope
+         law%offset = law%offset + slope * pose%displacement - direction * middle
+         law%rate = direction * rate
+         self%detached_count = max(0.0_wp, self%detached_count + 0.5_wp * number)
+      end associate
+   end subroutine add_changes
+
+   !> How long a step may last while thresholds fall, so that contacts let go in time that do so at
+   !> rest; while the slider moves its steps are short enough.
+   pure function time_to_fall(self, pose, duration) result(time)
+      class(population_state_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> Time in which the slider makes a step [s]
+      real(wp), intent(in) :: duration
+      real(wp) :: time
+
+      real(wp) :: age
+
+      time = huge(1.0_wp)
+      age = pose%time - self%pinned%last_birth
+      if (self%pinned%ageing%is_old(age)) return
+      time = self%resolution * max(self%pinned%ageing%time, age, self%parameters%delay)
+      if (duration < max_time) time = max(time, creeping_part * duration)
+      time = max(time, nearest(pose%time, huge(1.0_wp)) - pose%time)
+   end function time_to_fall
+
+   !> Find what breaks in a displacement of the slider.
+   !>
+   !> Where many populations start to break together, as they do where the slider turned before, the
+   !> force has a kink: the displacement ends there.
+   subroutine try(self, pose, direction, distance)
+      class(population_state_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> In which direction it goes
+      real(wp), intent(in) :: direction
+      !> Length of the displacement, which may become shorter [m]
+      real(wp), intent(inout) :: distance
+
+      real(wp) :: late, onset, displacement
+
+      call self%pinned%try(pose, pose%displacement + direction * distance, &
+         & expected_time(distance), direction, late, onset)
+      if (late > self%max_late) then
+         displacement = onset
+         distance = abs(displacement - pose%displacement)
+         call self%pinned%try(pose, displacement, expected_time(distance), direction, late, onset)
+      end if
+
+   contains
+
+      !> When the slider will have come so far [s].
+      pure function expected_time(distance) result(time)
+         real(wp), intent(in) :: distance
+         real(wp) :: time
+
+         time = pose%time
+         if (self%pinned%ages) time = pose%time &
+            & + min(time_to_move(pose, direction, distance), self%max_fall_time, max_time)
+      end function expected_time
+
+   end subroutine try
+
+end module mesoslip_contacts_populations_offer

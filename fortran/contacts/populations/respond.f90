@@ -1,0 +1,99 @@
+!> What populations do when the slider has moved: contacts break, and others attach.
+module mesoslip_contacts_populations_respond
+   use mesoslip_contacts_populations_motion, only: excess_of_mean
+   use mesoslip_contacts_populations_state, only: population_state_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: respond_to_motion
+
+   !> Populations whose work is that of one contact that breaks
+   real(wp), parameter :: populations_per_cost = 16.0_wp
+
+contains
+
+   !> Break and attach contacts after a motion of the slider.
+   subroutine respond_to_motion(self, before, after)
+      !> The populations
+      class(population_state_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: direction, late, onset, distance
+      logical :: reaches
+
+      if (self%offers) call add_step_work(self, before, after)
+      distance = after%displacement - before%displacement
+      direction = sign(1.0_wp, distance)
+      if (direction > 0.0_wp) then
+         reaches = after%displacement > self%pinned%ahead
+      else
+         reaches = after%displacement < self%pinned%behind
+      end if
+      if (self%pinned%some_fall .and. .not. reaches) then
+         ! Where thresholds fall contacts may break at rest.
+         if (.not. abs(distance) > 0.0_wp) direction = after%direction
+         if (direction > 0.0_wp) then
+            reaches = after%displacement >= self%pinned%ahead
+         else
+            reaches = after%displacement <= self%pinned%behind
+         end if
+      end if
+      if (reaches) then
+         if (.not. self%pinned%has_tried(after%displacement, after%time)) then
+            call self%pinned%try(before, after%displacement, after%time, direction, late, onset)
+         end if
+         call self%pinned%break_tried(self%break_loss)
+         associate (trial => self%pinned%trial)
+            self%breaks = self%breaks + trial%breaks
+            call self%step_work%add(trial%work)
+            call self%detached%add(before%time, after%time, trial%breaks, trial%mass)
+         end associate
+      end if
+      if (.not. self%detached%is_empty()) call attach_due(self, before, after)
+      if (self%pinned%ages) call self%pinned%update_thresholds(after%displacement, after%time)
+      self%detached_count = self%detached%number%total()
+      self%cost = 1.0_wp + self%pinned%count / populations_per_cost
+      self%offers = .false.
+   end subroutine respond_to_motion
+
+   !> Add the work by which the offered force differs from that of the contacts as they were.
+   subroutine add_step_work(self, before, after)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: distance, duration, middle
+      type(interface_law_type) :: law
+
+      law = self%law()
+      distance = after%displacement - before%displacement
+      duration = after%time - before%time
+      middle = before%displacement + 0.5_wp * distance
+      call self%step_work%add(distance * ((self%offered%stiffness - law%stiffness) * middle &
+         & - (self%offered%offset - law%offset)) + self%offered%rate * duration &
+         & * (0.5_wp * distance - excess_of_mean(before, after)))
+   end subroutine add_step_work
+
+   !> Attach all contacts that are due, as one population where they do on average.
+   subroutine attach_due(self, before, after)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: births, moment, when, origin, force
+
+      call self%detached%take_due(before, after, births, moment, when)
+      if (.not. births > 0.0_wp) return
+
+      call self%birth_gain%add(births * self%pinned%newborn_energy)
+      origin = moment / births
+      force = after%direction * self%parameters%back_force_ratio
+      call self%step_work%add(-births * (after%displacement - origin) &
+         & * (0.5_wp * self%pinned%newborn_stiffness * (after%displacement - origin) &
+         & + self%parameters%static_force * force))
+      call self%pinned%attach(births, moment, force, after%displacement, &
+         & min(when / births, after%time), after%time)
+   end subroutine attach_due
+
+end module mesoslip_contacts_populations_respond

@@ -1,0 +1,294 @@
+!> Rows of numbers about pinned contacts of infinitely many, each about a population.
+!>
+!> A population is what attached within one step. It is labelled by its origin, so that nothing is
+!> advected, and remembers below which threshold its contacts have broken: the maximum of the force
+!> on it, in either direction.
+!>
+!> Thresholds may change with the age of a population. What has broken of it is then given by the
+!> configured threshold of the last contact that did, as contacts of one age and force break in its
+!> order. It is found anew at the end of each step, from the force and the age.
+!>
+!> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
+module mesoslip_contacts_populations_rows
+   use mesoslip_contacts_ageing_law, only: ageing_law_type
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_mechanics, only: breaking_distance
+   use mesoslip_contacts_partial_moments, only: partial_moments_type
+   use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: population_rows_type, new_population_rows
+   public :: moments_length, number, stiff, compliant, lost, massive
+   public :: column_origin, column_force, column_weight, column_broken, column_law, column_ahead, &
+      & column_behind, column_birth
+
+   !> Moments of the thresholds of a population's pinned contacts: their number, stiffness, one over
+   !> it, twice the energy that they lose in breaking, and mass.
+   integer, parameter :: moments_length = 5
+   integer, parameter :: number = 1, stiff = 2, compliant = 3, lost = 4, massive = 5
+
+   !> Numbers kept for a population, besides its moments
+   integer, parameter :: population_length = 8
+   !> Displacement at which stretches are zero but for the force at attaching [m]
+   integer, parameter :: column_origin = 1
+   !> Force at attaching, signed
+   integer, parameter :: column_force = 2
+   !> Contacts that attached, broken or not
+   integer, parameter :: column_weight = 3
+   !> Threshold below which they have broken
+   integer, parameter :: column_broken = 4
+   !> 1 for the law of thresholds, 2 for that weighted by one over the breaking stretch
+   integer, parameter :: column_law = 5
+   !> Displacements at which contacts break, forward and backward [m]
+   integer, parameter :: column_ahead = 6, column_behind = 7
+   !> When it attached [s]
+   integer, parameter :: column_birth = 8
+
+   !> Populations for which there is room at first
+   integer, parameter :: initial_rows = 64
+
+   !> Populations of pinned contacts.
+   type :: population_rows_type
+      !> Number of populations
+      integer :: count = 0
+      !> Bounds on the displacements at which contacts break next, forward and backward [m]
+      real(wp) :: ahead = huge(1.0_wp), behind = -huge(1.0_wp)
+      !> Total stiffness [N/m] and stiffness times origin less force at attaching [N]
+      type(accumulator_type) :: stiffness, offset
+
+      !> Whether thresholds change with age, how, and whether some fall
+      logical :: ages = .false.
+      type(ageing_law_type) :: ageing
+      logical :: some_fall = .false.
+      !> Since when all contacts age that are attached [s]
+      real(wp) :: last_birth = 0.0_wp
+
+      !> What the contacts are made of
+      type(contact_parameters_type) :: parameters
+      !> Distance of a mean threshold f_s/k [m]
+      real(wp) :: stretch = 1.0_wp
+      !> Threshold at which the first contacts of a population break
+      real(wp) :: first_broken = 0.0_wp
+      !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
+      type(partial_moments_type) :: moments(2)
+      !> Populations, shape (rows, population_length), as many are in use as there are
+      real(wp), allocatable :: population(:, :)
+      !> Moments of their contacts that are left, shape (moments_length, rows)
+      real(wp), allocatable :: left(:, :)
+   contains
+      !> Add a population
+      procedure, non_overridable :: add
+      !> Displacement at which contacts of a population break next in a direction
+      procedure, non_overridable :: next_break
+      !> Find anew where populations break next, as their thresholds have changed
+      procedure, non_overridable :: update_thresholds
+      !> Sum stiffness and offset anew, and find what breaks next
+      procedure, non_overridable :: sum_forces
+      !> Move the origin of displacements
+      procedure, non_overridable :: shift_origin
+      !> Number of contacts
+      procedure, non_overridable :: number_of_contacts
+      !> Elastic energy of the contacts
+      procedure, non_overridable :: elastic_energy
+      !> Put the state into an archive or take it out
+      procedure, non_overridable :: exchange
+      procedure, non_overridable, private :: make_room
+   end type population_rows_type
+
+contains
+
+   !> Set up rows: none.
+   subroutine new_population_rows(self, parameters)
+      !> The populations
+      class(population_rows_type), intent(inout) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+
+      self%parameters = parameters
+      self%stretch = parameters%static_force / parameters%stiffness
+      allocate (self%population(initial_rows, population_length), source=0.0_wp)
+      allocate (self%left(moments_length, initial_rows), source=0.0_wp)
+   end subroutine new_population_rows
+
+   !> Add a population.
+   subroutine add(self, origin, force, weight, law, broken, displacement, birth, time)
+      class(population_rows_type), intent(inout) :: self
+      !> Where it attached [m], with what force, how many contacts, with which law
+      real(wp), intent(in) :: origin, force, weight
+      integer, intent(in) :: law
+      !> Threshold below which they have broken before
+      real(wp), intent(in) :: broken
+      !> Where the slider is [m]: what is due to break there does so when the slider moves on
+      real(wp), intent(in) :: displacement
+      !> When it attached, and when that is [s]
+      real(wp), intent(in) :: birth, time
+
+      real(wp) :: moments(moments_length)
+
+      call self%make_room()
+      self%count = self%count + 1
+      call self%moments(law)%interpolate(broken, moments)
+      associate (row => self%count, population => self%population)
+         population(row, column_origin) = origin
+         population(row, column_force) = force
+         population(row, column_weight) = weight
+         population(row, column_law) = real(law, wp)
+         population(row, column_broken) = max(broken, self%first_broken)
+         population(row, column_birth) = birth
+         self%left(:, row) = weight * moments
+         population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
+         population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
+         self%ahead = min(self%ahead, population(row, column_ahead))
+         self%behind = max(self%behind, population(row, column_behind))
+      end associate
+   end subroutine add
+
+   !> Make room for one more population.
+   subroutine make_room(self)
+      class(population_rows_type), intent(inout) :: self
+
+      real(wp), allocatable :: larger(:, :)
+
+      if (self%count < size(self%population, 1)) return
+      allocate (larger(2 * self%count, population_length), source=0.0_wp)
+      larger(:self%count, :) = self%population
+      call move_alloc(larger, self%population)
+      allocate (larger(moments_length, 2 * self%count), source=0.0_wp)
+      larger(:, :self%count) = self%left
+      call move_alloc(larger, self%left)
+   end subroutine make_room
+
+   !> Displacement at which contacts of a population break next in a direction.
+   pure function next_break(self, row, direction, time) result(displacement)
+      class(population_rows_type), intent(in) :: self
+      integer, intent(in) :: row
+      !> The direction, and when that is [s]
+      real(wp), intent(in) :: direction, time
+      real(wp) :: displacement
+
+      real(wp) :: threshold
+
+      threshold = self%population(row, column_broken)
+      if (self%ages) threshold = self%ageing%threshold(threshold, 1.0_wp, &
+         & time - self%population(row, column_birth))
+      displacement = self%population(row, column_origin) + direction * self%stretch &
+         & * breaking_distance(self%parameters%coupling, &
+         & direction * self%population(row, column_force), threshold)
+   end function next_break
+
+   !> Find anew where populations break next, as their thresholds have changed.
+   subroutine update_thresholds(self, displacement, time)
+      !> The populations
+      class(population_rows_type), intent(inout) :: self
+      !> Where the slider is [m], and when that is [s]
+      real(wp), intent(in) :: displacement, time
+
+      real(wp) :: threshold, rate
+      integer :: row
+
+      if (self%ageing%is_old(time - self%last_birth)) return
+      do row = 1, self%count
+         associate (one => self%population(row, :))
+            call self%ageing%evaluate(one(column_broken), 1.0_wp, time - one(column_birth), threshold, &
+               & rate)
+            if (.not. abs(rate) > 0.0_wp) cycle
+            self%population(row, column_ahead) = &
+               & max(displacement, self%next_break(row, 1.0_wp, time))
+            self%population(row, column_behind) = &
+               & min(displacement, self%next_break(row, -1.0_wp, time))
+         end associate
+      end do
+      self%ahead = minval(self%population(:self%count, column_ahead))
+      self%behind = maxval(self%population(:self%count, column_behind))
+   end subroutine update_thresholds
+
+   !> Sum stiffness and offset anew, and find what breaks next.
+   subroutine sum_forces(self)
+      class(population_rows_type), intent(inout) :: self
+
+      integer :: row
+
+      self%stiffness = accumulator_type()
+      self%offset = accumulator_type()
+      do row = 1, self%count
+         associate (one => self%population(row, :), left => self%left(:, row))
+            call self%stiffness%add(self%parameters%stiffness * left(stiff))
+            call self%offset%add(self%parameters%stiffness * left(stiff) * one(column_origin))
+            call self%offset%add(-self%parameters%static_force * left(number) * one(column_force))
+         end associate
+      end do
+      self%ahead = minval(self%population(:self%count, column_ahead))
+      self%behind = maxval(self%population(:self%count, column_behind))
+   end subroutine sum_forces
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift)
+      !> The populations
+      class(population_rows_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      associate (all => self%population(:self%count, :))
+         all(:, column_origin) = all(:, column_origin) - shift
+         all(:, column_ahead) = all(:, column_ahead) - shift
+         all(:, column_behind) = all(:, column_behind) - shift
+      end associate
+      call self%sum_forces()
+   end subroutine shift_origin
+
+   !> Number of contacts.
+   pure function number_of_contacts(self) result(total)
+      !> The populations
+      class(population_rows_type), intent(in) :: self
+      !> Their number, in the mean of what it may be
+      real(wp) :: total
+
+      total = sum(self%left(number, :self%count))
+   end function number_of_contacts
+
+   !> Elastic energy of the contacts.
+   pure function elastic_energy(self, displacement) result(energy)
+      !> The populations
+      class(population_rows_type), intent(in) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+      !> Energy [J]
+      real(wp) :: energy
+
+      type(accumulator_type) :: total
+      real(wp) :: distance
+      integer :: row
+
+      do row = 1, self%count
+         associate (force => self%population(row, column_force), &
+            & left => self%left(:, row))
+            distance = (displacement - self%population(row, column_origin)) / self%stretch
+            call total%add(left(stiff) * distance**2 + 2.0_wp * left(number) * force &
+               & * distance + left(compliant) * force**2)
+         end associate
+      end do
+      energy = 0.5_wp * self%parameters%static_force * self%stretch * total%total()
+   end function elastic_energy
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The populations
+      class(population_rows_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("pinned populations")
+      call archive%exchange("population", self%population)
+      call archive%exchange("left", self%left)
+      call archive%exchange("count", self%count)
+      call archive%exchange("ahead", self%ahead)
+      call archive%exchange("behind", self%behind)
+      call archive%exchange("stiffness", self%stiffness)
+      call archive%exchange("offset", self%offset)
+      call archive%exchange("last_birth", self%last_birth)
+   end subroutine exchange
+
+end module mesoslip_contacts_populations_rows

@@ -1,0 +1,48 @@
+!> What populations of contacts consist of while a slider moves: pinned ones, detached ones, and the
+!> force that the slider was offered.
+module mesoslip_contacts_populations_state
+   use mesoslip_contacts_base, only: contacts_type
+   use mesoslip_contacts_populations_packets, only: detached_packets_type
+   use mesoslip_contacts_populations_pinned, only: pinned_populations_type
+   use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: population_state_type
+
+   !> Populations of contacts, and how long their steps are.
+   type, abstract, extends(contacts_type) :: population_state_type
+      type(pinned_populations_type) :: pinned
+      type(detached_packets_type) :: detached
+
+      !> The law that was offered for the step, if one was
+      type(interface_law_type) :: offered
+      logical :: offers = .false.
+
+      !> Contacts that attach in one step at most, when the slider moves and when it rests
+      real(wp) :: max_attached = 0.0_wp, max_attached_at_rest = 0.0_wp
+      !> Breaks in one step of populations that start to break in it, at most
+      real(wp) :: max_late = 0.0_wp
+      !> Part of the time of ageing that a step may last while thresholds fall, and how long this
+      !> step may last for that [s]
+      real(wp) :: resolution = 1.0_wp, max_fall_time = huge(1.0_wp)
+   contains
+      procedure :: law
+   end type population_state_type
+
+contains
+
+   !> Contact force as a law, for a slider that does not move.
+   pure function law(self)
+      !> The populations
+      class(population_state_type), intent(in) :: self
+      !> The law
+      type(interface_law_type) :: law
+
+      law%stiffness = self%pinned%stiffness%total()
+      law%offset = self%pinned%offset%total()
+      law%drag = self%parameters%drag * self%detached%mass%total()
+   end function law
+
+end module mesoslip_contacts_populations_state

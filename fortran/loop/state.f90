@@ -20,8 +20,8 @@ module mesoslip_loop_state
    public :: energy_columns, energy_length
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
-   !> contacts; losses by damping, by drag, by breaking; gain by attaching; work of steps beyond that
-   !> of the contacts; residual
+   !> contacts; losses by damping, by drag, by breaking; gain by attaching; work of steps beyond
+   !> that of the contacts; residual
    character(len=*), parameter :: energy_columns(*) = [character(len=name_length) :: &
       & "drive_work", "slider_energy", "contact_energy", "damping_loss", "drag_loss", &
       & "break_loss", "birth_gain", "step_work", "residual"]

@@ -175,8 +175,8 @@ contains
          after%time = before%time + min(abs(distance), window%end_time - before%time, 0.05_wp)
          after%displacement = before%displacement + velocity * (after%time - before%time)
          distance = after%displacement - before%displacement
-         work = work + distance * (law%stiffness * (before%displacement + 0.5_wp * distance) - law%offset &
-            & + 0.5_wp * law%rate * (after%time - before%time))
+         work = work + distance * (law%stiffness * (before%displacement + 0.5_wp * distance) &
+            & - law%offset + 0.5_wp * law%rate * (after%time - before%time))
          call contacts%respond(before, after)
          before = after
       end do

@@ -1,7 +1,7 @@
 !> What breaks of pinned populations until the slider comes to a displacement.
 !>
-!> It is tried first: the slider is offered a force by what will break. It breaks when the slider has
-!> come there.
+!> It is tried first: the slider is offered a force by what will break. It breaks when the slider
+!> has come there.
 module mesoslip_contacts_populations_breaking
    use mesoslip_contacts_mechanics, only: broken_threshold
    use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
@@ -238,7 +238,7 @@ contains
    !> List the populations of which contacts break until the slider comes to a displacement.
    subroutine list_breaking(self, displacement, direction, column, listed, next)
       class(breaking_populations_type), intent(inout) :: self
-      !> Where the slider comes to [m], in which direction, and the column that is about this direction
+      !> Where the slider comes to [m], in which direction, and the column of this direction
       real(wp), intent(in) :: displacement, direction
       integer, intent(in) :: column
       !> How many they are, and the coordinate along the direction where the next one breaks [m]

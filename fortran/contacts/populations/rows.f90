@@ -192,8 +192,8 @@ contains
       if (self%ageing%is_old(time - self%last_birth)) return
       do row = 1, self%count
          associate (one => self%population(row, :))
-            call self%ageing%evaluate(one(column_broken), 1.0_wp, time - one(column_birth), threshold, &
-               & rate)
+            call self%ageing%evaluate(one(column_broken), 1.0_wp, time - one(column_birth), &
+               & threshold, rate)
             if (.not. abs(rate) > 0.0_wp) cycle
             self%population(row, column_ahead) = &
                & max(displacement, self%next_break(row, 1.0_wp, time))

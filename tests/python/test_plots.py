@@ -266,6 +266,24 @@ def test_the_caption_has_the_keys_that_a_run_changes(runs):
     assert "damping" not in elastic
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"start": "0.5 s"}, "start = '0.5 s': must be a number of seconds"),
+        ({"end": 10**400}, "end = .*: must be a number of seconds"),
+        ({"start": 1.0, "end": 0.5}, "1 s is not before 0.5 s"),
+        ({"realization": 0.5}, "realization = 0.5: must be a whole number"),
+        ({"snapshot": "1"}, "snapshot = '1': must be a whole number"),
+        ({"x": ["time"]}, "x = .*: unknown; choose from time"),
+        ({"figure": 3.5}, "figure = 3.5: must be a figure of matplotlib"),
+        ({"ax": "left"}, "ax = 'left': must be axes of matplotlib"),
+    ],
+)
+def test_options_of_wrong_types_are_refused(runs, options, message):
+    with pytest.raises(mesoslip.ConfigError, match=message):
+        mesoslip.plot(runs["several"], **options)
+
+
 def test_a_realization_and_a_window_are_what_is_drawn(runs):
     tree = runs["several"]
     (line,) = mesoslip.plot(tree, realization=2, start=0.5, end=0.6).axes[0].lines

@@ -47,7 +47,7 @@ class Extent:
 
     def __post_init__(self) -> None:
         found = []
-        if self.against not in {None, *HORIZONTAL}:
+        if self.against not in (None, *HORIZONTAL):
             choice = ", ".join(HORIZONTAL)
             found.append(Problem("", "x", f"unknown; choose from {choice}", self.against))
         if not self.start < self.end:

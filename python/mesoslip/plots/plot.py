@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from mesoslip.configuration.reading import PathLike, as_path
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots.animation import animate
 from mesoslip.plots.draw import draw
@@ -78,12 +79,20 @@ def plot(
     FileError
         If an output cannot be read or lacks the data of the view, or the picture cannot be written.
     ConfigError
-        If there is no such view or horizontal axis, or the view does not have one of the options.
+        If there is no such view or horizontal axis, the view does not have one of the options, or
+        an option is of a wrong type.
     """
     outputs = several(output)
     if not outputs:
         raise FileError("there is no output to draw")
-    options = Options(Extent(realization, start, end, x), snapshot)
+    extent = Extent(
+        _whole("realization", realization), _seconds("start", start), _seconds("end", end), x
+    )
+    options = Options(extent, _whole("snapshot", snapshot))
+    for key, value, method in (("figure", figure, "add_subplot"), ("ax", ax, "plot")):
+        if value is not None and not hasattr(value, method):
+            kind = "a figure" if key == "figure" else "axes"
+            raise ConfigError([Problem("", key, f"must be {kind} of matplotlib", value)])
     path = None if file is None else as_path(file)
     is_animation = path is not None and path.suffix == ".gif"
     if is_animation and (view not in {None, "lattice"} or len(outputs) > 1):
@@ -97,3 +106,35 @@ def plot(
         if path is not None:
             save(drawn, path)
     return drawn
+
+
+def _seconds(key: str, value: object) -> float:
+    """A time [s], as a number or an array of one number.
+
+    Raises
+    ------
+    ConfigError
+        If it is something else.
+    """
+    try:
+        if isinstance(value, str | bytes | bool):
+            raise TypeError
+        return float(value)  # type: ignore[arg-type]
+    except (OverflowError, TypeError, ValueError):
+        raise ConfigError([Problem("", key, "must be a number of seconds", value)]) from None
+
+
+def _whole(key: str, value: object) -> int | None:
+    """A whole number, or None.
+
+    Raises
+    ------
+    ConfigError
+        If it is something else.
+    """
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        return None if value is None else operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise ConfigError([Problem("", key, "must be a whole number", value)]) from None

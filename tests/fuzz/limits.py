@@ -193,7 +193,7 @@ def many(name: str, folder: Path) -> Report:
         table += "[sweep.grid]\n"
         table += '"run.seed" = { from = 9007199254740993, to = 9007199254750992, points = 10000 }\n'
     elif number == 1:
-        table += "realizations = 10000\n"
+        table += 'realizations = 10000\n[sweep.grid]\n"contacts.delay" = ["0.5 ms"]\n'
     else:
         short["run__realizations"] = 10000
     case = _case(folder, "" if number == 2 else table, **short)

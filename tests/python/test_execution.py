@@ -280,6 +280,15 @@ def test_a_folder_that_is_no_checkpoint_refuses_the_run(tmp_path, run_file, comm
     assert after == {name: one for name, one in before.items() if "checkpoint/" not in name}
 
 
+def test_a_link_to_itself_is_no_checkpoint(tmp_path, run_file, command):
+    """It is refused before the run, which would otherwise fail when its output is there."""
+    (tmp_path / "mine.checkpoint").symlink_to(tmp_path / "mine.checkpoint")
+    status, _, message = command("run", run_file, "-o", tmp_path / "mine.nc")
+    assert (status, message.count("\n")) == (2, 1)
+    assert "mine.checkpoint: was not made by this program" in message
+    assert not (tmp_path / "mine.nc").exists()
+
+
 def stopped_run(config, output: Path, seed: int) -> None:
     """Have a run stopped as soon as it has started."""
     from mesoslip.simulation.checkpoint import Checkpoint

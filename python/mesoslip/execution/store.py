@@ -63,8 +63,10 @@ class Folder:
             names = {one.name for one in self.path.iterdir()}
         except FileNotFoundError:
             return not self.path.is_symlink()
-        except NotADirectoryError:
-            return False
+        except OSError as error:
+            if error.errno in {errno.ENOTDIR, errno.ELOOP}:
+                return False
+            raise
         mark = self._mark()
         # An empty lock is that of a process that was killed as it made it.
         return names <= {LOCK} if mark == b"" else mark == self._own_mark
@@ -165,10 +167,10 @@ class Folder:
 
     def remove(self) -> None:
         """Remove its files, and then the folder unless others have put something there."""
-        if not self.is_own:
-            return
-        self.remove_parts()
         with suppress(OSError):
+            if not self.is_own:
+                return
+            self.remove_parts()
             # States before the rows of tables that they need.
             for one in sorted(self.path.iterdir(), key=self._removal_order):
                 if self._names.fullmatch(one.name):

@@ -101,7 +101,7 @@ program test_cvode
    call succeed(FCVodeGetDky(memory, between, 0_c_int, dense), "dense output")
    call check_close(middle(1), exact(between), 1.0e-8_wp, "displacement in between")
 
-   call check(index(sundials_version(), ".") > 1, "SUNDIALS tells its version")
+   call check(index(sundials_version(), ".") > 1, "SUNDIALS states its version")
 
    call FCVodeFree(memory)
    call succeed(FSUNNonlinSolFree(solver), "end of the solver")

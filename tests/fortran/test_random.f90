@@ -24,11 +24,11 @@ program test_random
 
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 0_i8, pair)
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8 + 2_i8**32, 0_i8, other)
-   call check(all(abs(pair - other) > 0.0_wp), "renewals beyond 2**32 are told apart")
+   call check(all(abs(pair - other) > 0.0_wp), "renewals beyond 2**32 are reported apart")
    call uniform_pair(7_i8 + 2_i8**40, 2_i8, 5_i8, 3_i8, 0_i8, other)
-   call check(all(abs(pair - other) > 0.0_wp), "seeds beyond 2**32 are told apart")
+   call check(all(abs(pair - other) > 0.0_wp), "seeds beyond 2**32 are reported apart")
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 1_i8, other)
-   call check(all(abs(pair - other) > 0.0_wp), "attempts are told apart")
+   call check(all(abs(pair - other) > 0.0_wp), "attempts are reported apart")
 
    call several_are_as_single_ones()
 

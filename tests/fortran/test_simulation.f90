@@ -329,7 +329,7 @@ contains
       call find_simulation(handle, .false., simulation, error)
       call check(.not. allocated(error) .and. associated(simulation), "a handle is found")
       call find_simulation(handle, .true., simulation, error)
-      call check(allocated(error), "a simulation without parts is told")
+      call check(allocated(error), "a simulation without parts is reported")
       stale = handle + [16_i8, 0_i8]
       call find_simulation(stale, .false., simulation, error)
       call check(allocated(error), "a handle of nothing is an error")

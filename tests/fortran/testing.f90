@@ -1,4 +1,4 @@
-!> A small frame for unit tests: checks are counted, failures are told, finish ends the program.
+!> A small frame for unit tests: checks are counted, failures are reported, finish ends the program.
 module testing
    use mesoslip_numerics_kinds, only: wp
    implicit none

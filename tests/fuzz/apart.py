@@ -259,9 +259,9 @@ class Command:
         """What it said, if it ends within a computing time [s]; None if it is still at work."""
         end = self.cpu_seconds() + work
         while self.cpu_seconds() < end:
-            told = self.wait(0.01)
-            if told is not None:
-                return told
+            printed = self.wait(0.01)
+            if printed is not None:
+                return printed
         return None
 
     def kill(self) -> None:

@@ -61,26 +61,26 @@ class Report:
     """Of which kind of run, and the part of what it may lack that its energy balance lacks."""
 
 
-def wrong_words(told: Told) -> list[str]:
+def wrong_words(printed: Told) -> list[str]:
     """What is wrong with what a command said."""
     found = []
-    if told.status not in OUTCOMES:
-        found.append(f"status: {told.status}: {told.err[-300:]}")
-    err = told.err
-    if told.cpu_after_signal is not None:
-        # An interrupt in a finalizer, of no consequence, is told by the interpreter.
+    if printed.status not in OUTCOMES:
+        found.append(f"status: {printed.status}: {printed.err[-300:]}")
+    err = printed.err
+    if printed.cpu_after_signal is not None:
+        # An interrupt in a finalizer, of no consequence, is reported by the interpreter.
         err = re.sub(r"Exception ignored in[^\n]*\nTraceback[^\n]*\n(\s.*\n|\n)*", "", err)
     for word in ("Traceback", "Warning:", "HDF5-DIAG", "Error in", "At line", "Fortran runtime"):
-        if word in err + told.out:
-            found.append(f"words: {told.err[-600:]}")
+        if word in err + printed.out:
+            found.append(f"words: {printed.err[-600:]}")
             break
-    messages = sum(line.startswith(("mesoslip: ", "Error: ")) for line in told.err.splitlines())
-    if told.status in {1, 2} and messages != 1:
-        found.append(f"message: {messages} of them: {told.err[-300:]}")
-    if told.status in {1, 2} and len(told.err) > 20_000:
-        found.append(f"message: {len(told.err)} characters")
-    if told.cpu_after_signal is not None and told.cpu_after_signal > ANSWER_SECONDS:
-        found.append(f"deaf: {told.cpu_after_signal:.1f} s of work after an interrupt")
+    messages = sum(line.startswith(("mesoslip: ", "Error: ")) for line in printed.err.splitlines())
+    if printed.status in {1, 2} and messages != 1:
+        found.append(f"message: {messages} of them: {printed.err[-300:]}")
+    if printed.status in {1, 2} and len(printed.err) > 20_000:
+        found.append(f"message: {len(printed.err)} characters")
+    if printed.cpu_after_signal is not None and printed.cpu_after_signal > ANSWER_SECONDS:
+        found.append(f"deaf: {printed.cpu_after_signal:.1f} s of work after an interrupt")
     return found
 
 
@@ -116,20 +116,20 @@ def check_configuration(material: bytes, name: str, folder: Path) -> Report:
     case, output = folder / "case.toml", folder / "out.nc"
     case.write_bytes(material)
     more = random.choice([[], ["--quiet"], ["--workers", 1], ["--checkpoint-interval", 0.02]])
-    told = call(["run", case, "-o", output, *more], folder, SECONDS)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told), material)
+    printed = call(["run", case, "-o", output, *more], folder, SECONDS)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed), material)
     problems = report.problems
     if case.read_bytes() != material:
         problems.append("input: changed by the run")
     wanted = {"case.toml"}
-    if told.status == 0:
+    if printed.status == 0:
         wanted |= {"out.nc"}
         tree, config = read(output), Config.load(case)
         problems += broken(tree, config)
         report.residual = (_kind(config), energy_residual(tree) / promised_residual(config))
-        if told.seconds < REPEATED_SECONDS:
+        if printed.seconds < REPEATED_SECONDS:
             problems += _other_segments(config, tree, random, folder.parent / "cut")
-    elif told.status == 130:
+    elif printed.status == 130:
         wanted |= {"out.partial.nc", "out.checkpoint"}
         if (folder / "out.partial.nc").exists():
             read(folder / "out.partial.nc")
@@ -139,7 +139,7 @@ def check_configuration(material: bytes, name: str, folder: Path) -> Report:
             problems += broken(read(output), Config.load(case))
     problems += [f"left over: {one}" for one in left_over(folder, wanted)]
     if report.outcome in {FINISHED, REFUSED}:
-        problems += _other_command(case, output, told.status, random, folder)
+        problems += _other_command(case, output, printed.status, random, folder)
     return report
 
 
@@ -155,11 +155,11 @@ def _other_segments(config: Config, tree: xr.DataTree, random: Random, folder: P
     whole = build_tree(run_realizations(config, executor=random.choice([1, 2])))
     problems = [f"file and memory: {one} differs" for one in differences(tree, whole)]
     advances = int(whole.attrs["advance_count"])
-    told: list[str] = []
+    printed: list[str] = []
     for _ in range(random.randint(1, MOST_CUTS)):
-        _, found = advanced(config, folder, random.randint(1, 1 + advances // 2), told)
+        _, found = advanced(config, folder, random.randint(1, 1 + advances // 2), printed)
         problems += found
-    results, found = advanced(config, folder, None, told, work=10 ** random.uniform(2.5, 5))
+    results, found = advanced(config, folder, None, printed, work=10 ** random.uniform(2.5, 5))
     problems += found
     again = build_tree(results)
     return problems + [f"resumed: {one} differs" for one in differences(whole, again)]
@@ -169,14 +169,14 @@ def advanced(
     config: Config,
     folder: Path,
     advances: int | None,
-    told: list[str],
+    printed: list[str],
     *,
     work: float | None = None,
 ) -> tuple[Results, list[str]]:
     """Go on from the checkpoint in a folder for some advances and keep another, or to the end."""
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
     problems: list[str] = []
-    with Checkpoint(folder, config, resume=True, report=told.append) as checkpoint:
+    with Checkpoint(folder, config, resume=True, report=printed.append) as checkpoint:
         checkpoint.restore(realizations)
         for one in realizations:
             while not one.finished:
@@ -212,19 +212,19 @@ def _other_command(
         commands += [["plot", output, "-o", picture], ["run", output, "-o", folder / "again.nc"]]
     # Those of little to do are many, as drawing and the theory take their time.
     command = random.choices(commands, [3 if one[0] in QUICK else 1 for one in commands])[0]
-    told = call(command, folder, SECONDS)
-    problems = [f"{command[0]}: {one}" for one in wrong_words(told)]
-    if told.status == 0 and "--json" in command:
+    printed = call(command, folder, SECONDS)
+    problems = [f"{command[0]}: {one}" for one in wrong_words(printed)]
+    if printed.status == 0 and "--json" in command:
         try:
-            json.loads(told.out, parse_constant=_no_constant)
+            json.loads(printed.out, parse_constant=_no_constant)
         except ValueError as error:
             problems.append(f"{command[0]}: not JSON: {error}")
-    if command[0] == "run" and told.status == 0:
+    if command[0] == "run" and printed.status == 0:
         found = differences(read(output), read(folder / "again.nc"))
         problems += [f"run again: {one} differs" for one in found]
-    is_refused = told.status in {1, 2} and command[0] in {"slips", "plot"}
-    if is_refused or (command[0] == "info" and told.status not in {status, 130}):
-        problems.append(f"{command[0]}: status {told.status}: {told.err[-300:]}")
+    is_refused = printed.status in {1, 2} and command[0] in {"slips", "plot"}
+    if is_refused or (command[0] == "info" and printed.status not in {status, 130}):
+        problems.append(f"{command[0]}: status {printed.status}: {printed.err[-300:]}")
     return problems
 
 
@@ -344,17 +344,17 @@ def outputs(name: str, folder: Path) -> Report:
             ["plot", path, "-o", folder / "new.png", "--view", "lattice"],
         ]
     )
-    told = call(arguments, folder, 5 * SECONDS)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
+    printed = call(arguments, folder, 5 * SECONDS)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
     problems = report.problems
     if _digest(path) != before:
         problems.append("input: changed")
     there = {value for key, value in new.items() if key in arguments}
-    if told.status == 130:
+    if printed.status == 130:
         there |= {"new.partial.nc", "new.checkpoint"}
-    if told.status in {1, 2} and there & {one.name for one in folder.iterdir()}:
+    if printed.status in {1, 2} and there & {one.name for one in folder.iterdir()}:
         problems.append("half written: an output of a command that failed")
-    if told.status == 0 and arguments[0] == "run":
+    if printed.status == 0 and arguments[0] == "run":
         problems += broken(read(folder / "new.nc"), Config.from_toml(_text_of(path)))
     problems += [f"left over: {one}" for one in left_over(folder, {path.name, *there})]
     return report
@@ -386,10 +386,10 @@ def checkpoints(name: str, folder: Path) -> Report:
             path.write_bytes(damaged(data, random))
         if not any(place.iterdir()):
             break
-    told = call(["run", case, "-o", output, "--resume"], folder, 20.0)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told), case.read_bytes())
+    printed = call(["run", case, "-o", output, "--resume"], folder, 20.0)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed), case.read_bytes())
     wanted = {"case.toml", "out.checkpoint"}
-    if told.status == 0:
+    if printed.status == 0:
         wanted = {"case.toml", "out.nc"}
         whole = build_tree(run_realizations(config))
         found = differences(read(output), whole)
@@ -418,20 +418,22 @@ def signals(name: str, folder: Path) -> Report:
     for number in sent:
         process.send(number)
         time.sleep(random.choice([0, 0.001, 0.1]))
-    told = process.wait(60.0)
-    if told is None:
+    printed = process.wait(60.0)
+    if printed is None:
         process.kill()
         return Report("other", [f"hang: 60 s after {sent}, {which}"])
     problems = []
-    if told.seconds - before > ANSWER_SECONDS:
-        problems.append(f"deaf: {told.seconds - before:.1f} s of work after {sent[0]!r}, {which}")
+    if printed.seconds - before > ANSWER_SECONDS:
+        problems.append(
+            f"deaf: {printed.seconds - before:.1f} s of work after {sent[0]!r}, {which}"
+        )
     allowed = {0} | {-number for number in sent} | {128 + number for number in sent}
-    if told.status not in allowed:
-        problems.append(f"status: {told.status} after {sent}, {which}: {told.err[-400:]}")
-    if "Traceback" in told.err:
-        problems.append(f"words: {told.err[-400:]}")
+    if printed.status not in allowed:
+        problems.append(f"status: {printed.status} after {sent}, {which}: {printed.err[-400:]}")
+    if "Traceback" in printed.err:
+        problems.append(f"words: {printed.err[-400:]}")
     wanted = {"out.checkpoint", "out.partial.nc", "out.nc"}
-    is_killed = signal.SIGKILL in sent or told.status < 0
+    is_killed = signal.SIGKILL in sent or printed.status < 0
     if is_killed:
         # Whose end nothing can tidy up after.
         wanted |= {path.name for path in folder.glob(f".{process.pid}-*")}
@@ -439,7 +441,7 @@ def signals(name: str, folder: Path) -> Report:
     expected = read(store / f"{which}.nc")
     if (folder / "out.partial.nc").exists():
         read(folder / "out.partial.nc")
-    if told.status == 0 and not output.exists():
+    if printed.status == 0 and not output.exists():
         problems.append("status: 0 without an output")
     if output.exists():
         problems += [f"half written: {one}" for one in differences(read(output), expected)]
@@ -449,7 +451,7 @@ def signals(name: str, folder: Path) -> Report:
         if again.status == 0:
             found = differences(read(output), expected)
             problems += [f"resumed: {one} differs, {which}" for one in found]
-    outcome = FINISHED if told.status == 0 else "killed" if told.status < 0 else STOPPED
+    outcome = FINISHED if printed.status == 0 else "killed" if printed.status < 0 else STOPPED
     return Report(outcome, problems)
 
 
@@ -500,21 +502,21 @@ def _on_small_disk(
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
     process = Command(arguments, folder, limit)
-    told = process.wait(60.0)
-    if told is None:
+    printed = process.wait(60.0)
+    if printed is None:
         process.kill()
         return Report("other", [f"hang: {what}"])
-    problems = [f"{what}: {one}" for one in wrong_words(told)]
-    if told.status == 0 and what == "run":
+    problems = [f"{what}: {one}" for one in wrong_words(printed)]
+    if printed.status == 0 and what == "run":
         expected = store / Path(str(arguments[1])).with_suffix(".nc").name
         problems += [f"half written: {one}" for one in differences(read(output), read(expected))]
-    elif told.status != 0 and output.exists() != is_old:
+    elif printed.status != 0 and output.exists() != is_old:
         problems.append(f"{what}: half written" if output.exists() else f"{what}: the old is gone")
-    elif told.status != 0 and is_old and output.read_bytes() != b"old":
+    elif printed.status != 0 and is_old and output.read_bytes() != b"old":
         problems.append(f"{what}: the old is overwritten")
-    wanted = {new} if told.status == 0 else {new, "new.checkpoint"}
+    wanted = {new} if printed.status == 0 else {new, "new.checkpoint"}
     problems += [f"left over: {one}, {what}" for one in left_over(folder, wanted)]
-    return Report(OUTCOMES.get(told.status, "other"), problems)
+    return Report(OUTCOMES.get(printed.status, "other"), problems)
 
 
 # Terminals.
@@ -563,30 +565,30 @@ def terminals(name: str, folder: Path) -> Report:
         shell, capture_output=True, env={**os.environ, **settings}, cwd=folder, check=False
     )
     texts = (one.decode(errors="replace") for one in (result.stdout, result.stderr))
-    told = Told(result.returncode, *texts, 0.0)
+    printed = Told(result.returncode, *texts, 0.0)
     problems = []
     where = f"{what} {streams} {settings}"
-    if told.status not in {0, 1, 2, 128 + signal.SIGPIPE}:
-        problems.append(f"status: {told.status}, {where}: {told.err[-300:]}")
-    err = told.err
-    if told.cpu_after_signal is not None:
-        # An interrupt in a finalizer, of no consequence, is told by the interpreter.
+    if printed.status not in {0, 1, 2, 128 + signal.SIGPIPE}:
+        problems.append(f"status: {printed.status}, {where}: {printed.err[-300:]}")
+    err = printed.err
+    if printed.cpu_after_signal is not None:
+        # An interrupt in a finalizer, of no consequence, is reported by the interpreter.
         err = re.sub(r"Exception ignored in[^\n]*\nTraceback[^\n]*\n(\s.*\n|\n)*", "", err)
     for word in ("Traceback", "Warning:", "Exception ignored"):
-        if word in told.err + told.out:
-            problems.append(f"words: {where}: {(told.err + told.out)[-500:]}")
+        if word in printed.err + printed.out:
+            problems.append(f"words: {where}: {(printed.err + printed.out)[-500:]}")
             break
     # Who listens no more, or has no room, is no mistake of the user.
     is_heard = "|" not in streams and "full" not in streams
-    if what == "run" and is_heard and told.status != 0:
-        problems.append(f"run: status {told.status}, {where}: {told.err[-300:]}")
-    if what == "wrong" and is_heard and told.status != 2:
-        problems.append(f"wrong: status {told.status}, {where}")
+    if what == "run" and is_heard and printed.status != 0:
+        problems.append(f"run: status {printed.status}, {where}: {printed.err[-300:]}")
+    if what == "wrong" and is_heard and printed.status != 2:
+        problems.append(f"wrong: status {printed.status}, {where}")
     if (folder / "out.nc").exists():
         problems += broken(read(folder / "out.nc"), Config.load(case))
     wanted = {case.name, "out.nc", "new.png"}
     problems += [f"left over: {one}, {where}" for one in left_over(folder, wanted)]
-    return Report(OUTCOMES.get(told.status, "other"), problems)
+    return Report(OUTCOMES.get(printed.status, "other"), problems)
 
 
 PTY = "import os, pty, sys; sys.exit(os.waitstatus_to_exitcode(pty.spawn(sys.argv[1:])))"

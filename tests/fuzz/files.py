@@ -115,10 +115,10 @@ def neighbours(name: str, folder: Path) -> Report:
     if what == "run":
         more += random.choice([[], ["--resume"], ["--checkpoint-interval", 0]])
     before = look_of(folder, others)
-    told = call([what, case, "-o", output, *more], folder, SECONDS)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
+    printed = call([what, case, "-o", output, *more], folder, SECONDS)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
     report.problems += touched(before, look_of(folder, others), {output})
-    if what == "run" and told.status in {1, 2} and output.exists():
+    if what == "run" and printed.status in {1, 2} and output.exists():
         report.problems.append("half written: an output of a command that failed")
     return report
 
@@ -214,10 +214,10 @@ def stores(name: str, folder: Path) -> Report:
             (place / name_of_other).write_bytes(b"mine")
     others = {path for path in place.iterdir() if path not in files}
     before = {name: look for name, look in look_of(folder).items() if Path(name) in others}
-    told = call(["sweep", case, "-o", output, "--quiet"], folder, 60.0)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
+    printed = call(["sweep", case, "-o", output, "--quiet"], folder, 60.0)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
     report.problems += touched(before, look_of(folder), set())
-    if told.status == 0:
+    if printed.status == 0:
         found = differences(read(output), expected)
         # A point is read from its file: a number changed there is another number.
         report.problems += [f"store: {one} differs" for one in found if "history" not in one]
@@ -281,16 +281,16 @@ def _without_room(
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
     process = Command(arguments, folder, limit_files)
-    told = process.wait(60.0)
-    if told is None:
+    printed = process.wait(60.0)
+    if printed is None:
         process.kill()
         return Report("other", [f"hang: {arguments[0]}"])
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
-    own = {output} if told.status == 0 else set()
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
+    own = {output} if printed.status == 0 else set()
     report.problems += touched(before, look_of(folder), own)
-    if told.status != 0 and output.exists() != is_old:
+    if printed.status != 0 and output.exists() != is_old:
         report.problems.append("half written")
-    if told.status != 0:
+    if printed.status != 0:
         if limit is None:
             line = ["mount", "-o", "remount,size=64m", str(output.parent)]
             subprocess.run(line, check=True)
@@ -352,15 +352,15 @@ def links(name: str, folder: Path) -> Report:
         ["report", path, "-o", folder / "new.html"],
     ]
     before = look_of(folder)
-    told = call(random.choice(commands), folder, 10.0)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
+    printed = call(random.choice(commands), folder, 10.0)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
     report.problems = [f"{what}: {one}" for one in report.problems]
     report.problems += touched(before, look_of(folder), set())
-    texts = [told.out, told.err]
+    texts = [printed.out, printed.err]
     texts += [one.read_text(errors="replace") for one in folder.glob("new.*")]
     if any(SECRET in text for text in texts):
         report.problems.append(f"{what}: another file was read")
-    if told.status == 0 and what in {"external", "storage", "fifo"}:
+    if printed.status == 0 and what in {"external", "storage", "fifo"}:
         report.problems.append(f"{what}: not refused")
     return report
 
@@ -439,10 +439,10 @@ def numbers(name: str, folder: Path) -> Report:
         case.write_text(_short(drive={"history": {"file": "table.csv"}}))
         arguments = ["run", case, "-o", output]
     before = look_of(folder)
-    told = call(arguments, folder, SECONDS)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
+    printed = call(arguments, folder, SECONDS)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
     report.problems += touched(before, look_of(folder), set())
-    if told.status == 0:
+    if printed.status == 0:
         report.problems.append(f"number: {cell!r} between {separator!r} is read in a {kind}")
     return report
 

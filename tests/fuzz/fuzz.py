@@ -68,8 +68,8 @@ def report_of(result: tuple[bool, Report | str], log: Path) -> Report:
     is_whole, report = result
     if is_whole and isinstance(report, Report):
         return report
-    told = log.read_text(errors="replace")[-1000:] if log.exists() else ""
-    return Report("other", [f"{report}\n{told}".strip()])
+    printed = log.read_text(errors="replace")[-1000:] if log.exists() else ""
+    return Report("other", [f"{report}\n{printed}".strip()])
 
 
 def smallest(material: bytes, name: str, problem: str, place: Path) -> bytes:

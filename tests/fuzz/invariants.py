@@ -10,7 +10,7 @@ import xarray as xr
 from mesoslip import Config
 from mesoslip.simulation.realization import ENDINGS
 
-# What tells when, and how long.
+# What states when, and how long.
 TIMES = {"kernel_seconds"}
 TIME_ATTRIBUTES = {"history", "date_created", "wall_seconds"}
 
@@ -54,15 +54,15 @@ def is_exact(config: Config) -> bool:
 def energy_residual(tree: xr.DataTree) -> float:
     """What the energy balance lacks, relative to its largest term.
 
-    An output tells it relative to the work of the drive, which is next to nothing where the drive
+    An output states it relative to the work of the drive, which is next to nothing where the drive
     goes back and forth.
     """
     terms = np.array([np.abs(tree["energy"][name].values) for name in tree["energy"].data_vars])
     work = np.abs(tree["energy/drive_work"].values)
-    told = np.abs(tree["energy_residual"].values)
+    printed = np.abs(tree["energy_residual"].values)
     # A balance of less than can be written down is that of nothing.
     largest = np.maximum(terms.max(axis=0), 1e-300)
-    return float(np.max(told * np.where(work > 0, work, largest) / largest))
+    return float(np.max(printed * np.where(work > 0, work, largest) / largest))
 
 
 def broken(tree: xr.DataTree, config: Config) -> Iterator[str]:

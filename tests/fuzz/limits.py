@@ -83,15 +83,17 @@ def read_only(name: str, folder: Path) -> Report:
     _take_rights(random, place)
     before = look_of(folder)
     process = Command(arguments, folder, _as_nobody)
-    told = process.wait(SECONDS)
-    if told is None:
+    printed = process.wait(SECONDS)
+    if printed is None:
         process.kill()
         return Report("other", [f"hang: {what}"])
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(whole) + wrong_words(told))
+    report = Report(
+        OUTCOMES.get(printed.status, "other"), wrong_words(whole) + wrong_words(printed)
+    )
     after = look_of(folder)
-    own = {Path(one) for one in before if "out." in one} if told.status == 0 else set()
+    own = {Path(one) for one in before if "out." in one} if printed.status == 0 else set()
     report.problems += touched(before, after, own)
-    if told.status != 0 and set(after) - set(before):
+    if printed.status != 0 and set(after) - set(before):
         report.problems.append(f"left over: {sorted(set(after) - set(before))}")
     for path in [place, *place.rglob("*")]:
         path.chmod(0o777 if path.is_dir() else 0o666)
@@ -144,12 +146,12 @@ def versions(name: str, folder: Path) -> Report:
         with (place / state).open("wb") as file:
             np.savez(file, header=np.array(json.dumps(header)), **arrays)
     before = look_of(folder)
-    told = call(["run", case, "-o", output, "--resume", "--quiet"], folder, SECONDS)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
+    printed = call(["run", case, "-o", output, "--resume", "--quiet"], folder, SECONDS)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
     report.problems += touched(before, look_of(folder), set())
-    if told.status != 2:
-        report.problems.append(f"version: {key} = {value!r} is resumed: status {told.status}")
-    if "\x1b" in told.err:
+    if printed.status != 2:
+        report.problems.append(f"version: {key} = {value!r} is resumed: status {printed.status}")
+    if "\x1b" in printed.err:
         report.problems.append("version: characters that steer the terminal")
     anew = call(["run", case, "-o", output, "--quiet"], folder, SECONDS)
     report.problems += [f"anew: {one}" for one in wrong_words(anew)]
@@ -199,15 +201,15 @@ def many(name: str, folder: Path) -> Report:
     case = _case(folder, "" if number == 2 else table, **short)
     arguments = ["run" if number == 2 else "sweep", case, "-o", output, "--quiet"]
     process = Command([*arguments, "--workers", 2], folder)
-    told = process.wait(1200.0)
-    if told is None:
+    printed = process.wait(1200.0)
+    if printed is None:
         process.kill()
         return Report("other", [f"hang: {arguments[0]}"])
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
-    if told.memory > MAX_MEMORY:
-        report.problems.append(f"memory: {told.memory / 2**20:.0f} MB")
-    if told.status != 0 or not output.exists():
-        report.problems.append(f"status: {told.status}: {told.err[-300:]}")
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
+    if printed.memory > MAX_MEMORY:
+        report.problems.append(f"memory: {printed.memory / 2**20:.0f} MB")
+    if printed.status != 0 or not output.exists():
+        report.problems.append(f"status: {printed.status}: {printed.err[-300:]}")
     else:
         data = read(output)
         count = data["energy_residual" if number == 2 else "mean_force"].size
@@ -230,10 +232,10 @@ def seeds(name: str, folder: Path) -> Report:
     tables = klein_tables(**FAST | KINDS["rigid"]) | {"sweep": sweep}
     case, output = folder / "case.toml", folder / "out.nc"
     case.write_text(tomli_w.dumps(tables))
-    told = call(["sweep", case, "-o", output, "--quiet", "--pool", "threads"], folder, SECONDS)
-    report = Report(OUTCOMES.get(told.status, "other"), wrong_words(told))
-    if told.status != 0:
-        report.problems.append(f"status: {told.status}: {told.err[-300:]}")
+    printed = call(["sweep", case, "-o", output, "--quiet", "--pool", "threads"], folder, SECONDS)
+    report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed))
+    if printed.status != 0:
+        report.problems.append(f"status: {printed.status}: {printed.err[-300:]}")
         return report
     with xr.open_dataset(output) as data:
         there = data["run.seed"].values.tolist()
@@ -246,10 +248,10 @@ def seeds(name: str, folder: Path) -> Report:
         report.problems.append(f"seeds: breaks of {wanted[one]} are those of another")
     too_long = random.choice([2**63, 2**64, -1, 10**30])
     case.write_text(tomli_w.dumps(klein_tables(**FAST | {"run__seed": 1})))
-    told = call(["run", case, "-o", folder / "no.nc", "--set", f"run.seed={too_long}"], folder)
-    report.problems += wrong_words(told)
-    if told.status != 2:
-        report.problems.append(f"seeds: {too_long} is taken: status {told.status}")
+    printed = call(["run", case, "-o", folder / "no.nc", "--set", f"run.seed={too_long}"], folder)
+    report.problems += wrong_words(printed)
+    if printed.status != 2:
+        report.problems.append(f"seeds: {too_long} is taken: status {printed.status}")
     return report
 
 

@@ -412,20 +412,20 @@ def test_bad_input_is_one_message(klein, ageing, changes, key, message):
     assert message in error.value.problems[0].message.replace('"', "'")
 
 
-def test_a_curve_is_refused_and_info_tells_of_young_and_old(klein):
+def test_a_curve_is_refused_and_info_reports_of_young_and_old(klein):
     config = klein(contacts__coupling="equal", contacts__ageing=RELAX)
     with pytest.raises(ConfigError, match=r"contacts\.ageing: has no force curve"):
         mesoslip.curve(config)
-    told = mesoslip.derived(config)
-    assert told["young_static_force"].value == pytest.approx(0.5 * STATIC)
-    assert told["young_relative_width"].value == pytest.approx(0.3)
-    assert told["ageing_velocity"].value == pytest.approx(STRETCH / 5e-3)
-    forces = [told[name].value for name in ("F_steady", "F_steady_drive", "F_steady_young")]
+    printed = mesoslip.derived(config)
+    assert printed["young_static_force"].value == pytest.approx(0.5 * STATIC)
+    assert printed["young_relative_width"].value == pytest.approx(0.3)
+    assert printed["ageing_velocity"].value == pytest.approx(STRETCH / 5e-3)
+    forces = [printed[name].value for name in ("F_steady", "F_steady_drive", "F_steady_young")]
     assert forces == sorted(forces, reverse=True)
-    told = mesoslip.derived(klein(contacts__coupling="equal", contacts__ageing=LOG))
-    assert told["growth_per_decade"].value == pytest.approx(0.05 * math.log(10))
+    printed = mesoslip.derived(klein(contacts__coupling="equal", contacts__ageing=LOG))
+    assert printed["growth_per_decade"].value == pytest.approx(0.05 * math.log(10))
     # Without an end of growing there is no limit of slow sliding.
-    assert "F_steady" not in told
+    assert "F_steady" not in printed
 
 
 def test_contacts_of_the_start_could_attach_when_they_were_young(klein):

@@ -31,9 +31,11 @@ def short(tmp_path):
 def test_functions_are_seen():
     """By dir, completion and help, though they are imported late; docstrings name what exists."""
     code = "import mesoslip, sys; assert 'numpy' not in sys.modules; print(dir(mesoslip))"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    printed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=True, text=True
+    )
     for name in ("run", "slips", "avalanche_summary", "Config", "plot"):
-        assert f"'{name}'" in told.stdout
+        assert f"'{name}'" in printed.stdout
         assert name in dir(mesoslip)
     assert "Simulate." in pydoc.render_doc(mesoslip)
     package = Path(mesoslip.__file__).parent
@@ -56,20 +58,20 @@ def test_history_is_what_was_typed(short, tmp_path, command):
 
 
 def test_statistics_are_in_the_units_of_the_table(command):
-    told = command("slips", OLD)[1]
-    assert "SI" not in told
+    printed = command("slips", OLD)[1]
+    assert "SI" not in printed
     catalogue = mesoslip.slips(OLD)
-    line = next(line for line in told.splitlines() if line.startswith("force_drop"))
+    line = next(line for line in printed.splitlines() if line.startswith("force_drop"))
     assert line.endswith("uN")
     mean = float(re.search(r"mean ([\d.e+-]+)", line).group(1))
     assert mean == pytest.approx(1e6 * catalogue["force_drop"].values.mean(), rel=1e-4)
 
 
 def test_a_configuration_is_no_output(short, command):
-    status, _, told = command("slips", short)
+    status, _, printed = command("slips", short)
     assert status == 2
-    assert "is a configuration, not an output" in told
-    assert f"mesoslip run {short}" in told
+    assert "is a configuration, not an output" in printed
+    assert f"mesoslip run {short}" in printed
 
 
 @pytest.mark.parametrize(
@@ -103,9 +105,9 @@ def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, comm
     os.mkfifo(tmp_path / "fifo")
     before = {path: path.lstat().st_mode for path in tmp_path.rglob("*")}
     held = {path: path.read_bytes() for path in tmp_path.glob("*.[nt]*")}
-    status, _, told = command(*arguments)
+    status, _, printed = command(*arguments)
     assert status == 2
-    assert told.startswith("mesoslip: ")
+    assert printed.startswith("mesoslip: ")
     assert {path: path.lstat().st_mode for path in tmp_path.rglob("*")} == before
     assert {path: path.read_bytes() for path in held} == held
     assert Path("/dev/null").is_char_device()
@@ -129,9 +131,9 @@ def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
             part.write_text("half")
             raise OSError(28, "No space left on device")
 
-    with pytest.raises(mesoslip.MesoslipError, match="no space") as told:
+    with pytest.raises(mesoslip.MesoslipError, match="no space") as printed:
         fill()
-    assert told.value.exit_status == 1
+    assert printed.value.exit_status == 1
     # netCDF says other things of a full disk.
     monkeypatch.setattr(targets.shutil, "disk_usage", lambda _: Free())
     with pytest.raises(mesoslip.MesoslipError, match="no space"), targets.written_whole(table):
@@ -167,9 +169,9 @@ def test_names_that_are_not_utf_8(short, tmp_path, command):
     strange = os.fsdecode(bytes(tmp_path) + b"/\xff.toml")
     Path(strange).write_bytes(short.read_bytes())
     assert command("run", strange, "-o", tmp_path / "out.nc")[0] == 0
-    status, _, told = command("run", strange, "-o", strange[:-5] + ".nc")
+    status, _, printed = command("run", strange, "-o", strange[:-5] + ".nc")
     assert status in {0, 2}
-    assert told.count("mesoslip: ") == (status == 2)
+    assert printed.count("mesoslip: ") == (status == 2)
     assert command("slips", strange)[0] == 2
 
 
@@ -202,7 +204,7 @@ import numpy as np
 warnings.simplefilter("ignore")
 data, path = Path(sys.argv[1]).read_bytes(), Path(sys.argv[2])
 generator = np.random.default_rng(int(sys.argv[3]))
-told = 0
+printed = 0
 for _ in range(int(sys.argv[4])):
     flipped = bytearray(data)
     flipped[generator.integers(len(data))] ^= 1 << generator.integers(8)
@@ -211,8 +213,8 @@ for _ in range(int(sys.argv[4])):
         try:
             use(path)
         except mesoslip.MesoslipError:
-            told += 1
-print(told)
+            printed += 1
+print(printed)
 """
 
 

@@ -153,10 +153,10 @@ def test_strength_of_a_bundle(bundles):
         strengths = np.array([force[owner == one].max() for one in np.unique(owner)]) / 9e-6
         error = strengths.std() / math.sqrt(len(strengths))
         assert abs(strengths.mean() - 1 - 1.255 * count ** (-2 / 3)) < 4 * error < 0.01
-        assert tree.attrs["ending"] == "no contact is left to break"
+        assert tree.attrs["ending"] == "all contacts are broken"
 
 
-def test_a_force_beyond_what_sliding_contacts_bear_is_told(command, tmp_path):
+def test_a_force_beyond_what_sliding_contacts_bear_is_reported(command, tmp_path):
     tables = bundle(1000, 1).to_dict()
     tables["contacts"]["reattach"] = True
     tables["run"] = {"duration": 40.0}
@@ -170,7 +170,7 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_told(command, tmp_path):
     # The slide without end is no avalanche; and the force curve needs no spring.
     assert mesoslip.avalanches(tree)["size"].values.max() < 1000 * 1000
     assert np.isfinite(mesoslip.curve(Config.from_dict(tables)).attrs["K_star"])
-    # So sizes do not add up to the breaks, and it is told by how many.
+    # So sizes do not add up to the breaks, and it is reported by how many.
     summary = mesoslip.avalanche_summary(tree)
     assert summary["breaks_outside"] > 1000 * 1000
     assert summary["breaks_outside"] + summary["breaks"] == tree["breaks"].item()
@@ -183,13 +183,13 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_told(command, tmp_path):
 def test_runs_end_by_avalanches_or_by_the_drive():
     by_count = mesoslip.run(sliding(200.0, 500))
     assert by_count["avalanche_count"].item() == by_count["avalanches"].sizes["avalanche"] == 500
-    assert by_count.attrs["ending"] == "as many avalanches as wanted"
+    assert by_count.attrs["ending"] == "number of avalanches reached"
     assert "breaks_outside" not in mesoslip.avalanche_summary(by_count)
     tables = sliding(200.0, 500).to_dict()
     start = by_count["drive_displacement"].values[0, 0]
     tables["run"] = {"drive_displacement": 2e-10}
     by_way = mesoslip.run(Config.from_dict(tables))
-    assert by_way.attrs["ending"] == "the drive came to its end"
+    assert by_way.attrs["ending"] == "end of the drive"
     np.testing.assert_allclose(by_way["drive_displacement"].values[0, -1] - start, 2e-10, rtol=1e-6)
     # The same run as far as both go.
     shared = min(500, by_way["avalanches"].sizes["avalanche"])

@@ -107,14 +107,14 @@ def test_what_is_otherwise_fails(outputs):
     assert judged("C14", quadratic, onsets[1]) is Verdict.FAILS
 
 
-def test_what_is_told(outputs):
+def test_what_is_reported(outputs):
     judgements = judge(["C4", "C14"], outputs)
     page = as_markdown(judgements)
     assert "2 holds with a qualification" in page
     assert "| [C4](#c4) |" in page
-    told = as_table(judgements)
-    assert json.loads(json.dumps(told))[0]["measured"][0]["standard_deviation"] < 0.1
-    assert len(told[0]["measured"][0]["values"]) == 3
+    printed = as_table(judgements)
+    assert json.loads(json.dumps(printed))[0]["measured"][0]["standard_deviation"] < 0.1
+    assert len(printed[0]["measured"][0]["values"]) == 3
     assert configuration(files.read(outputs / "claims" / "klein.nc")).contacts.count == 500
 
 

@@ -30,9 +30,9 @@ def short(tmp_path):
 
 def test_run_writes_a_cf_file(short, tmp_path, command):
     output = tmp_path / "deep" / "short.nc"
-    status, _, told = command("run", short, "-o", output, "--set", "run.realizations=2")
+    status, _, printed = command("run", short, "-o", output, "--set", "run.realizations=2")
     assert status == 0
-    assert str(output) in told
+    assert str(output) in printed
     assert [path.name for path in output.parent.iterdir()] == ["short.nc"]
     with xr.open_datatree(output) as tree:
         tree = tree.load()
@@ -156,11 +156,11 @@ def test_mistakes(arguments, words, tmp_path, command, monkeypatch):
     command("run", "short.toml", "-o", "good.nc", "--quiet")
     (tmp_path / "truncated.nc").write_bytes((tmp_path / "good.nc").read_bytes()[:20000])
     before = sorted(tmp_path.rglob("*"))
-    status, out, told = command(*arguments)
+    status, out, printed = command(*arguments)
     assert status == 2
     assert out == ""
     for word in words:
-        assert word in told
+        assert word in printed
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -188,10 +188,10 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
         if "% after" in line:
             break
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    _, printed = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "Traceback" not in told
-    assert "interrupted" in told
+    assert "Traceback" not in printed
+    assert "interrupted" in printed
     assert {path.name for path in tmp_path.iterdir()} == {"long.partial.nc", "long.checkpoint"}
     tree = mesoslip.open_output(tmp_path / "long.partial.nc")
     assert tree.attrs["complete"] == "false"
@@ -199,12 +199,12 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
     mesoslip.plot(tree, tmp_path / "partial.png")
 
 
-def test_curve_tells_the_instability(short, tmp_path, command):
+def test_curve_reports_the_instability(short, tmp_path, command):
     output = tmp_path / "curve.nc"
     changes = ("--set", "curve.density_at=[3e-9]", "--set", "curve.drive_displacement=50 nm")
-    status, told, _ = command("curve", short, "-o", output, "--json", *changes)
+    status, printed, _ = command("curve", short, "-o", output, "--json", *changes)
     assert status == 0
-    summary = json.loads(told)
+    summary = json.loads(printed)
     for name in ("K_star", "X_c", "F_peak", "F_steady", "D0", "D1", "D2", "D3", "stable", "digits"):
         assert name in summary
     tree = mesoslip.open_output(output)
@@ -215,46 +215,46 @@ def test_curve_tells_the_instability(short, tmp_path, command):
     assert tree["critical"].sizes["point"] >= 2
     assert "potential" in tree.data_vars
     assert tree["stretch_density"]["unbroken_part"].values[0] == pytest.approx(1, abs=1e-9)
-    status, told, _ = command("curve", short)
+    status, printed, _ = command("curve", short)
     assert status == 0
-    assert "K_star_estimate" in told
+    assert "K_star_estimate" in printed
     assert command("plot", output)[0] == 0
     assert output.with_suffix(".png").exists()
 
 
 def test_a_stiff_spring_has_an_answer(short, command):
-    status, told, _ = command("curve", short, "--json", "--set", "slider.stiffness=1e6")
+    status, printed, _ = command("curve", short, "--json", "--set", "slider.stiffness=1e6")
     assert status == 0
-    summary = json.loads(told)
+    summary = json.loads(printed)
     assert summary["stable"] is True
     assert summary["X_c"] is None
-    status, told, _ = command("onset", short, "--set", "slider.stiffness=1e6")
+    status, printed, _ = command("onset", short, "--set", "slider.stiffness=1e6")
     assert status == 0
-    assert "no onset" in told
+    assert "no onset" in printed
 
 
-def test_a_rough_law_is_told(short, command):
+def test_a_rough_law_is_reported(short, command):
     changes = ("contacts.threshold.law=uniform", "contacts.threshold.relative_width=0.2")
     arguments = [part for change in changes for part in ("--set", change)]
-    status, _, told = command("curve", short, *arguments)
+    status, _, printed = command("curve", short, *arguments)
     assert status == 0
-    assert "digits" in told
+    assert "digits" in printed
 
 
 def test_onset_writes_both_equations(short, tmp_path, command):
     output = tmp_path / "onset.nc"
-    status, told, _ = command("onset", short, "-o", output, "--json")
+    status, printed, _ = command("onset", short, "-o", output, "--json")
     assert status == 0
-    assert json.loads(told)["alpha"] == pytest.approx(14.2, abs=0.1)
+    assert json.loads(printed)["alpha"] == pytest.approx(14.2, abs=0.1)
     assert set(mesoslip.open_output(output).children) == {"sequential", "melting"}
     assert command("plot", output)[0] == 0
 
 
 def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
     output = tmp_path / "me.nc"
-    status, _, told = command("run", short, "-o", output, "--set", "run.engine=me")
+    status, _, printed = command("run", short, "-o", output, "--set", "run.engine=me")
     assert status == 0
-    assert "1 slip; " in told
+    assert "1 slip; " in printed
     assert command("slips", output)[0] == 0
     assert command("plot", output)[0] == 0
     detached = mesoslip.open_output(output)["detached_contacts"].values
@@ -264,9 +264,9 @@ def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
 def test_a_curve_has_no_slips(short, tmp_path, command):
     output = tmp_path / "curve.nc"
     assert command("curve", short, "-o", output)[0] == 0
-    status, _, told = command("slips", output)
+    status, _, printed = command("slips", output)
     assert status == 2
-    assert "not an output of mesoslip run" in told
+    assert "not an output of mesoslip run" in printed
 
 
 def test_json_has_no_number_that_is_not_finite(capsys):
@@ -274,8 +274,8 @@ def test_json_has_no_number_that_is_not_finite(capsys):
     from mesoslip.command_line.options import print_json
 
     print_json({"a": [1.5, math.nan, (math.inf,)], "b": {"c": -math.inf, "d": None, "e": True}})
-    told = json.loads(capsys.readouterr().out)
-    assert told == {"a": [1.5, None, [None]], "b": {"c": None, "d": None, "e": True}}
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == {"a": [1.5, None, [None]], "b": {"c": None, "d": None, "e": True}}
 
 
 def test_messages_name_what_would_be_right(short, tmp_path, command):
@@ -284,14 +284,14 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     assert "mesoslip trace" in command("slips", table)[2]
     assert command("run", short, "-o", output)[0] == 0
     assert "is an output already" in command("trace", output, "-o", tmp_path / "other.nc")[2]
-    # Whose result is lost is told.
-    told = command("run", short, "-o", output, "--set", "run.seed=7")[2]
-    assert "the output of another configuration will be replaced" in told
+    # Whose result is lost is printed.
+    printed = command("run", short, "-o", output, "--set", "run.seed=7")[2]
+    assert "the output of another configuration will be replaced" in printed
     assert "replaces" not in command("run", short, "-o", output, "--set", "run.seed=7")[2]
     for name in ("out.csv", "out.png"):
-        status, _, told = command("run", short, "-o", tmp_path / name)
+        status, _, printed = command("run", short, "-o", tmp_path / name)
         assert status == 2
-        assert "out.nc would be right" in told
+        assert "out.nc would be right" in printed
     assert "there is no sample from 70 s on" in command("plot", output, "--from", "70 s")[2]
     # Plain numbers are in SI, in options as in --set.
     assert "there is no sample from 70 s on" in command("plot", output, "--from", "70")[2]
@@ -299,31 +299,31 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     assert "no contact broke" in command("run", short, *still)[2]
     lost = tmp_path / "lost.toml"
     lost.write_text('base = "nothing.toml"\n')
-    status, _, told = command("info", lost)
+    status, _, printed = command("info", lost)
     assert status == 2
-    assert "lost.toml: base = 'nothing.toml': there is no such file;" in told
+    assert "lost.toml: base = 'nothing.toml': there is no such file;" in printed
     lost.write_text("[slider]\nstiffness = 97 N/m\n")
     assert 'quotes, as in "97 N/m"' in command("info", lost)[2]
     assert "mesoslip example lists them" in command("example", "mine")[2]
     assert "Usage" in command("run", "-h")[1]
 
 
-def test_a_drive_that_the_run_cuts_is_told(short, tmp_path, command):
+def test_a_drive_that_the_run_cuts_is_reported(short, tmp_path, command):
     stages = tmp_path / "stages.toml"
     stage = '[[drive.stage]]\nvelocity = "1 um/s"\nduration = "1 s"\n'
     stages.write_text(f'base = "{short}"\n{3 * stage}[drive]\nrepeat = 2\n')
     cut = ("--set", "run.duration=2.5 s")
-    told = "run.duration ends the run after 2.5 s of a drive of 6 s, in stage 3 of 6"
-    assert told in command("info", stages, *cut)[1]
-    assert f"warning: {told}" in command("run", stages, *cut, "-o", tmp_path / "cut.nc")[2]
+    printed = "run.duration ends the run after 2.5 s of a drive of 6 s, in stage 3 of 6"
+    assert printed in command("info", stages, *cut)[1]
+    assert f"warning: {printed}" in command("run", stages, *cut, "-o", tmp_path / "cut.nc")[2]
     assert "ends the run" not in command("info", stages, "--set", "run.duration=6 s")[1]
 
 
 def test_whole_numbers_may_have_an_exponent(short, command):
-    status, told, _ = command("info", short, "--set", "contacts.count=1e3", "--json")
+    status, printed, _ = command("info", short, "--set", "contacts.count=1e3", "--json")
     assert status == 0
     other = command("info", short, "--set", "contacts.count=1000", "--json")[1]
-    assert told == other
+    assert printed == other
     assert "integer" in command("info", short, "--set", "contacts.count=1.5e0")[2]
 
 

@@ -49,7 +49,7 @@ def test_a_base_that_cannot_be_run_by_itself_is_none(tmp_path):
     assert mesoslip.Config.load(tmp_path / "whole.toml").base is None
 
 
-def test_an_output_tells_what_its_run_changes(tmp_path, command):
+def test_an_output_reports_what_its_run_changes(tmp_path, command):
     config = mesoslip.Config.load(KLEIN, ["run.duration=1 ms", "output.interval=1 ms"])
     tree = mesoslip.run(config)
     assert mesoslip.Config.from_toml(tree.attrs["base_configuration"]) == config.base
@@ -86,7 +86,7 @@ def test_labels_name_what_differs(klein):
     ]
 
 
-def test_stages_are_told(klein):
+def test_stages_are_reported(klein):
     stages = [{"duration": 4, "velocity": 1e-7}, {"duration": 1, "velocity": 0}]
     turned = klein(drive={"stage": stages})
     assert differences.changes(turned, klein()) == ["drive.stage = [(4 s, 100 nm/s), (1 s, 0 m/s)]"]

@@ -223,7 +223,7 @@ def test_sentences_that_a_page_quotes_are_printed(command):
 
 
 def check_targets(targets):
-    """Whether make knows what a page tells it to make."""
+    """Whether make knows what a page states it to make."""
     known = (ROOT / "Makefile").read_text() + (ROOT / "runs" / "campaign.mk").read_text()
     for target in targets:
         if not target.startswith(("-", "out/")) and "=" not in target:
@@ -288,7 +288,7 @@ def test_the_fortran_reference_has_what_modules_make_public():
             continue
         for name in module.public:
             entity = module.entities.get(name)
-            # What other modules define is told there.
+            # What other modules define is reported there.
             if entity is not None:
                 assert f"**{name}**" in page
                 assert entity.comment, f"{module.file}: {name}"

@@ -338,10 +338,10 @@ def stage(**keys):
         ({"history": {"file": "nowhere.csv"}}, ["nowhere.csv: no such file"]),
     ],
 )
-def test_what_is_wrong_with_a_drive_is_told(drive, words):
-    with pytest.raises(ConfigError) as told:
+def test_what_is_wrong_with_a_drive_is_reported(drive, words):
+    with pytest.raises(ConfigError) as printed:
         Config.from_dict(klein_tables(drive=drive))
-    (problem,) = told.value.problems
+    (problem,) = printed.value.problems
     for word in words:
         assert word in str(problem)
 
@@ -376,16 +376,16 @@ HEADER = "time [s],displacement [um]\n"
         ("\ufefftime [ms],displacement [nm]\n0,0\n1,1\n\n", None),
     ],
 )
-def test_what_is_wrong_with_a_history_is_told(tmp_path, text, words):
+def test_what_is_wrong_with_a_history_is_reported(tmp_path, text, words):
     path = tmp_path / "moved.csv"
     path.write_text(text, encoding="utf-8")
     tables = klein_tables(drive={"history": {"file": str(path)}})
     if words is None:
         assert len(Config.from_dict(tables).drive.history.time) == 2
         return
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as printed:
         Config.from_dict(tables)
-    (problem,) = told.value.problems
+    (problem,) = printed.value.problems
     assert str(path) in str(problem)
     assert words in str(problem)
 
@@ -410,7 +410,7 @@ FAR += ["prescribed, me", "layered", "layered, adams", "layered, me"]
 def test_a_run_ends_at_a_displacement_to_the_bit(kind, way):
     """For the first time, and until then it is the run that goes on."""
     tree = mesoslip.run(configuration(kind, run__stop={"displacement": way}))
-    assert tree.attrs["ending"] == "the slider came to its displacement"
+    assert tree.attrs["ending"] == "displacement of the slider reached"
     assert stages_of(tree)["end_displacement"].values[-1] == way
     assert np.all(tree["displacement"].values < way)
     whole = mesoslip.run(configuration(kind))
@@ -446,7 +446,7 @@ def test_a_run_ends_at_a_displacement_backwards(name, distance):
     config = configuration("rigid", **BACKWARDS[name], run__stop={"displacement": -distance})
     tree = mesoslip.run(config)
     stages = stages_of(tree)
-    assert tree.attrs["ending"] == "the slider came to its displacement"
+    assert tree.attrs["ending"] == "displacement of the slider reached"
     assert stages["end_displacement"].values[-1] == -distance
     assert stages["stage_number"].values.tolist() == list(range(stages.sizes["stage"]))
     assert np.all(tree["displacement"].values > -distance)
@@ -459,7 +459,7 @@ def test_a_run_ends_at_a_displacement_backwards(name, distance):
 
 def test_without_inertia_a_run_ends_where_it_comes_to_rest():
     tree = mesoslip.run(configuration("quasistatic", run__stop={"displacement": 1e-7}))
-    assert tree.attrs["ending"] == "the slider came to its displacement"
+    assert tree.attrs["ending"] == "displacement of the slider reached"
     assert 1e-7 <= tree["end_displacement"].values[0] < 1.3e-7
 
 
@@ -476,7 +476,7 @@ def test_a_run_ends_with_a_slip(count):
     tables = SLOW | {"run": {"duration": 4.0, "stop": {"slips": count}}}
     tree = mesoslip.run(configuration("rigid", **tables))
     whole = mesoslip.run(configuration("rigid", **SLOW | {"run": {"duration": 4.0}}))
-    assert tree.attrs["ending"] == "as many slips as wanted"
+    assert tree.attrs["ending"] == "number of slips reached"
     slips, all_slips = (
         tree["slips"].to_dataset(inherit=False),
         whole["slips"].to_dataset(inherit=False),
@@ -500,7 +500,7 @@ def test_a_run_ends_in_a_steady_state(kind):
     tree = mesoslip.run(
         configuration(kind, drive={"velocity": speed}, run=run | {"stop": {"steady": steady}})
     )
-    assert tree.attrs["ending"] == "the state is steady"
+    assert tree.attrs["ending"] == "steady state reached"
     end = stages_of(tree)["stage_end_time"].values[-1]
     number = round(end * speed / way)
     assert end == pytest.approx(number * way / speed, rel=1e-12)
@@ -526,7 +526,7 @@ def test_a_loading_spring_is_not_steady():
             run={"duration": 1.0, "stop": {"steady": steady}},
             contacts__static_force=1e-3,
         )
-        assert mesoslip.run(config).attrs["ending"] == "the drive came to its end"
+        assert mesoslip.run(config).attrs["ending"] == "end of the drive"
 
 
 @pytest.mark.parametrize(
@@ -544,11 +544,11 @@ def test_a_loading_spring_is_not_steady():
         ({"run__stop": {"steady": {"blocks": 1}}}, ["run.stop.steady.blocks"]),
     ],
 )
-def test_what_is_wrong_with_an_end_is_told(changes, words):
-    with pytest.raises(ConfigError) as told:
+def test_what_is_wrong_with_an_end_is_reported(changes, words):
+    with pytest.raises(ConfigError) as printed:
         Config.from_dict(klein_tables(**changes))
     for word in words:
-        assert word in str(told.value)
+        assert word in str(printed.value)
 
 
 def test_info_knows_ramps_and_holds(klein):

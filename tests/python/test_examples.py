@@ -1,4 +1,4 @@
-"""What comes with the program: its runs in the wheel, and what is told if a library is missing."""
+"""What comes with the program: its runs in the wheel, and what a missing library reports."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_a_base_elsewhere_comes_to_stand_beside_the_example(tmp_path, monkeypatc
     assert 'base = "klein.toml"' in written[0].read_text()
 
 
-def test_a_missing_library_is_told_in_a_line(monkeypatch, command):
+def test_a_missing_library_is_reported_in_a_line(monkeypatch, command):
     def broken():
         raise ImportError("libsundials_cvode.so.6: cannot open shared object file")
 

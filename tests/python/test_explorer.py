@@ -346,7 +346,7 @@ def test_a_picture_waits_for_the_one_before_it():
 
 
 def test_theory_is_computed_once():
-    """Also of configurations that it cannot tell apart; the curve alone comes first."""
+    """Also of configurations that it cannot distinguish; the curve alone comes first."""
     theories, config = Theories(), Config.load(KLEIN)
     assert theories.known(config) is None
     first, last = theories.compute(config)

@@ -300,7 +300,7 @@ def test_the_truth_lies_in_the_posterior(small_fit):
     assert posterior.attrs["simulation_count"] == 300
 
 
-def test_a_report_tells_the_parameters(small_fit, tmp_path):
+def test_a_report_reports_the_parameters(small_fit, tmp_path):
     _, posterior, _ = small_fit
     mesoslip.report(posterior, tmp_path / "fit.html")
     page = (tmp_path / "fit.html").read_text()
@@ -351,7 +351,7 @@ def test_another_mass_is_no_part_of_the_model():
     assert "no parameters in the ranges describe the trace" in posterior.attrs["warnings"]
 
 
-def test_what_predictions_never_have_is_told():
+def test_what_predictions_never_have_is_reported():
     rng = np.random.default_rng(1)
 
     def drawn(count):
@@ -379,7 +379,7 @@ def test_what_predictions_never_have_is_told():
     assert "hardly any prediction" in str(extra.worst[0])
 
 
-def test_warnings_tell_what_is_not_determined():
+def test_warnings_report_what_is_not_determined():
     prior = Prior(
         (
             FreeParameter("a", 0, 1),
@@ -400,12 +400,12 @@ def test_warnings_tell_what_is_not_determined():
         axis=1,
     )
     fine = checks.Agreement(0.5, np.zeros(1), ())
-    told = "\n".join(checks.warnings(prior, draws, fine, np.ones(4)))
-    assert "c is not determined" in told
-    assert "a and b are only determined together (correlation +" in told
-    assert "d lies at the end of its range: widen fit.free.d.to" in told
-    assert "a is not" not in told
-    assert "describe the trace" not in told
+    printed = "\n".join(checks.warnings(prior, draws, fine, np.ones(4)))
+    assert "c is not determined" in printed
+    assert "a and b are only determined together (correlation +" in printed
+    assert "d lies at the end of its range: widen fit.free.d.to" in printed
+    assert "a is not" not in printed
+    assert "describe the trace" not in printed
 
 
 def test_the_command_fits_and_draws(tmp_path, command):
@@ -419,18 +419,18 @@ def test_the_command_fits_and_draws(tmp_path, command):
 
     config.write_text(tomli_w.dumps(fit_tables()))
     posterior = tmp_path / "posterior.nc"
-    status, told, _ = command("fit", output, config, "-o", posterior, "--quiet")
+    status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet")
     assert status == 0
-    assert "contacts.static_force" in told
-    assert "µN" in told
+    assert "contacts.static_force" in printed
+    assert "µN" in printed
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
         ["trace.csv", "trace.nc", "fit.toml", "posterior.nc"]
     )
     picture = tmp_path / "posterior.png"
     assert command("plot", posterior, "-o", picture)[0] == 0
     assert picture.stat().st_size > 20_000
-    status, told, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
-    row = json.loads(told)["parameters"]["contacts.delay"]
+    status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
+    row = json.loads(printed)["parameters"]["contacts.delay"]
     assert row["interval_90"][0] < row["median"] < row["interval_90"][1]
 
 
@@ -458,7 +458,7 @@ def test_the_command_fits_and_draws(tmp_path, command):
         ({"smulations": 1000}, "did you mean 'simulations'"),
     ],
 )
-def test_what_is_wrong_with_a_fit_is_told(change, said):
+def test_what_is_wrong_with_a_fit_is_reported(change, said):
     tables = fit_tables(**change)
     with pytest.raises(ConfigError, match=said.replace("(", r"\(")):
         Plan.from_dict(tables)
@@ -471,9 +471,9 @@ def test_a_fit_needs_a_table_and_a_trace(tmp_path, command):
     plan = Plan.from_dict(fit_tables(after="3.99 s"))
     with pytest.raises(FileError, match=r"after 3\.99 s; a fit needs at least"):
         prepare(tree, plan)
-    status, _, told = command("fit", tmp_path / "none.nc", tmp_path / "none.toml")
+    status, _, printed = command("fit", tmp_path / "none.nc", tmp_path / "none.toml")
     assert status == 2
-    assert "no such file" in told
+    assert "no such file" in printed
 
 
 def test_a_configuration_that_contradicts_the_trace_is_refused():
@@ -533,7 +533,7 @@ def test_a_trace_without_noise_is_given_some():
     assert np.std(force - tree["spring_force"].values[0]) == pytest.approx(simulator.noise, rel=0.1)
 
 
-def test_without_emcee_it_is_told_before_anything_is_simulated(monkeypatch):
+def test_without_emcee_it_is_reported_before_anything_is_simulated(monkeypatch):
     monkeypatch.setattr("mesoslip.inference.sampler.find_spec", lambda _: None)
     with pytest.raises(mesoslip.RunError, match="needs the package emcee"):
         mesoslip.fit(experiment(), fit_tables())

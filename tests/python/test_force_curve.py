@@ -258,7 +258,7 @@ def test_a_fibre_bundle_breaks_once(klein):
     assert curve.force(5 * STRETCH) == pytest.approx(0, abs=1e-15)
 
 
-def test_a_rough_law_tells_its_digits(klein):
+def test_a_rough_law_reports_its_digits(klein):
     """A uniform law has kinks in its force: fewer digits, and as many as it says."""
     curve = ForceCurve(klein(**dispersion(0.2, "uniform")))
     assert 5 <= curve.digits <= 9

@@ -75,10 +75,10 @@ def test_an_output_refers_to_nothing_outside_of_it(output, tmp_path, attack, com
     with pytest.raises(mesoslip.FileError, match=r"secret|slips/"):
         mesoslip.open_output(output)
     for arguments in (["slips", output], ["run", output, "-o", tmp_path / "again.nc"]):
-        status, _, told = command(*arguments)
+        status, _, printed = command(*arguments)
         assert status == 2
-        assert "damaged" not in told
-        assert told.count("\n") == 1
+        assert "damaged" not in printed
+        assert printed.count("\n") == 1
 
 
 def test_a_configuration_of_an_output_reads_no_file(output, tmp_path, command):
@@ -90,11 +90,11 @@ def test_a_configuration_of_an_output_reads_no_file(output, tmp_path, command):
         with netCDF4.Dataset(output, "r+") as file:
             text = mesoslip.Config.load(ROOT / "runs" / "klein.toml").to_toml()
             file.setncattr(name, text.replace("[drive]\n", f"{history}[drive]\n", 1))
-        status, shown, told = command("run", output, "-o", tmp_path / "again.nc")
+        status, shown, printed = command("run", output, "-o", tmp_path / "again.nc")
         assert status == 2
-        assert "drive.history.file" in told
-        assert "is not read from an output" in told
-        assert "password" not in shown + told
+        assert "drive.history.file" in printed
+        assert "is not read from an output" in printed
+        assert "password" not in shown + printed
     # Who repeats a run may give a file.
     table = tmp_path / "history.csv"
     table.write_text("time [s],displacement [um]\n0,0\n20,2\n")

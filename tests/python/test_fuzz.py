@@ -44,7 +44,7 @@ def test_cases_are_made_again_from_their_names():
 
 
 @pytest.mark.parametrize(
-    ("where", "name", "value", "told"),
+    ("where", "name", "value", "printed"),
     [
         ("/", "spring_force", np.nan, "finite"),
         ("/", "velocity", np.inf, "finite"),
@@ -56,12 +56,12 @@ def test_cases_are_made_again_from_their_names():
         ("slips", "realization_index", 5, "slips: of no realization"),
     ],
 )
-def test_what_is_broken_is_seen(where, name, value, told):
+def test_what_is_broken_is_seen(where, name, value, printed):
     config = configuration("rigid", drive={"velocity": 1e-5}, run__duration=0.1)
     tree = mesoslip.run(config)
     assert list(broken(tree, config)) == []
     tree[where][name].values[..., -1] = value
-    assert any(one.startswith(told) for one in broken(tree, config))
+    assert any(one.startswith(printed) for one in broken(tree, config))
 
 
 def test_avalanches_that_do_not_add_up_are_seen():
@@ -126,11 +126,11 @@ def test_signals_while_the_output_is_written(number, times, folder):
     for _ in range(times):
         process.send(number)
         time.sleep(0.01)
-    told = process.wait(60.0)
-    assert told is not None
-    assert "Traceback" not in told.err
+    printed = process.wait(60.0)
+    assert printed is not None
+    assert "Traceback" not in printed.err
     # Those that come after all is written end the program as they end any.
-    assert told.status in {0, 128 + number, -number}
+    assert printed.status in {0, 128 + number, -number}
     assert left_over(folder, {"case.toml", "out.nc"}) == []
     with xr.open_datatree(folder / "out.nc") as tree:
         assert np.isfinite(tree.load()["spring_force"].values).all()
@@ -145,11 +145,11 @@ def test_ctrl_c_before_the_first_event(times, folder):
         before = wait_for_work(process, seconds)
         for _ in range(times):
             process.send(signal.SIGINT)
-        told = process.wait(60.0)
-        assert told is not None
-        assert told.status == 130
-        assert "Traceback" not in told.err
-        assert told.seconds - before < ANSWER_SECONDS
+        printed = process.wait(60.0)
+        assert printed is not None
+        assert printed.status == 130
+        assert "Traceback" not in printed.err
+        assert printed.seconds - before < ANSWER_SECONDS
         # A checkpoint is kept until a run of the output is complete.
         kept = {"case.toml", "out.partial.nc", "out.checkpoint", "out.checkpoint.old"}
         kept |= {f"out.checkpoint.old{number}" for number in (2, 3)}
@@ -194,10 +194,10 @@ def test_runs_answer(kind, seconds, folder):
     process = Command(["run", long_run(folder, **SLOW[kind]), "-o", "out.nc"], folder)
     before = wait_for_work(process, seconds)
     process.send(signal.SIGINT)
-    told = process.wait(60.0)
-    assert told is not None
-    assert told.status in {130, 0}
-    assert told.seconds - before < ANSWER_SECONDS
+    printed = process.wait(60.0)
+    assert printed is not None
+    assert printed.status in {130, 0}
+    assert printed.seconds - before < ANSWER_SECONDS
 
 
 # Arguments in Python.
@@ -205,9 +205,9 @@ def test_runs_answer(kind, seconds, folder):
 
 @pytest.mark.parametrize("workers", [-1, 0, float("nan"), 1.5, "2", True, np.int64(-1)])
 def test_workers_are_refused(workers):
-    with pytest.raises(mesoslip.ConfigError, match=r"executor = .*: must be a whole") as told:
+    with pytest.raises(mesoslip.ConfigError, match=r"executor = .*: must be a whole") as printed:
         mesoslip.run(configuration("rigid"), executor=workers)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(printed.value)
 
 
 def test_numbers_of_numpy_are_taken():

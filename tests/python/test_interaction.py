@@ -114,7 +114,7 @@ def test_quasistatic_avalanches_are_those_of_forces_recomputed_at_every_event(kl
         assert len(expected) == 200
     else:
         assert sum(expected[:, 2]) == config.contacts.count
-        assert realization.ending == "no contact is left to break"
+        assert realization.ending == "all contacts are broken"
     names = ("time", "displacement", "size", "force_drop", "slip")
     actual = np.stack([column(realization, name) for name in names], axis=1)
     actual[:, 0] *= 1e-7
@@ -141,7 +141,7 @@ def test_a_bundle_under_a_force(klein):
     expected, _ = quasistatic(config, 1000)
     expected = np.array(expected)
     realization = finish(config)
-    assert realization.ending == "no contact is left to break"
+    assert realization.ending == "all contacts are broken"
     np.testing.assert_array_equal(column(realization, "size"), expected[:, 2])
     np.testing.assert_allclose(1e-6 * column(realization, "time"), expected[:, 0], rtol=1e-10)
     np.testing.assert_allclose(column(realization, "force_before"), expected[:, 0], rtol=1e-10)

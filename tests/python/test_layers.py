@@ -111,7 +111,7 @@ def test_frequencies_are_the_eigenvalues():
 
 @pytest.mark.parametrize("damping", [0.0, 20.0, 400.0])
 def test_modes_decay_as_the_eigenvalues_say(klein, damping):
-    """Of what is left of the modes, with all contacts broken, a linear recurrence tells the rates.
+    """Of what is left of the modes, with all contacts broken, a linear recurrence states the rates.
 
     Damping acts between layers, not on the drive's spring: the slowest mode hardly decays.
     """

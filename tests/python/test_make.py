@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-# Stands for mesoslip: it tells what it is asked to do, and does it by touching the output.
+# Stands for mesoslip: it states what it is asked to do, and does it by touching the output.
 PROGRAM = """#!/bin/sh
 echo "$1 $2"
 while [ "$1" != -o ]; do shift; done

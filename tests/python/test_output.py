@@ -233,8 +233,8 @@ def test_a_long_run_is_written_in_little_memory(tmp_path):
     """200 MB of samples take a fixed part of that."""
     arguments = [str(ROOT / "runs" / "klein.toml"), str(tmp_path / "long.nc")]
     command = [sys.executable, "-c", MANY, *arguments]
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    assert float(told) < 100
+    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert float(printed) < 100
     with xr.open_datatree(tmp_path / "long.nc", engine="netcdf4") as tree:
         assert tree["velocity"].values[0, -1] == 1_499_999
         assert tree["slip_traces/sample_time"].values[100_000] == 100_000

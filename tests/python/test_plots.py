@@ -309,7 +309,7 @@ def test_several_outputs_say_how_they_differ(runs):
         top = max(one.values.max() for one in parts)
         assert line.get_ydata().max() == pytest.approx(top * 1e6)
     assert overlapping(figure) == []
-    # Those that do not differ are told apart by their names.
+    # Those that do not differ are reported apart by their names.
     figure = mesoslip.plot([runs["plain"], runs["plain"]])
     assert len(figure.legends[0].get_texts()) == 2
     axes = Figure().subplots()
@@ -318,7 +318,7 @@ def test_several_outputs_say_how_they_differ(runs):
 
 
 @pytest.mark.parametrize(
-    ("given", "options", "told"),
+    ("given", "options", "printed"),
     [
         (["several"], {"realization": 3}, "no realization 3; the last one is 2"),
         (["plain"], {"start": 3.0}, "from 3 s on: the run goes from 0 s to 2.2 s"),
@@ -332,8 +332,8 @@ def test_several_outputs_say_how_they_differ(runs):
         ([], {}, "no output"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(runs, given, options, told):
-    with pytest.raises(mesoslip.MesoslipError, match=told):
+def test_what_cannot_be_drawn_is_reported(runs, given, options, printed):
+    with pytest.raises(mesoslip.MesoslipError, match=printed):
         mesoslip.plot([runs[name] for name in given], **options)
 
 
@@ -342,7 +342,7 @@ def test_outputs_of_different_commands_are_not_drawn_together(runs, klein):
         mesoslip.plot([runs["plain"], mesoslip.curve(klein())])
 
 
-def test_what_is_of_no_known_command_is_told(runs):
+def test_what_is_of_no_known_command_is_reported(runs):
     other = xr.DataTree(xr.Dataset(attrs={"configuration": runs["plain"].attrs["configuration"]}))
     with pytest.raises(mesoslip.FileError, match="neither a run"):
         mesoslip.plot(other)
@@ -400,11 +400,11 @@ def test_avalanches_of_several_outputs(kind):
 
 def test_the_command_takes_windows_with_units(tmp_path, command):
     output = tmp_path / "run.nc"
-    told = command(
+    printed = command(
         *("run", ROOT / "runs" / "klein.toml", "-o", output, "--quiet"),
         *("--set", "run.duration=0.1 s", "--set", "contacts.count=100"),
     )
-    assert told[0] == 0
+    assert printed[0] == 0
     picture = tmp_path / "picture.svg"
     window = ("--from", "10 ms", "--to", "0.05 s", "--x", "drive", "--realization", "0")
     assert command("plot", output, output, "-o", picture, *window)[0] == 0

@@ -180,11 +180,11 @@ def test_parameters_are_found_again_within_their_errors(name, length):
     # Mean squares of 20 departures of the size of their errors, not all independent.
     assert 0.2 < np.mean(apart**2) < 3
     assert all(one.p_value > 1e-3 and not one.at_bounds for one in found)
-    # Errors of parameters that the record tells well.
+    # Errors of parameters that the record states well.
     assert np.median([one.errors[1] / one.law.a for one in found]) < 0.1
 
 
-def test_the_wrong_law_is_told_from_the_right_one():
+def test_the_wrong_law_is_reported_from_the_right_one():
     right, wrong = (synthetic_fit("ageing", 0.0, 3, name) for name in LAWS)
     assert right.p_value > 0.01 > wrong.p_value
     assert wrong.information_criterion > right.information_criterion + 100
@@ -211,7 +211,7 @@ def test_a_record_without_noise_gives_the_law_back_with_the_stiffness():
     assert np.std(held.residual) > 3 * np.std(found.residual)
 
 
-def test_what_a_record_does_not_tell_is_said():
+def test_what_a_record_does_not_report_is_said():
     """Sliding at one velocity, as in a record whose hold is too short to do anything."""
     stages = (Loading(20, 1e-6, 1e-6), Loading(20, 1.0001e-6, 1.0001e-6))
     times = np.arange(0, 40, 0.05)

@@ -21,8 +21,8 @@ from reference import (
 
 @pytest.mark.parametrize("name", CASES)
 def test_outputs_are_those_of_the_reference(name):
-    told = report(name, mesoslip.open_output(FOLDER / f"{name}.nc"), CASES[name]())
-    assert not told, told
+    printed = report(name, mesoslip.open_output(FOLDER / f"{name}.nc"), CASES[name]())
+    assert not printed, printed
 
 
 @pytest.mark.parametrize("refused", sorted(REFUSED))
@@ -33,7 +33,7 @@ def test_what_has_no_reference_is_refused(refused):
         mesoslip.Config.from_dict(klein_tables(**changes))
 
 
-def test_differences_are_told():
+def test_differences_are_reported():
     """A variable that is otherwise, where and by how much; one too many; another shape."""
     name = "eq-rigid-scaled"
     expected = mesoslip.open_output(FOLDER / f"{name}.nc")
@@ -42,11 +42,11 @@ def test_differences_are_told():
     actual["spring_force"].values[0, 7] += 1e-8
     actual["extra"] = actual["spring_force"]
     actual["slips"] = expected["slips"].to_dataset(inherit=False).isel(slip=slice(0))
-    told = report(name, expected, actual)
-    assert "/spring_force: 1 of 101 values differ by more than 1e-06 of" in told
-    assert "at realization 0, time 7: " in told
-    assert "/extra: only in the output" in told
-    assert "/slips/force_drop: shape (0,) instead of " in told
+    printed = report(name, expected, actual)
+    assert "/spring_force: 1 of 101 values differ by more than 1e-06 of" in printed
+    assert "at realization 0, time 7: " in printed
+    assert "/extra: only in the output" in printed
+    assert "/slips/force_drop: shape (0,) instead of " in printed
     within = expected.copy(deep=True)
     within["spring_force"].values[...] *= 1 + 1e-7
     assert differences(expected, within) == []

@@ -200,11 +200,11 @@ def test_command_and_run_say_the_same(klein, tmp_path, command):
     config.write_text(klein(contacts__count=300).to_toml())
     status, _, said = command("run", str(config), "-o", str(output))
     assert status == 0
-    status, told, _ = command("regime", str(output))
+    status, printed, _ = command("regime", str(output))
     assert status == 0
-    assert f"{output}: {told.splitlines()[-1]}" in said
-    status, told, _ = command("regime", str(output), "--json")
-    rows = json.loads(told)
+    assert f"{output}: {printed.splitlines()[-1]}" in said
+    status, printed, _ = command("regime", str(output), "--json")
+    rows = json.loads(printed)
     assert [one["realization"] for one in rows] == [0]
     data = mesoslip.regime(output)
     assert rows[0]["cycles"] == int(data["cycles"][0])

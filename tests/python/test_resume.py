@@ -41,10 +41,10 @@ def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
     assert differences(one, other) == []
 
 
-def advanced(config: Config, folder: Path, advances: int | None, told: list[str]) -> Results:
+def advanced(config: Config, folder: Path, advances: int | None, printed: list[str]) -> Results:
     """Go on from the checkpoint in a folder for some advances and keep another, or to the end."""
     realizations = [Realization(config, number) for number in range(config.run.realizations)]
-    with Checkpoint(folder, config, resume=True, report=told.append) as checkpoint:
+    with Checkpoint(folder, config, resume=True, report=printed.append) as checkpoint:
         checkpoint.restore(realizations)
         for one in realizations:
             while not one.finished:
@@ -68,21 +68,21 @@ def test_a_run_cut_anywhere_is_the_same(kind, data, tmp_path_factory):
     """Several cuts, each at any event, also within a slip, a cascade, or a cut of a cut."""
     cuts = data.draw(st.lists(st.integers(1, 400), min_size=1, max_size=4), label="advances")
     folder = tmp_path_factory.mktemp("cut")
-    config, told = configuration(kind), []
+    config, printed = configuration(kind), []
     for advances in cuts:
-        advanced(config, folder, advances, told)
-    results = advanced(config, folder, None, told)
-    assert len(told) == 1
-    assert "no checkpoint" in told[0]
+        advanced(config, folder, advances, printed)
+    results = advanced(config, folder, None, printed)
+    assert len(printed) == 1
+    assert "no checkpoint" in printed[0]
     assert_same(whole(kind), build_tree(results))
 
 
 @pytest.mark.parametrize("kind", ["rigid, lattice", "layered, bdf", "rigid, three realizations"])
 def test_a_chain_of_ten_resumes(kind, tmp_path):
-    config, told = configuration(kind), []
+    config, printed = configuration(kind), []
     for advances in range(10, 110, 10):
-        advanced(config, tmp_path, advances, told)
-    assert_same(whole(kind), build_tree(advanced(config, tmp_path, None, told)))
+        advanced(config, tmp_path, advances, printed)
+    assert_same(whole(kind), build_tree(advanced(config, tmp_path, None, printed)))
 
 
 def test_workers_and_stops_do_not_matter(tmp_path):
@@ -125,14 +125,14 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
 
 def test_a_full_disk_does_not_stop_a_run(tmp_path):
     """It says so, once, goes on, and what cannot be put into files stays in memory."""
-    config, told = configuration("rigid"), []
-    with Checkpoint(tmp_path, config, interval=1e-9, report=told.append) as checkpoint:
+    config, printed = configuration("rigid"), []
+    with Checkpoint(tmp_path, config, interval=1e-9, report=printed.append) as checkpoint:
         checkpoint.restore([])
         (tmp_path / "trace.rows").symlink_to("/dev/full")
         results = run_realizations(config, checkpoint=checkpoint)
         assert not checkpoint.write(results.realizations)
-        assert len(told) == 1
-        assert "No space left" in told[0]
+        assert len(printed) == 1
+        assert "No space left" in printed[0]
         assert_same(whole("rigid"), build_tree(results))
         # Once there is room again, there is a checkpoint.
         (tmp_path / "trace.rows").unlink()
@@ -142,7 +142,7 @@ def test_a_full_disk_does_not_stop_a_run(tmp_path):
 
 def test_a_realization_may_end_while_a_checkpoint_is_written(tmp_path, monkeypatch):
     """Its last rows, of which some are in no file yet, belong to the next checkpoint."""
-    config, told = configuration("rigid"), []
+    config, printed = configuration("rigid"), []
     one = Realization(config, 0)
     one.advance(100)
     with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
@@ -156,17 +156,17 @@ def test_a_realization_may_end_while_a_checkpoint_is_written(tmp_path, monkeypat
 
         monkeypatch.setattr(checkpoint, "_flush", end_after_flush)
         assert checkpoint.write([one])
-    results = advanced(config, tmp_path, None, told)
-    assert told == []
+    results = advanced(config, tmp_path, None, printed)
+    assert printed == []
     assert_same(whole("rigid"), build_tree(results))
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty", "no rows"])
 def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
-    config, told = configuration("rigid"), []
-    advanced(config, tmp_path, 200, told)
-    advanced(config, tmp_path, 200, told)
-    told.clear()
+    config, printed = configuration("rigid"), []
+    advanced(config, tmp_path, 200, printed)
+    advanced(config, tmp_path, 200, printed)
+    printed.clear()
     state = tmp_path / "state.npz"
     data = state.read_bytes()
     if damage == "cut":
@@ -177,9 +177,9 @@ def test_a_damaged_checkpoint_falls_back(damage, tmp_path):
         state.write_bytes(b"")
     else:
         (tmp_path / "trace.rows").write_bytes(b"")
-    results = advanced(config, tmp_path, None, told)
-    assert "damaged" in told[0]
-    assert len(told) == (3 if damage == "no rows" else 1)
+    results = advanced(config, tmp_path, None, printed)
+    assert "damaged" in printed[0]
+    assert len(printed) == (3 if damage == "no rows" else 1)
     # Nothing is thrown away: what was damaged may be of use to somebody.
     kept = tmp_path.with_name(f"{tmp_path.name}.old") if damage == "no rows" else tmp_path
     assert (kept / "damaged.state.npz").exists()
@@ -219,27 +219,27 @@ def test_what_cannot_be_read_is_not_taken_for_damaged(tmp_path):
     assert (tmp_path / "state.npz").exists()
 
 
-def test_rows_that_were_changed_are_told(tmp_path):
-    config, told = configuration("rigid"), []
-    advanced(config, tmp_path, 2000, told)
+def test_rows_that_were_changed_are_reported(tmp_path):
+    config, printed = configuration("rigid"), []
+    advanced(config, tmp_path, 2000, printed)
     path = tmp_path / "trace.rows"
     data = path.read_bytes()
     path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
     with pytest.raises(RunError, match=r"trace\.rows: damaged"):
-        build_tree(advanced(config, tmp_path, None, told))
+        build_tree(advanced(config, tmp_path, None, printed))
 
 
 def test_another_configuration_or_program_is_refused(tmp_path, monkeypatch):
     from mesoslip.simulation import checkpoint as module
 
-    config, told = configuration("rigid"), []
-    advanced(config, tmp_path, 100, told)
+    config, printed = configuration("rigid"), []
+    advanced(config, tmp_path, 100, printed)
     other = configuration("rigid", contacts__delay=1e-3)
     with pytest.raises(FileError, match=r"contacts\.delay was 0\.0005, is 0\.001"):
-        advanced(other, tmp_path, 100, told)
+        advanced(other, tmp_path, 100, printed)
     monkeypatch.setattr(module, "FORMAT", 0)
     with pytest.raises(FileError, match="format"):
-        advanced(config, tmp_path, 100, told)
+        advanced(config, tmp_path, 100, printed)
 
 
 def test_two_runs_of_one_output_are_refused(tmp_path):
@@ -255,17 +255,17 @@ def test_two_runs_of_one_output_are_refused(tmp_path):
 
 def test_a_run_that_starts_anew_keeps_what_was_there(tmp_path):
     """Who forgot --resume, and stops the new run, has lost nothing."""
-    config, told = configuration("rigid"), []
+    config, printed = configuration("rigid"), []
     folder = tmp_path / "c"
-    advanced(config, folder, 500, told)
-    with Checkpoint(folder, config, report=told.append) as checkpoint:
+    advanced(config, folder, 500, printed)
+    with Checkpoint(folder, config, report=printed.append) as checkpoint:
         checkpoint.restore([Realization(config, 0)])
         assert not (folder / "state.npz").exists()
-    assert "c.old" in told[-1]
+    assert "c.old" in printed[-1]
     (tmp_path / "c.old").rename(folder)
-    told.clear()
-    assert_same(whole("rigid"), build_tree(advanced(config, folder, None, told)))
-    assert told == []
+    printed.clear()
+    assert_same(whole("rigid"), build_tree(advanced(config, folder, None, printed)))
+    assert printed == []
     with Checkpoint(folder, config) as checkpoint:
         checkpoint.remove()
     assert list(tmp_path.iterdir()) == []
@@ -273,8 +273,8 @@ def test_a_run_that_starts_anew_keeps_what_was_there(tmp_path):
 
 def test_realizations_that_wait_for_a_worker_do_not_hold_up_checkpoints(tmp_path):
     """Taken up by fewer workers than before."""
-    config, told = configuration("rigid, three realizations"), []
-    advanced(config, tmp_path, 50, told)
+    config, printed = configuration("rigid, three realizations"), []
+    advanced(config, tmp_path, 50, printed)
     with Checkpoint(tmp_path, config, interval=1e-9, resume=True) as checkpoint:
         realizations = [Realization(config, number) for number in range(3)]
         checkpoint.restore(realizations)
@@ -310,14 +310,14 @@ def test_contacts_of_a_finished_run_are_gone():
 
 def test_states_are_whole_at_any_moment(tmp_path):
     """Whatever file operation a run is cut off at, one of two states can be taken up."""
-    config, told = configuration("rigid"), []
-    advanced(config, tmp_path, 50, told)
-    advanced(config, tmp_path, 50, told)
+    config, printed = configuration("rigid"), []
+    advanced(config, tmp_path, 50, printed)
+    advanced(config, tmp_path, 50, printed)
     # Between two renamings there is only the previous one; before them a part of the next.
     (tmp_path / "state.npz").rename(tmp_path / ".state.npz.part")
-    told.clear()
-    results = advanced(config, tmp_path, None, told)
-    assert told == []
+    printed.clear()
+    results = advanced(config, tmp_path, None, printed)
+    assert printed == []
     assert_same(whole("rigid"), build_tree(results))
 
 
@@ -449,22 +449,22 @@ def test_killed_runs_go_on(long_run, tmp_path):
         if process.poll() is None and kills < 5:
             process.send_signal(signal.SIGTERM if kills == 2 else signal.SIGKILL)
             kills += 1
-        _, told = process.communicate()
-        assert process.returncode in {0, -signal.SIGKILL, 128 + signal.SIGTERM}, told
+        _, printed = process.communicate()
+        assert process.returncode in {0, -signal.SIGKILL, 128 + signal.SIGTERM}, printed
     assert kills >= 3
     assert not folder.exists()
     assert_same(read_whole(expected), read_whole(output))
 
 
-def test_ctrl_c_tells_how_to_go_on(long_run, tmp_path):
+def test_ctrl_c_reports_how_to_go_on(long_run, tmp_path):
     """A partial file to look at, a checkpoint to go on from, exit status 130; twice is no harm."""
     output = tmp_path / "stopped.nc"
     state = checkpoint_folder(output) / "state.npz"
     process = start(long_run, output, "--checkpoint-interval", "0.05", interrupt_at=state)
-    _, told = process.communicate(timeout=60)
+    _, printed = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "Traceback" not in told
-    assert "--resume" in told
+    assert "Traceback" not in printed
+    assert "--resume" in printed
     assert not output.exists()
     partial = read_whole(tmp_path / "stopped.partial.nc")
     assert partial.attrs["complete"] == "false"
@@ -474,6 +474,6 @@ def test_ctrl_c_tells_how_to_go_on(long_run, tmp_path):
     again.kill()
     again.communicate()
     process = start(long_run, output, "--resume")
-    _, told = process.communicate()
-    assert process.returncode == 0, told
+    _, printed = process.communicate()
+    assert process.returncode == 0, printed
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.toml", "stopped.nc"]

@@ -166,7 +166,7 @@ def test_times_are_in_the_table(tmp_path, command):
 
     output, table = tmp_path / "out.nc", tmp_path / "slips.csv"
     writing.write(mesoslip.run(klein_tables(drive__velocity=1e-6, run__duration=1.0)), output)
-    status, told, _ = command("slips", output, "--csv", table, "--json")
+    status, printed, _ = command("slips", output, "--csv", table, "--json")
     assert status == 0
     with table.open() as file:
         rows = list(csv.DictReader(file))
@@ -177,4 +177,4 @@ def test_times_are_in_the_table(tmp_path, command):
     np.testing.assert_array_equal(waiting, slips["waiting_time"].values[1:])
     lasting = [float(row["duration [s]"]) for row in rows]
     np.testing.assert_array_equal(lasting, slips["duration"].values)
-    assert json.loads(told)["slips"][0]["waiting_time"] is None
+    assert json.loads(printed)["slips"][0]["waiting_time"] is None

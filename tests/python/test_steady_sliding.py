@@ -161,7 +161,7 @@ def test_frequencies_of_a_chain_are_those_of_its_formula(klein):
         assert values[1] < 1e-6 * values[0]
 
 
-def test_engine_answers_as_told():
+def test_engine_answers_as_reported():
     module = study()
     config = module.tables(contacts={"threshold": {"law": "gaussian", "relative_width": 0.3}})
     sliding = SteadySliding(
@@ -203,9 +203,9 @@ def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
     assert stable_stiffness(long) is None
     file = tmp_path / "klein.toml"
     file.write_text(config.to_toml())
-    told = command("curve", file)[1]
-    assert f"springs stiffer than {with_unit(found, 'N/m', 3)}" in told
-    assert f"out of step, stiffer than {with_unit(most, 'N/m', 3)}." in told
+    printed = command("curve", file)[1]
+    assert f"springs stiffer than {with_unit(found, 'N/m', 3)}" in printed
+    assert f"out of step, stiffer than {with_unit(most, 'N/m', 3)}." in printed
     assert "springs stiffer than" not in command("curve", file, "--set", "contacts.delay=0")[1]
 
 
@@ -229,17 +229,17 @@ def test_info_and_curve_report_steady_sliding(klein, tmp_path, command):
     file.write_text(klein().to_toml())
     soft = ("--set", "slider.stiffness=200", "--set", "contacts.delay=3e-4")
     for name in ("info", "curve"):
-        status, told, _ = command(name, file, *soft)
+        status, printed, _ = command(name, file, *soft)
         assert status == 0
-        assert "necessary" in told
-        assert "not sufficient" in told
-        assert "is linearly unstable, with delay" in told
-        assert "may be self-limiting" in told
+        assert "necessary" in printed
+        assert "not sufficient" in printed
+        assert "is linearly unstable, with delay" in printed
+        assert "may be self-limiting" in printed
     for velocity in ("1e-7", "3e-6"):
-        told = command("info", file, "--set", f"drive.velocity={velocity}")[1]
-        assert "for contacts that break out of step too" in told
-    status, told, _ = command("info", file, "--set", "contacts.delay=0")
-    assert "is linearly stable, as there is no delay" in told
+        printed = command("info", file, "--set", f"drive.velocity={velocity}")[1]
+        assert "for contacts that break out of step too" in printed
+    status, printed, _ = command("info", file, "--set", "contacts.delay=0")
+    assert "is linearly stable, as there is no delay" in printed
     quantities = mesoslip.derived(klein())
     assert quantities["steady_growth_rate"].value == SteadySliding(klein()).growth_rate
     assert quantities["steady_frequency"].unit == "1/s"

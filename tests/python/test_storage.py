@@ -26,14 +26,14 @@ def output(tmp_path):
 def test_a_locked_output_is_not_called_damaged(output, command):
     with output.open("rb+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        status, _, told = command("slips", output)
+        status, _, printed = command("slips", output)
         assert status == 2
-        assert "is locked by a program that writes to it" in told
+        assert "is locked by a program that writes to it" in printed
     assert mesoslip.open_output(output)["time"].size
 
 
-def test_a_file_system_without_locks_is_told(output, monkeypatch):
-    """As the library tells it: an error of HDF5, whatever it is."""
+def test_a_file_system_without_locks_is_reported(output, monkeypatch):
+    """As the library states it: an error of HDF5, whatever it is."""
 
     def refuse(*_):
         raise OSError(errno.ENOLCK, "No locks available")
@@ -55,15 +55,15 @@ def test_a_file_system_without_locks_is_told(output, monkeypatch):
     assert list(output.parent.iterdir()) == [output]
 
 
-@pytest.mark.parametrize(("version", "told"), [("99.0", "is of mesoslip 99.0, which is newer")])
-def test_a_newer_output_that_cannot_be_read_is_told(version, told, output):
+@pytest.mark.parametrize(("version", "printed"), [("99.0", "is of mesoslip 99.0, which is newer")])
+def test_a_newer_output_that_cannot_be_read_is_reported(version, printed, output):
     with netCDF4.Dataset(output, "a") as file:
         file.program_version = version
     # What is understood is read.
     assert mesoslip.open_output(output)["time"].size
     with netCDF4.Dataset(output, "a") as file:
         file.renameVariable("velocity", "speed")
-    with pytest.raises(FileError, match=told):
+    with pytest.raises(FileError, match=printed):
         mesoslip.open_output(output)
     with netCDF4.Dataset(output, "a") as file:
         file.program_version = "0.0.1"

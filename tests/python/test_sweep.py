@@ -496,8 +496,10 @@ def test_measures_of_ones_own(tmp_path, sweep_file, command):
     (tmp_path / "own.py").write_text(USER.format(number=1))
     path = sweep_file(SIMPLE.replace('"mean_force"', '"own.py:last_force", "mean_force"'))
     output = tmp_path / "sweep.nc"
-    status, _, told = command("sweep", path, "-o", output, "--workers", "1", "--pool", "processes")
-    assert (status, "4 points computed" in told) == (0, True)
+    status, _, printed = command(
+        "sweep", path, "-o", output, "--workers", "1", "--pool", "processes"
+    )
+    assert (status, "4 points computed" in printed) == (0, True)
     data = xr.open_dataset(output)
     assert data["last_force"].units == "N"
     assert data["last_force"].long_name == "the force at the end"
@@ -517,21 +519,21 @@ def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
     own.write_text(USER.format(number=1))
     path = sweep_file(SIMPLE.replace('"mean_force"', '"own.py:sometimes", "mean_force"'))
     output = tmp_path / "sweep.nc"
-    status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
+    status, _, printed = command("sweep", path, "-o", output, "--pool", "threads")
     assert status == 1
     data = xr.load_dataset(output)
     failed = data["status"].values == 1
     np.testing.assert_array_equal(failed, [[False, True], [False, True]])
-    assert told.count("failed: contacts.delay") == 2
-    assert "failed: contacts.delay = 0.0001 s, realization = 1: measure sometimes" in told
-    assert "own.py, line 13): ValueError: too much" in told
+    assert printed.count("failed: contacts.delay") == 2
+    assert "failed: contacts.delay = 0.0001 s, realization = 1: measure sometimes" in printed
+    assert "own.py, line 13): ValueError: too much" in printed
     np.testing.assert_array_equal(np.isnan(data["mean_force"].values), failed)
     assert data.attrs["failures"].count("too much") == 2
-    status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
-    assert (status, "0 points computed, 2 read from the store, 2 failed" in told) == (1, True)
-    status, _, told = command("sweep", sweep_file(SIMPLE.replace("mean_force", "own.py:text")))
+    status, _, printed = command("sweep", path, "-o", output, "--pool", "threads")
+    assert (status, "0 points computed, 2 read from the store, 2 failed" in printed) == (1, True)
+    status, _, printed = command("sweep", sweep_file(SIMPLE.replace("mean_force", "own.py:text")))
     assert status == 1
-    assert "returned 'much', not a number" in told
+    assert "returned 'much', not a number" in printed
 
 
 WRONG = {
@@ -574,16 +576,16 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_what_is_wrong_is_told_before_anything_is_run(text, tmp_path, sweep_file, command):
+def test_what_is_wrong_is_reported_before_anything_is_run(text, tmp_path, sweep_file, command):
     (tmp_path / "bad.py").write_text("\n1 / 0\n")
     (tmp_path / "good.py").write_text("def there(tree):\n    return 0\n")
     head = "[sweep]\n" if "measure" in text else '[sweep]\nmeasures = ["breaks"]\n'
     tail = "" if "sweep." in text or not text else '\n[sweep.grid]\n"contacts.delay" = [0.001]'
     output = tmp_path / "out" / "sweep.nc"
-    status, out, told = command("sweep", sweep_file(head + text + tail), "-o", output)
-    assert status == 2, told
-    assert WRONG[text] in told
-    assert "sweep.toml" in told
+    status, out, printed = command("sweep", sweep_file(head + text + tail), "-o", output)
+    assert status == 2, printed
+    assert WRONG[text] in printed
+    assert "sweep.toml" in printed
     assert out == ""
     assert not output.parent.exists()
 
@@ -592,20 +594,20 @@ def test_many_points_that_cannot_be_run_are_counted(sweep_file, command):
     path = sweep_file(
         '[sweep]\nmeasures = ["breaks"]\n[sweep.grid]\n"slider.mass" = [-1,-2,-3,-4,-5,-6,-7,8]'
     )
-    status, _, told = command("sweep", path)
+    status, _, printed = command("sweep", path)
     assert status == 2
-    assert told.count("must be greater than 0") == 5
-    assert "7 of 8 combinations are wrong" in told
+    assert printed.count("must be greater than 0") == 5
+    assert "7 of 8 combinations are wrong" in printed
 
 
 def test_a_sweep_needs_a_sweep(tmp_path, command):
     (tmp_path / "base.toml").write_text(Config.from_dict(TINY).to_toml())
-    status, _, told = command("sweep", tmp_path / "base.toml")
-    assert (status, "sweep: missing; this table names" in told) == (2, True)
+    status, _, printed = command("sweep", tmp_path / "base.toml")
+    assert (status, "sweep: missing; this table names" in printed) == (2, True)
     (tmp_path / "sweep.toml").write_text('base = "base.toml"\n[sweep]')
-    status, _, told = command("run", tmp_path / "sweep.toml")
-    assert (status, "the command for it is mesoslip sweep" in told) == (2, True)
-    status, _, told = command("sweep", tmp_path / "sweep.toml", "--pool", "swimming")
+    status, _, printed = command("run", tmp_path / "sweep.toml")
+    assert (status, "the command for it is mesoslip sweep" in printed) == (2, True)
+    status, _, printed = command("sweep", tmp_path / "sweep.toml", "--pool", "swimming")
     assert status == 2
     with pytest.raises(ConfigError, match="executor"):
         mesoslip.sweep(tables(), executor="swimming")
@@ -613,10 +615,15 @@ def test_a_sweep_needs_a_sweep(tmp_path, command):
 
 def test_a_dry_run_runs_nothing(tmp_path, sweep_file, command):
     output = tmp_path / "out" / "sweep.nc"
-    status, told, _ = command("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")
+    status, printed, _ = command("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")
     assert status == 0
-    assert "points   4 (2 contacts.delay x 2 realizations), 0 of them done" in told
-    assert {line.split()[0] for line in told.splitlines()} == {"points", "time", "memory", "disk"}
+    assert "points   4 (2 contacts.delay x 2 realizations), 0 of them done" in printed
+    assert {line.split()[0] for line in printed.splitlines()} == {
+        "points",
+        "time",
+        "memory",
+        "disk",
+    }
     assert not output.parent.exists()
     command("sweep", sweep_file(SIMPLE), "-o", output, "--pool", "threads")
     assert "4 of them done" in command("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")[1]
@@ -670,3 +677,22 @@ def test_a_script_without_a_guard_may_sweep(tmp_path):
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
     )
     assert (result.stdout, result.stderr) == ("0\n", "")
+
+
+class Mirrored:
+    """What a measure sees of a run whose drive goes back."""
+
+    def trace(self, name):
+        return {
+            "spring_force": -np.array([0.0, 3.0, 1.0, 4.0, 2.0]),
+            "drive_displacement": -np.linspace(0.0, 1.0, 5),
+        }[name]
+
+    def catalogue(self, group, name):
+        assert (group, name) == ("slips", "peak_velocity")
+        return -np.array([2.0, 18.0, 5.0])
+
+
+def test_measures_of_a_reversed_drive_are_those_of_its_mirror():
+    assert MEASURES["peak_velocity"].function(Mirrored()) == 18.0
+    assert MEASURES["max_force"].function(Mirrored()) == -4.0

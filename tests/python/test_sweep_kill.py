@@ -100,10 +100,10 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     children = workers_of(process.pid)
     # As a terminal does it: to all of them.
     os.killpg(process.pid, signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    _, printed = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "Traceback" not in told
-    assert "the same command computes them" in told
+    assert "Traceback" not in printed
+    assert "the same command computes them" in printed
     assert not any(map(is_alive, children))
     kept = len(points_of(output))
     partial = xr.load_dataset(tmp_path / "out" / "sweep.partial.nc")
@@ -112,8 +112,8 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     assert not output.exists()
     (tmp_path / "slow").unlink()
     process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
-    _, told = process.communicate(timeout=60)
-    assert f"{40 - kept} points computed, {kept} read from the store" in told
+    _, printed = process.communicate(timeout=60)
+    assert f"{40 - kept} points computed, {kept} read from the store" in printed
     assert not (tmp_path / "out" / "sweep.partial.nc").exists()
 
 
@@ -128,18 +128,18 @@ def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file):
     text = SIMPLE.replace("mean_force", "own.py:deadly").replace('"0.1 ms", ', "")
     path = sweep_file(text)
     process = begin(path, output, "--pool", "processes", "--workers", "2")
-    _, told = process.communicate(timeout=120)
+    _, printed = process.communicate(timeout=120)
     assert process.returncode == 1
-    assert told.count("cost 3 workers, of which the last was ended by signal 9") == 1
+    assert printed.count("cost 3 workers, of which the last was ended by signal 9") == 1
     np.testing.assert_array_equal(xr.load_dataset(output)["status"], [[0, 1]])
 
 
 def test_workers_that_cannot_start_end_the_sweep(tmp_path, sweep_file, monkeypatch, command):
     monkeypatch.setattr("mesoslip.execution.local.PROCESS", "raise SystemExit(7)")
     arguments = ("-o", tmp_path / "sweep.nc", "--pool", "processes", "--workers", "1")
-    status, _, told = command("sweep", sweep_file(SIMPLE), *arguments)
+    status, _, printed = command("sweep", sweep_file(SIMPLE), *arguments)
     assert status == 1
-    assert "ended with status 7" in told
+    assert "ended with status 7" in printed
 
 
 @pytest.fixture
@@ -162,20 +162,20 @@ def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
     """One message; with room again, the sweep goes on from what is there."""
     output = small_disk / "sweep.nc"
     path = sweep_file(SIMPLE.replace("realizations = 2", "realizations = 50"))
-    status, _, told = command("sweep", path, "-o", output, "--pool", "threads", "--quiet")
+    status, _, printed = command("sweep", path, "-o", output, "--pool", "threads", "--quiet")
     assert status == 1
-    assert told.count("\n") == 1
-    assert "no space left on the disk" in told
+    assert printed.count("\n") == 1
+    assert "no space left on the disk" in printed
     kept = points_of(output)
     assert 5 < len(kept) < 60
-    assert f"{len(kept)} points are stored: the same command continues" in told
+    assert f"{len(kept)} points are stored: the same command continues" in printed
     assert not output.exists()
     assert not list(small_disk.rglob(".*"))
     remount = ["mount", "-o", "remount,size=4m", str(small_disk)]
     subprocess.run(remount, check=True)
-    status, _, told = command("sweep", path, "-o", output, "--pool", "threads")
+    status, _, printed = command("sweep", path, "-o", output, "--pool", "threads")
     assert status == 0
-    assert f"{100 - len(kept)} points computed, {len(kept)} read from the store" in told
+    assert f"{100 - len(kept)} points computed, {len(kept)} read from the store" in printed
 
 
 def test_a_folder_that_vanishes_keeps_no_result_from_the_dataset(tmp_path):
@@ -189,17 +189,17 @@ def test_a_folder_that_vanishes_keeps_no_result_from_the_dataset(tmp_path):
     assert np.isfinite(data["mean_force"]).all()
 
 
-def test_a_folder_that_is_none_is_told(tmp_path, sweep_file, command):
+def test_a_folder_that_is_none_is_reported(tmp_path, sweep_file, command):
     output = tmp_path / "sweep.nc"
     output.write_bytes(b"earlier")
     output.with_name("sweep.points").write_text("a file")
-    status, _, told = command("sweep", sweep_file(SIMPLE), "-o", output)
+    status, _, printed = command("sweep", sweep_file(SIMPLE), "-o", output)
     assert status == 2
-    assert "sweep.points: was not made by this program" in told
+    assert "sweep.points: was not made by this program" in printed
     assert output.read_bytes() == b"earlier"
-    status, _, told = command("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
+    status, _, printed = command("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
     assert status == 2
-    assert "cannot be written: Not a directory" in told
+    assert "cannot be written: Not a directory" in printed
 
 
 def test_an_earlier_output_outlives_a_sweep_that_is_stopped(tmp_path, sweep_file):

@@ -136,9 +136,9 @@ def test_a_table_becomes_an_output(tmp_path, command):
     rows = "".join(f"{t:.4f};{1e6 * f:.4f}\n" for t, f in zip(time, force, strict=True))
     write(table, "# made up\ntime [s];Force (uN)\n" + rows.replace(".", ","))
     known = ("--velocity", "0.1 um/s", "--stiffness", "140 N/m")
-    status, _, told = command("trace", table, "-o", output, *known)
+    status, _, printed = command("trace", table, "-o", output, *known)
     assert status == 0
-    assert "7 slips" in told
+    assert "7 slips" in printed
     tree = mesoslip.open_output(output)
     np.testing.assert_allclose(tree["spring_force"].values[0], force, atol=1e-10)
     # Displacements follow from the spring, which sticks to the run's but for noise over stiffness.
@@ -250,15 +250,15 @@ def test_rates_columns_and_gaps(tmp_path):
         (SINE, ["--config", "no.toml"], "no such file"),
     ],
 )
-def test_what_is_wrong_is_told_with_the_line(tmp_path, command, text, options, said):
+def test_what_is_wrong_is_reported_with_the_line(tmp_path, command, text, options, said):
     table = write(tmp_path / "trace.csv", text)
-    status, _, told = command("trace", table, "-o", tmp_path / "out.nc", *options)
+    status, _, printed = command("trace", table, "-o", tmp_path / "out.nc", *options)
     assert status == 2
-    assert said in told
+    assert said in printed
     assert not (tmp_path / "out.nc").exists()
 
 
-def test_what_is_no_table_is_told(tmp_path, command):
+def test_what_is_no_table_is_reported(tmp_path, command):
     assert "no such file" in command("trace", tmp_path / "none.csv", "-o", tmp_path / "a.nc")[2]
     assert "directory" in command("trace", tmp_path, "-o", tmp_path / "a.nc")[2]
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
@@ -283,9 +283,9 @@ def test_a_cell_that_counts_the_other_way(tmp_path, klein, command):
     for pair in ((1, -1), (-1, 1)):
         assert "against the drive most of the time" in found[pair][1]
     table.write_text("time [s],force [uN]\n" + "".join(f"{t},1\n" for t in range(100)))
-    told = command("trace", table, "-o", tmp_path / "flat.nc")[2]
-    assert "no fall of the force exceeds the noise" in told
-    assert "inf" not in told
+    printed = command("trace", table, "-o", tmp_path / "flat.nc")[2]
+    assert "no fall of the force exceeds the noise" in printed
+    assert "inf" not in printed
     with pytest.raises(mesoslip.FileError, match="has a column of the time, and a sampling rate"):
         mesoslip.read_trace(table, rate=100.0)
 

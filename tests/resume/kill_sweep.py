@@ -36,10 +36,10 @@ from tally import Tally, arguments
 
 WORKERS = 2
 OWN = '''
-"""A measure that tells when a point is computed, and takes its time."""
+"""A measure that states when a point is computed, and takes its time."""
 import os, time, tomllib
 
-def told(tree):
+def printed(tree):
     """nothing"""
     delay = tomllib.loads(tree.attrs["configuration"])["contacts"]["delay"]
     realization = int(tree["realization"].values[0])
@@ -52,7 +52,7 @@ SWEEP = """
 base = "base.toml"
 [sweep]
 realizations = 10
-measures = ["mean_force", "breaks", "own.py:told"]
+measures = ["mean_force", "breaks", "own.py:printed"]
 [sweep.grid]
 "contacts.delay" = { from = "0.1 ms", to = "1 ms", points = POINTS }
 """
@@ -97,8 +97,8 @@ class Study:
         """The dataset of a sweep that nobody kills."""
         output = self.folder / "whole.nc"
         process = self.start(output, self.folder / "whole.log", 0.0, "threads")
-        _, told = process.communicate()
-        assert process.returncode == 0, told.decode()
+        _, printed = process.communicate()
+        assert process.returncode == 0, printed.decode()
         return xr.load_dataset(output)
 
     def attack(self, name: str, whole: xr.Dataset, kills: int) -> None:
@@ -129,12 +129,12 @@ class Study:
                     except ProcessLookupError:
                         continue
                 self._check_stored(output, stored)
-            _, told = process.communicate()
+            _, printed = process.communicate()
             # A point may have cost too many workers: then it fails, and the next call computes it.
             if process.returncode not in {0, 1, -signal.SIGKILL}:
-                self.wrong.append(f"exit status {process.returncode}: {told.decode()}")
+                self.wrong.append(f"exit status {process.returncode}: {printed.decode()}")
                 return
-            if process.returncode == 1 and b"cost 3 workers" in told:
+            if process.returncode == 1 and b"cost 3 workers" in printed:
                 output.unlink()
         self._check_stored(output, stored)
         self._check_log(log, output, told_before)

@@ -2,7 +2,7 @@
 
 Runs of Klein's case with 500 contacts over velocity, stiffness, delay and width of the thresholds
 are judged by the program, which counts cycles, and by the spectrum of the same force: by its power,
-by how that changes, and by its lines. Lines are told from a broad band by their Fourier transform,
+by how that changes, and by its lines. Lines and a broad band differ in their Fourier transform,
 the correlation of the force with itself: how far it comes back after it has been negative. Close
 to a boundary a spectrum leaves both sides open. Prints the table of ``docs/regimes.md``, the points
 at which the two disagree, and draws these on request::

@@ -236,7 +236,7 @@ def draw_map(file: str) -> None:
                     colors=["tab:red"],
                     alpha=0.15,
                 )
-        told: dict[tuple[str, str], int] = {}
+        printed: dict[tuple[str, str], int] = {}
         for delay in DELAYS:
             for stiffness in STIFFNESSES:
                 config = at(velocity, delay, stiffness)
@@ -247,7 +247,7 @@ def draw_map(file: str) -> None:
                 if sliding.is_stable != sliding.is_stable_out_of_step:
                     stable += " in step only"
                 name = data["regime"].attrs["flag_meanings"].split()[regime]
-                told[stable, name] = told.get((stable, name), 0) + 1
+                printed[stable, name] = printed.get((stable, name), 0) + 1
                 if sliding.is_stable_out_of_step == (regime in {1, 2}):
                     print(
                         f"{1e6 * velocity:g} um/s, {1e3 * delay:.3g} ms, {stiffness:.3g} N/m: "
@@ -258,7 +258,7 @@ def draw_map(file: str) -> None:
                 panel.plot(
                     1e3 * delay, stiffness, MARKERS[regime], color=COLOURS[regime], markersize=5
                 )
-        print(velocity, told, flush=True)
+        print(velocity, printed, flush=True)
         own = np.sqrt(MASS / FINE_STIFFNESSES)
         panel.plot(1e3 * own, FINE_STIFFNESSES, ":", color="grey")
         panel.annotate("1/Ω$_S$", (1e3 * own[2], FINE_STIFFNESSES[2]), color="grey")

@@ -131,8 +131,11 @@ def _mean_force(run: RunView) -> float:
 
 
 def _max_force(run: RunView) -> float:
-    forces = run.trace("spring_force")
-    return float(np.max(forces)) if forces.size else np.nan
+    """Extreme force in the direction of the drive, with its sign."""
+    forces, drive = run.trace("spring_force"), run.trace("drive_displacement")
+    if not forces.size:
+        return np.nan
+    return float(np.min(forces) if drive[-1] < drive[0] else np.max(forces))
 
 
 def _force_amplitude(run: RunView) -> float:
@@ -155,7 +158,7 @@ def _slip_count(run: RunView) -> float:
 
 def _peak_velocity(run: RunView) -> float:
     velocities = run.catalogue("slips", "peak_velocity")
-    return float(np.max(velocities)) if velocities.size else np.nan
+    return float(np.max(np.abs(velocities))) if velocities.size else np.nan
 
 
 def _smooth_time_share(run: RunView) -> float:
@@ -210,7 +213,9 @@ MEASURES: dict[str, Measure] = {
     one.name: one
     for one in (
         Measure("mean_force", _mean_force, "N", "mean spring force"),
-        Measure("max_force", _max_force, "N", "maximum spring force"),
+        Measure(
+            "max_force", _max_force, "N", "maximum spring force, in the direction of the drive"
+        ),
         Measure("force_amplitude", _force_amplitude, "N", "half the range of the spring force"),
         Measure(
             "mean_peak_force",
@@ -222,7 +227,7 @@ MEASURES: dict[str, Measure] = {
         Measure("mean_waiting_time", _mean_waiting_time, "s", "mean time between starts of slips"),
         Measure("mean_slip_duration", _mean_slip_duration, "s", "mean duration of slips"),
         Measure("slip_count", _slip_count, "1", "number of slips"),
-        Measure("peak_velocity", _peak_velocity, "m s-1", "maximum velocity in slips"),
+        Measure("peak_velocity", _peak_velocity, "m s-1", "maximum speed in slips"),
         Measure(
             "smooth_time_share",
             _smooth_time_share,
@@ -306,7 +311,7 @@ def find_measures(names: Sequence[str], source: str, folder: Path) -> tuple[Meas
         if measure is None:
             near = difflib.get_close_matches(name, MEASURES, 1)
             meant = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(MEASURES)}"
-            message = f"unknown measure; {meant} One of your own is 'file.py:function'"
+            message = f"unknown measure; {meant} For a function of yours write 'file.py:function'"
             found.append(Problem(source, key, message, name))
         elif measure.name in measures:
             found.append(Problem(source, key, "is named twice", name))

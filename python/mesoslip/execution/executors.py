@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 # How often progress, signals and workers are looked at [s].
-LOOK_SECONDS = 0.1
+POLL_SECONDS = 0.1
 
 
 class Executor(ABC):
@@ -225,12 +225,12 @@ def completed(
                     future.add_done_callback(done.put)
                 if not running:
                     return
-                if time.monotonic() - last > LOOK_SECONDS:
+                if time.monotonic() - last > POLL_SECONDS:
                     pool.check()
                     look()
                     last = time.monotonic()
                 try:
-                    future = done.get(timeout=LOOK_SECONDS)
+                    future = done.get(timeout=POLL_SECONDS)
                 except Empty:
                     continue
                 if not in_order:

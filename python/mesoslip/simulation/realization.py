@@ -37,20 +37,20 @@ if TYPE_CHECKING:
 # Why a run is over, by the kernel's names.
 ENDINGS = {
     "": "",
-    "drive": "the drive came to its end",
-    "avalanches": "as many avalanches as wanted",
-    "broken": "no contact is left to break",
+    "drive": "end of the drive",
+    "avalanches": "number of avalanches reached",
+    "broken": "all contacts are broken",
     "slides": "contacts break under the force without end; breaks of this slide are in no "
     "avalanche",
-    "slips": "as many slips as wanted",
-    "displacement": "the slider came to its displacement",
-    "steady": "the state is steady",
+    "slips": "number of slips reached",
+    "displacement": "displacement of the slider reached",
+    "steady": "steady state reached",
 }
 
-# Work of the drive over the energy of all contacts about to break, below which it does not count.
-LEAST_ENERGY = 1e-9
+# Minimum scale of energy residuals, over the energy of all contacts about to break.
+MIN_ENERGY_RATIO = 1e-9
 
-# The end of a drive that does not end: the greatest double.
+# The end of a drive that does not end: the maximum double.
 NEVER = float(np.finfo(np.float64).max)
 
 # Wall time of a segment, between two looks at progress and signals [s]; work of the first one.
@@ -62,7 +62,7 @@ COARSE_PART = 0.25
 ANY_NUMBER = 2**62
 # Advances at a time on the way to a time.
 MAX_ADVANCES = 100_000
-# What no stretch can be: that of a detached contact.
+# Sentinel: the stretch of a detached contact.
 DETACHED = 1e300
 
 
@@ -385,8 +385,8 @@ class Realization:
         wanted = self.config.run.avalanches
         by_avalanches = self.avalanche_count / wanted if wanted else 0.0
         far = self.config.run.stops.displacement
-        by_way = self.displacement / far if far else 0.0
-        return min(1.0, max(by_avalanches, by_way, self.time / self.config.duration))
+        by_displacement = self.displacement / far if far else 0.0
+        return min(1.0, max(by_avalanches, by_displacement, self.time / self.config.duration))
 
     @property
     def energy(self) -> Array:
@@ -413,7 +413,7 @@ class Realization:
         # A run in which hardly anything happens is measured by what may happen.
         unit = contacts.static_force**2 / contacts.stiffness
         scale = abs(energy[0]) or float(np.max(np.abs(energy)))
-        return float(term / max(scale, LEAST_ENERGY * unit))
+        return float(term / max(scale, MIN_ENERGY_RATIO * unit))
 
     @property
     def contacts(self) -> dict[str, Array]:

@@ -59,12 +59,12 @@ def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
     yield "drive_stages", float(parts[-1].stage + 1), "1", "stages of the drive in the run"
     yield "drive_duration", config.duration, "s", "duration of the run"
     length = math.fsum(part.path_length for part in parts)
-    yield "drive_path_length", length, "m", "path length of the drive, there and back both counted"
+    yield "drive_path_length", length, "m", "path length of the drive (both directions added)"
     yield (
         "drive_speed",
         config.drive_speed,
         "m/s",
-        "speed that represents the drive in the other quantities",
+        "reference speed of the drive: of the first stage that moves, the maximum of a ramp",
     )
 
 
@@ -98,13 +98,14 @@ def _verdict_of_stiffness(config: Config) -> str | None:
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
     if spring >= estimate:
         return (
-            "K is above the estimate of K*: slow sliding from relaxed contacts has no slip, and is "
-            "smooth unless delay or ageing weaken faster contacts"
+            "K is above the estimate of K*, which depends on the threshold law: mesoslip curve "
+            "computes K*. Above K* slow sliding from relaxed contacts has no slip, unless delay or "
+            "ageing weaken faster contacts"
         )
     return (
-        "K is below the estimate of K*: relaxed contacts lead to a first slip. This is necessary "
-        "for stick-slip, not sufficient: delay and ageing decide whether slips continue or decay. "
-        "mesoslip curve computes K*; only a run shows the motion"
+        "K is below the estimate of K*: relaxed contacts usually lead to a first slip. K < K* is "
+        "necessary for stick-slip, not sufficient: delay and ageing decide whether slips continue "
+        "or decay. mesoslip curve computes K*; only a run shows the motion"
     )
 
 
@@ -203,8 +204,8 @@ def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, s
         "ageing_velocity",
         contacts.break_stretch / ageing.time,
         "m/s",
-        "mean breaking stretch over the time of ageing: contacts are old when they break where "
-        "sliding is much slower, and young where it is much faster",
+        "mean breaking stretch over the ageing time: in much slower sliding contacts age fully "
+        "before they break, in much faster sliding they stay young",
     )
     if ageing.growth is not None:
         yield (

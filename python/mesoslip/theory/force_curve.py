@@ -60,7 +60,7 @@ SUMMARY = {
     "K_star_displacement": ("m", "displacement at K*"),
     "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
     "stable": ("1", "whether K >= K*, so that slow sliding has no instability"),
-    "X_c": ("m", "displacement at which the slider becomes unstable, lowest F'(X) = -K"),
+    "X_c": ("m", "displacement at which the slider becomes unstable, smallest X with F'(X) = -K"),
     "F_c": ("N", "force at X_c"),
     "F_peak": ("N", "maximum force; none if the force does not fall"),
     "X_peak": ("m", "displacement at the maximum force"),

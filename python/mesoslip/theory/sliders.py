@@ -131,7 +131,10 @@ def _inertial_quantities(slider: InertialSlider, config: Config) -> Iterator[Qua
     period = 2 * math.pi / omega_s
     yield Quantity("setup_period", period, "s", "period of the setup, tau_S = 2 pi/Omega_S")
     yield Quantity(
-        "omega_l", omega_l, "1/s", "ringing frequency of the pinned slider, Omega_L = (Nk/M)^(1/2)"
+        "omega_l",
+        omega_l,
+        "1/s",
+        "ringing of the pinned slider without its spring, Omega_L = (Nk/M)^(1/2)",
     )
     yield Quantity(
         "ringing_period", 2 * math.pi / omega_l, "s", "period of the ringing, 2 pi/Omega_L"
@@ -141,7 +144,7 @@ def _inertial_quantities(slider: InertialSlider, config: Config) -> Iterator[Qua
         "film_drag_rate", film, "1/s", "drag of the whole molten film per slider mass, N m eta/M"
     )
     scale = slider.velocity_scale(config)
-    yield Quantity("slip_velocity_scale", scale, "m/s", "velocity of a slip, Omega_S F_s/K")
+    yield Quantity("slip_velocity_scale", scale, "m/s", "velocity scale of a slip, Omega_S F_s/K")
     yield from _first_slip(slider, config, film)
 
 
@@ -192,8 +195,7 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
         "alpha",
         alpha,
         "1",
-        "duration of a slip by sequential breaking times Omega_S, (6/D1)^(1/3); for Klein's case "
-        "14.2, not 2.21 as in the source",
+        "duration of a slip by sequential breaking times Omega_S, (6/D1)^(1/3)",
     )
     yield Quantity(
         "slip_time_sequential", alpha / omega_s, "s", "duration of a slip by sequential breaking"
@@ -201,7 +203,10 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
     # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
     start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s
     yield Quantity(
-        "B", start / 2, "1", "(D0 - eta D1/Omega_S)/2, the film melting at once, D0 ~ 1 - delta"
+        "B",
+        start / 2,
+        "1",
+        "(D0 - eta D1/Omega_S)/2, the film melting at once, estimate with D0 = 1 - delta",
     )
     if start > 0:
         beta = math.sqrt(2 / start)
@@ -210,7 +215,7 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
             beta,
             "1",
             "duration of a slip by instant melting times Omega_S, [2/(D0 - eta D1/Omega_S)]^(1/2), "
-            "with D0 ~ 1 - delta",
+            "estimate with D0 = 1 - delta; mesoslip onset computes D0",
         )
         yield Quantity(
             "slip_time_melting", beta / omega_s, "s", "duration of a slip by instant melting"

@@ -35,15 +35,14 @@ SUMMARY = {
     "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
     "alpha": (
         "1",
-        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S; the source gives 2.21 for "
-        "Klein's case, where this is 14.2",
+        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S",
     ),
     "slip_time_sequential": ("s", "slip time of sequential breaking"),
     "B": ("1", "(D0 - eta D1/Omega_S)/2: the spring force drops by B tau^2 F_s as the film melts"),
     "beta": ("1", "B^(-1/2), slip time of instant melting times Omega_S"),
     "slip_time_melting": ("s", "slip time of instant melting"),
-    "expansion_end": ("1", "x at which S46 no longer describes the contacts"),
-    "expansion_end_time": ("1", "tau at which x reaches that value"),
+    "expansion_end": ("1", "x up to which the expansion S46 describes the contacts"),
+    "expansion_end_time": ("1", "tau = Omega_S (t - t_c) at that x"),
 }
 
 EQUATIONS = ("sequential", "melting")

@@ -44,6 +44,10 @@ def _case(folder: Path, more: str = "", **changes: Any) -> Path:
 
 
 def _as_nobody() -> None:
+    # The interpreter may lie where others cannot read.
+    import matplotlib.pyplot  # noqa: F401
+    import mesoslip.plots.plot  # noqa: F401
+
     os.setgroups([])
     os.setgid(NOBODY)
     os.setuid(NOBODY)

@@ -10,8 +10,10 @@ module mesoslip_boundary_names
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_avalanches, only: avalanche_columns, snapshot_event_columns
-   use mesoslip_recording_recorder, only: slip_columns, slip_trace_columns, trace_columns
+   use mesoslip_recording_slip_trace, only: slip_trace_columns
+   use mesoslip_recording_slips, only: slip_columns
    use mesoslip_recording_stages, only: stage_columns
+   use mesoslip_recording_trace, only: trace_columns
    use mesoslip_sliders_layered_system, only: solver_names
    use mesoslip_theory_lives, only: scale_names
    use mesoslip_theory_onset, only: equation_names, onset_columns

@@ -119,8 +119,8 @@ subroutine set_drive(handle, parts, part_end, start_rate, end_rate, stage, statu
    call report(error, status, message)
 end subroutine set_drive
 
-!> Tell a simulation when to stop before its drive ends.
-subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, status, message)
+!> Set when a simulation stops before its drive ends.
+subroutine set_stop(handle, slips, displacement, block_distance, blocks, tolerance, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
@@ -131,9 +131,9 @@ subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, s
    integer(8), intent(in) :: slips
    !> Displacement of the slider to come to [m], 0 for any
    real(8), intent(in) :: displacement
-   !> Way of the drive in a block whose mean force tells a steady state [m], 0 for none; blocks that
+   !> Distance of the drive in a block [m], 0 for not to stop at a steady state; blocks that
    !> are compared with as many before; difference of the mean forces that counts as none [N]
-   real(8), intent(in) :: block_way
+   real(8), intent(in) :: block_distance
    integer, intent(in) :: blocks
    real(8), intent(in) :: tolerance
    integer, intent(out) :: status
@@ -146,18 +146,19 @@ subroutine set_stop(handle, slips, displacement, block_way, blocks, tolerance, s
    if (.not. allocated(error)) then
       if (slips > 0) simulation%stop%max_slips = slips
       simulation%stop%displacement = displacement
-      call simulation%steady%open(block_way, blocks, tolerance)
+      call simulation%steady%open(block_distance, blocks, tolerance)
    end if
    call report(error, status, message)
 end subroutine set_stop
 
-!> Tell a simulation, which has its contacts, what to record of the motion.
+!> Set what a simulation, which has its contacts, records of the motion.
 subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &
    & layers, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_recording_recorder, only: recorder_parameters_type
+   use mesoslip_recording_slips, only: slip_parameters_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
@@ -177,9 +178,9 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
       if (allocated(simulation%contacts)) then
-         call simulation%recorder%open(recorder_parameters_type(interval=interval, &
-            & slip_interval=slip_interval, slip_velocity=slip_velocity, quiet_time=quiet_time, &
-            & duration=duration, contacts=simulation%contacts%parameters%count, layers=layers))
+         call simulation%recorder%open(recorder_parameters_type(interval, duration, layers, &
+            & slip_parameters_type(slip_velocity=slip_velocity, quiet_time=quiet_time, &
+            & interval=slip_interval, contacts=simulation%contacts%parameters%count)))
       else
          call raise(error, status_invalid, "contacts come before what is recorded of them")
       end if
@@ -187,8 +188,8 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
    call report(error, status, message)
 end subroutine set_recorder
 
-!> Tell a simulation, which has its contacts, what to record of avalanches.
-subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, snapshots, &
+!> Set what a simulation, which has its contacts, records of avalanches.
+subroutine set_avalanches(handle, min_size, snapshot_size, max_avalanches, snapshots, &
    & snapshot_time, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
@@ -197,10 +198,10 @@ subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, sn
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Least sizes of avalanches in the catalogue and with a snapshot, 0 for none
-   real(8), intent(in) :: least_size, snapshot_size
+   !> Minimum sizes of avalanches in the catalogue and with a snapshot, 0 for none
+   real(8), intent(in) :: min_size, snapshot_size
    !> Avalanches after which the run is over, 0 for any number
-   integer(8), intent(in) :: most_avalanches
+   integer(8), intent(in) :: max_avalanches
    !> Times of snapshots [s]
    integer, intent(in) :: snapshots
    real(8), intent(in) :: snapshot_time(snapshots)
@@ -213,9 +214,9 @@ subroutine set_avalanches(handle, least_size, snapshot_size, most_avalanches, sn
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
-      parameters%least_size = least_size
+      parameters%min_size = min_size
       parameters%snapshot_size = snapshot_size
-      if (most_avalanches > 0) parameters%most_avalanches = most_avalanches
+      if (max_avalanches > 0) parameters%max_avalanches = max_avalanches
       if (allocated(simulation%contacts)) then
          call simulation%avalanches%open(parameters, snapshot_time, &
             & simulation%contacts%individual_count())
@@ -252,7 +253,7 @@ subroutine start_simulation(handle, initial, status, message)
 end subroutine start_simulation
 
 !> Go on for some advances or some work, or until much waits to be drained, or until the end.
-subroutine advance_simulation(handle, most_advances, most_work, status, message)
+subroutine advance_simulation(handle, max_advances, max_work, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report
    use mesoslip_numerics_errors, only: error_type
@@ -260,8 +261,8 @@ subroutine advance_simulation(handle, most_advances, most_work, status, message)
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Largest number of advances; work in units of an advance of a rigid slider
-   integer(8), intent(in) :: most_advances
-   real(8), intent(in) :: most_work
+   integer(8), intent(in) :: max_advances
+   real(8), intent(in) :: max_work
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
@@ -269,7 +270,7 @@ subroutine advance_simulation(handle, most_advances, most_work, status, message)
    type(error_type), allocatable :: error
 
    call find_simulation(handle, .true., simulation, error)
-   if (.not. allocated(error)) call simulation%run(most_advances, most_work, error)
+   if (.not. allocated(error)) call simulation%run(max_advances, max_work, error)
    call report(error, status, message)
 end subroutine advance_simulation
 
@@ -370,7 +371,7 @@ subroutine ask_contacts(handle, count, values, status, message)
       if (simulation%contacts%individual_count() == count) then
          call simulation%contacts%records(values)
       else
-         call raise(error, status_invalid, "contacts are not followed one by one, or not as many")
+         call raise(error, status_invalid, "contacts are not kept one by one, or not as many")
       end if
    end if
    call report(error, status, message)

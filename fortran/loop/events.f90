@@ -4,7 +4,7 @@ module mesoslip_loop_events
    use mesoslip_loop_endings, only: ending_broken, ending_none
    use mesoslip_loop_state, only: state_type
    use mesoslip_loop_transitions, only: change_drive, end_at_avalanches, end_at_displacement, &
-      & end_at_slips, end_if_steady, finish, is_broken, max_step
+      & end_at_slips, end_if_steady, finish, is_broken
    implicit none
    private
 
@@ -28,7 +28,7 @@ contains
          return
       end if
       window%end_time = min(window%end_time, state%slider%drive%next_change(), &
-         & state%steady%block_end, state%slider%time + max_step(state))
+         & state%steady%block_end, state%slider%time + state%recorder%max_step())
       call state%stop%limit_window(window, state%slider%origin)
 
       call state%slider%advance(law, window)

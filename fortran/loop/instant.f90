@@ -5,7 +5,7 @@ module mesoslip_loop_instant
    use mesoslip_loop_segment, only: segment_type
    use mesoslip_loop_state, only: state_type
    use mesoslip_loop_transitions, only: change_drive, end_at_avalanches, end_at_displacement, &
-      & end_at_slips, end_if_steady, finish, is_broken, max_step, shift_origin
+      & end_at_slips, end_if_steady, finish, is_broken, shift_origin
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_sliders_instant, only: instant_slider_type
    implicit none
@@ -71,7 +71,7 @@ contains
 
       last = segment%last_advance(state%advances, slider%cost + state%contacts%cost)
       end_time = min(slider%drive%next_change(), state%steady%block_end, &
-         & slider%time + max_step(state))
+         & slider%time + state%recorder%max_step())
       max_breaks = max_size(state, slider)
       before = slider%pose()
       call state%contacts%offer(before, law, window)

@@ -5,7 +5,7 @@ module mesoslip_loop_scheduled
    use mesoslip_loop_segment, only: segment_type
    use mesoslip_loop_state, only: state_type
    use mesoslip_loop_transitions, only: change_drive, end_at_displacement, end_at_slips, &
-      & end_if_steady, max_step, shift_stretches
+      & end_if_steady, shift_stretches
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
    use mesoslip_step_filter, only: step_filter_type
@@ -42,7 +42,7 @@ contains
       call state%contacts%plan(state%slider%pose(), state%max_schedule, state%schedule)
       call state%stop%limit_schedule(state%schedule, state%slider%origin)
       state%schedule%end_time = min(state%slider%drive%end_of_part(), state%steady%block_end)
-      state%schedule%max_step = max_step(state)
+      state%schedule%max_step = state%recorder%max_step()
       state%schedule%mean_stiffness = state%contacts%parameters%stiffness
       state%schedule%max_force = shift_stretches * state%contacts%parameters%static_force
    end subroutine plan
@@ -62,7 +62,7 @@ contains
          turns = state%slider%direction * state%schedule%direction < 0.0_wp
          if (turns .or. state%schedule%is_over .or. state%advances >= last) exit
          if (state%recorder%is_full()) exit
-         if (state%recorder%slips_so_far() >= state%stop%max_slips) exit
+         if (state%recorder%slips%count >= state%stop%max_slips) exit
       end do
       call state%contacts%settle(state%schedule, state%slider%pose())
       call state%avalanches%count_others(state%schedule%moments, state%contacts%breaks)
@@ -90,7 +90,7 @@ contains
          call slider%run_ahead(state%schedule, filter)
       end select
       state%advances = state%advances + filter%steps
-      call state%recorder%skip_steps(filter)
+      call state%recorder%slips%skip_steps(filter)
       if (.not. filter%is_selected) return
       call state%recorder%record(state%slider, real(state%schedule%detached, wp), &
          & state%contacts%breaks + state%schedule%broken)

@@ -88,7 +88,8 @@ contains
       logical :: is_whole
 
       is_whole = allocated(self%slider) .and. allocated(self%contacts) &
-         & .and. allocated(self%recorder%trace%row) .and. allocated(self%recorder%slips%row) &
+         & .and. allocated(self%recorder%trace%rows%row) &
+         & .and. allocated(self%recorder%slips%catalogue%row) &
          & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row)
       if (is_whole) is_whole = self%slider%drive%is_open()
    end function is_whole
@@ -123,15 +124,15 @@ contains
 
       select case (name)
       case ("trace")
-         buffer => self%recorder%trace
+         buffer => self%recorder%trace%rows
       case ("slip_trace")
-         buffer => self%recorder%slip_trace
+         buffer => self%recorder%slips%trace%rows
       case ("slips")
-         buffer => self%recorder%slips
+         buffer => self%recorder%slips%catalogue
       case ("stages")
          buffer => self%stages%rows
       case ("layers")
-         buffer => self%recorder%layers
+         buffer => self%recorder%trace%layer_rows
       case ("avalanches")
          buffer => self%avalanches%catalogue
       case ("snapshot_events")
@@ -157,7 +158,7 @@ contains
       buffer => self%table(name)
       rows = 0
       if (associated(buffer)) rows = buffer%count
-      if (name == "slip_trace") rows = self%recorder%final_slip_samples()
+      if (name == "slip_trace") rows = self%recorder%slips%final_samples()
    end function rows_to_drain
 
    !> Take the first rows of a table away.
@@ -181,7 +182,7 @@ contains
       else if (size(values, 1) /= size(buffer%row, 1) .or. size(values, 2) > rows) then
          call raise(error, status_invalid, "the table '" // name // "' has other rows")
       else if (name == "slip_trace") then
-         call self%recorder%drain_slip_trace(values)
+         call self%recorder%slips%trace%drain(values)
       else
          call buffer%drain(values)
       end if

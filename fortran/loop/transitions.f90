@@ -5,11 +5,10 @@ module mesoslip_loop_transitions
       & ending_none, ending_slides, ending_slips, ending_steady
    use mesoslip_loop_state, only: state_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_recording_recorder, only: most_samples_in_step
    implicit none
    private
 
-   public :: finish, is_broken, max_step, look_for_steady, change_drive, shift_origin, &
+   public :: finish, is_broken, look_for_steady, change_drive, shift_origin, &
       & shift_stretches
    public :: end_at_avalanches, end_at_slips, end_at_displacement, end_if_steady
 
@@ -33,7 +32,7 @@ contains
       if (ending /= ending_slides) then
          call state%avalanches%close(state%slider, state%contacts, state%slider%displacement)
       end if
-      call state%recorder%finish()
+      call state%recorder%slips%finish()
       call state%stages%finish(state%slider)
       state%ending = ending
    end subroutine finish
@@ -52,26 +51,12 @@ contains
          & .or. state%slider%drive%end_of_part() < never .or. state%avalanches%size > 0.0_wp)
    end function is_broken
 
-   !> Maximum duration of an advance, so that it does not come past too many samples.
-   pure function max_step(state) result(step)
-      !> The state
-      class(state_type), intent(in) :: state
-      !> Duration [s]
-      real(wp) :: step
-
-      step = state%recorder%parameters%interval
-      if (state%recorder%parameters%slip_interval > 0.0_wp) then
-         step = min(step, state%recorder%parameters%slip_interval)
-      end if
-      step = 0.5_wp * most_samples_in_step * step
-   end function max_step
-
    !> End the run if there were as many avalanches as wanted.
    subroutine end_at_avalanches(state)
       !> The state
       class(state_type), intent(inout) :: state
 
-      if (state%avalanches%avalanches >= state%avalanches%parameters%most_avalanches) then
+      if (state%avalanches%avalanches >= state%avalanches%parameters%max_avalanches) then
          call finish(state, ending_avalanches)
       end if
    end subroutine end_at_avalanches
@@ -81,7 +66,7 @@ contains
       !> The state
       class(state_type), intent(inout) :: state
 
-      if (state%recorder%slips_so_far() >= state%stop%max_slips) call finish(state, ending_slips)
+      if (state%recorder%slips%count >= state%stop%max_slips) call finish(state, ending_slips)
    end subroutine end_at_slips
 
    !> End the run if the slider came to its displacement.
@@ -129,7 +114,7 @@ contains
             call state%slider%drive%turn_round(state%slider%time)
             call state%slider%adapt_to_drive()
             call state%slider%mark_extreme()
-            state%recorder%drive_changes = .true.
+            state%recorder%slips%drive_changes = .true.
          else if (state%slider%drive%is_last_part()) then
             call finish(state, ending_drive)
             return
@@ -162,7 +147,7 @@ contains
       associate (drive => state%slider%drive)
          is_new = is_new .and. abs(drive%rate - rate) > tiny_part * max(abs(rate), abs(drive%rate))
          if (is_new .or. abs(drive%direction - direction) > 0.0_wp) then
-            state%recorder%drive_changes = .true.
+            state%recorder%slips%drive_changes = .true.
          end if
       end associate
    end subroutine take_next_part

@@ -1,7 +1,7 @@
 !> The catalogue of avalanches of a run, and snapshots of its contacts.
 !>
 !> An avalanche is all contacts that break at one time and displacement, one pushing over the next;
-!> under a slider without inertia, all that break at one place of the drive.
+!> under a slider without inertia, all that break at one displacement of the drive.
 module mesoslip_recording_avalanches
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
@@ -27,18 +27,19 @@ module mesoslip_recording_avalanches
    integer, parameter :: avalanche_length = size(avalanche_columns)
    integer, parameter :: snapshot_event_length = size(snapshot_event_columns)
 
-   !> Avalanches for which there is room at first; avalanches, and numbers in snapshots, that wait
-   !> before the run pauses to have them taken away
-   integer, parameter :: first_avalanches = 1000, many_avalanches = 100000, many_numbers = 6000000
+   !> Avalanches for which there is room at first
+   integer, parameter :: initial_room = 1000
+   !> Waiting avalanches, and numbers in snapshots, at which the run pauses to have them taken away
+   integer, parameter :: pausing_avalanches = 100000, pausing_numbers = 6000000
 
    !> What to record.
    type :: avalanche_parameters_type
-      !> Least size of an avalanche in the catalogue; 0 for no catalogue
-      real(wp) :: least_size = 0.0_wp
-      !> Least size of an avalanche after which a snapshot is taken; 0 for none
+      !> Minimum size of an avalanche in the catalogue; 0 for no catalogue
+      real(wp) :: min_size = 0.0_wp
+      !> Minimum size of an avalanche after which a snapshot is taken; 0 for none
       real(wp) :: snapshot_size = 0.0_wp
       !> Avalanches after which the run is over
-      integer(i8) :: most_avalanches = huge(1_i8)
+      integer(i8) :: max_avalanches = huge(1_i8)
    end type avalanche_parameters_type
 
    !> Records avalanches and snapshots into tables that the caller empties.
@@ -57,8 +58,8 @@ module mesoslip_recording_avalanches
       !> Times at which snapshots are taken [s], and how many of them have been
       real(wp), allocatable, private :: snapshot_time(:)
       integer, private :: taken = 0
-      !> Snapshots that may wait
-      integer, private :: many = 1
+      !> Waiting snapshots at which the run pauses
+      integer, private :: pausing_snapshots = 1
       !> Breaks up to now
       real(wp), private :: breaks = 0.0_wp
       !> Time, displacement and contact force at the start of the present avalanche
@@ -101,13 +102,13 @@ contains
       if (allocated(self%snapshot_time)) deallocate (self%snapshot_time)
       allocate (self%snapshot_time, source=snapshot_time)
       room = 0
-      if (parameters%least_size > 0.0_wp) room = first_avalanches
+      if (parameters%min_size > 0.0_wp) room = initial_room
       call self%catalogue%open(avalanche_length, room)
       room = 0
       if (parameters%snapshot_size > 0.0_wp .or. size(snapshot_time) > 0) room = 1
       call self%events%open(snapshot_event_length, room)
       call self%snapshots%open(snapshot_length * contacts, room)
-      self%many = max(1, many_numbers / max(1, snapshot_length * contacts))
+      self%pausing_snapshots = max(1, pausing_numbers / max(1, snapshot_length * contacts))
    end subroutine open
 
    !> Whether so much waits that it should be taken away.
@@ -117,7 +118,8 @@ contains
       !> Whether it does
       logical :: is_full
 
-      is_full = self%catalogue%count >= many_avalanches .or. self%snapshots%count >= self%many
+      is_full = self%catalogue%count >= pausing_avalanches &
+         & .or. self%snapshots%count >= self%pausing_snapshots
    end function is_full
 
    !> Take the snapshots that are due after an advance of the slider, before the contacts respond.
@@ -164,8 +166,8 @@ contains
       !> Whether there is
       logical :: needs_each
 
-      needs_each = self%parameters%least_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
-         & .or. self%parameters%most_avalanches < huge(1_i8) &
+      needs_each = self%parameters%min_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
+         & .or. self%parameters%max_avalanches < huge(1_i8) &
          & .or. self%taken < size(self%snapshot_time)
    end function needs_each
 
@@ -217,7 +219,7 @@ contains
          call self%take_snapshot(contacts, self%time, slider%origin + displacement, displacement)
       end if
       call contacts%take_extent(extent)
-      if (self%parameters%least_size > 0.0_wp .and. self%size >= self%parameters%least_size) then
+      if (self%parameters%min_size > 0.0_wp .and. self%size >= self%parameters%min_size) then
          law = contacts%law()
          call self%catalogue%add([self%time, self%displacement, self%size, &
             & self%force, self%force - (law%stiffness * displacement - law%offset), slip, &

@@ -22,8 +22,8 @@ module mesoslip_recording_stages
       & "greatest_force_displacement", "least_force", "least_force_time", &
       & "least_force_displacement", "mean_force"]
    integer, parameter :: stage_length = size(stage_columns)
-   !> Stages that wait before the run pauses to have them taken away
-   integer, parameter :: many_stages = 2000
+   !> Waiting stages at which the run pauses to have them taken away
+   integer, parameter :: pausing_stages = 2000
 
    !> Records the stages of a drive.
    type :: stage_recorder_type
@@ -63,7 +63,7 @@ contains
       !> Whether it does
       logical :: is_full
 
-      is_full = self%rows%count >= many_stages
+      is_full = self%rows%count >= pausing_stages
    end function is_full
 
    !> A stage begins: the drive has taken its velocity.

@@ -1,7 +1,7 @@
 !> Whether a motion has come to a steady state, from means of the drive's force over blocks.
 !>
-!> Each block is an equal way of the drive at a constant velocity. The state is steady as soon as
-!> the mean of the last blocks and that of as many before agree within the standard error of their
+!> Each block is an equal distance of the drive at a constant velocity. The state is steady as soon
+!> as the mean of the last blocks and that of as many before agree within the standard error of their
 !> difference, by the scatter of the last ones, or within a tolerance, and those before do not
 !> scatter twice as much. A force that drifts does not pass: where it changes evenly over twice n
 !> blocks, the difference is some sqrt(6 n) standard errors; nor does what dies away fast.
@@ -15,8 +15,8 @@ module mesoslip_recording_steady
 
    !> Means over the latest blocks.
    type :: steady_recorder_type
-      !> Way of the drive in a block [m], 0 for no steady state to look for
-      real(wp) :: way = 0.0_wp
+      !> Distance of the drive in a block [m], 0 for no steady state to look for
+      real(wp) :: distance = 0.0_wp
       !> Blocks of which the mean is taken, two at least
       integer :: blocks = 2
       !> Difference that counts as none [N]
@@ -32,7 +32,7 @@ module mesoslip_recording_steady
       !> Means over the latest blocks, each at its number modulo their number, shape (2 blocks) [N]
       real(wp), allocatable, private :: mean(:)
    contains
-      !> Say what to look for
+      !> Set what to look for
       procedure, non_overridable :: open
       !> Begin with the first block
       procedure, non_overridable :: begin
@@ -44,22 +44,22 @@ module mesoslip_recording_steady
 
 contains
 
-   !> Say what to look for.
-   subroutine open(self, way, blocks, tolerance)
+   !> Set what to look for.
+   subroutine open(self, distance, blocks, tolerance)
       !> The recorder
       class(steady_recorder_type), intent(inout) :: self
-      !> Way of the drive in a block [m], 0 for nothing to look for
-      real(wp), intent(in) :: way
+      !> Distance of the drive in a block [m], 0 for nothing to look for
+      real(wp), intent(in) :: distance
       !> Blocks of which the mean is taken, two at least
       integer, intent(in) :: blocks
       !> Difference that counts as none [N]
       real(wp), intent(in) :: tolerance
 
-      self%way = way
+      self%distance = distance
       self%blocks = max(2, blocks)
       self%tolerance = tolerance
       self%mean = [real(wp) ::]
-      if (way > 0.0_wp) then
+      if (distance > 0.0_wp) then
          deallocate (self%mean)
          allocate (self%mean(0:2 * self%blocks - 1), source=0.0_wp)
       end if
@@ -75,9 +75,9 @@ contains
       self%block_end = huge(1.0_wp)
       self%number = 0
       self%impulse = 0.0_wp
-      if (.not. (self%way > 0.0_wp .and. abs(velocity) > 0.0_wp)) return
+      if (.not. (self%distance > 0.0_wp .and. abs(velocity) > 0.0_wp)) return
       self%start_time = time
-      self%duration = self%way / abs(velocity)
+      self%duration = self%distance / abs(velocity)
       self%block_end = self%start_time + self%duration
    end subroutine begin
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 def advance_simulation(
-    handle: NDArray[np.int64], most_advances: int, most_work: float
+    handle: NDArray[np.int64], max_advances: int, max_work: float
 ) -> tuple[int, bytes]: ...
 def ask_contacts(
     handle: NDArray[np.int64], count: int
@@ -86,9 +86,9 @@ def restore_simulation(
 def save_simulation(handle: NDArray[np.int64]) -> tuple[int, int, bytes]: ...
 def set_avalanches(
     handle: NDArray[np.int64],
-    least_size: float,
+    min_size: float,
     snapshot_size: float,
-    most_avalanches: int,
+    max_avalanches: int,
     snapshot_time: NDArray[np.float64],
     snapshots: int = ...,
 ) -> tuple[int, bytes]: ...
@@ -131,7 +131,7 @@ def set_stop(
     handle: NDArray[np.int64],
     slips: int,
     displacement: float,
-    block_way: float,
+    block_distance: float,
     blocks: int,
     tolerance: float,
 ) -> tuple[int, bytes]: ...

@@ -12,6 +12,7 @@ program test_simulation
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_parameters_type
+   use mesoslip_recording_trace, only: trace_columns
    use mesoslip_schedule, only: max_events
    use mesoslip_loop_endings, only: ending_drive
    use mesoslip_loop_simulation, only: simulation_type
@@ -93,6 +94,7 @@ contains
       type(simulation_type) :: simulation
       type(error_type), allocatable :: error
       real(wp) :: energy(energy_length)
+      integer :: block_column, base_column
 
       call build(simulation, "ensemble", "layered", "gaussian", 0.1_wp, coupling_scaled, solver)
       call simulation%start(initial_relaxed)
@@ -105,12 +107,14 @@ contains
       call check(simulation%contacts%breaks > count, "contacts break under layers: " // name)
       call check(all(simulation%slider%integrator_counts > 0) .neqv. solver == "series", &
          & "CVODE counts its steps: " // name)
-      associate (recorder => simulation%recorder)
-         call check(recorder%layers%count == recorder%trace%count &
-            & .and. abs(recorder%layers%row(1, recorder%layers%count) &
-            & - recorder%trace%row(9, recorder%trace%count) &
-            & - recorder%trace%row(3, recorder%trace%count)) < 1.0e-15_wp, &
-            & "displacement is that of layer 1 relative to the base: " // name)
+      block_column = findloc(trace_columns, "displacement", dim=1)
+      base_column = findloc(trace_columns, "base_displacement", dim=1)
+      associate (trace => simulation%recorder%trace)
+         associate (last => trace%rows%row(:, trace%rows%count), rows => trace%layer_rows)
+            call check(rows%count == trace%rows%count .and. abs(rows%row(1, rows%count) &
+               & - last(base_column) - last(block_column)) < 1.0e-15_wp, &
+               & "displacement is that of layer 1 relative to the base: " // name)
+         end associate
       end associate
    end subroutine elastic
 
@@ -388,8 +392,9 @@ contains
       call make_contacts(simulation%contacts, contacts, parameters, 1_i8, 0_i8, error)
       call check(.not. allocated(error), "contacts: " // contacts)
 
-      recorder = recorder_parameters_type(interval=1.0e-4_wp, slip_interval=1.0e-4_wp, &
-         & duration=0.15_wp, contacts=count)
+      recorder = recorder_parameters_type(interval=1.0e-4_wp, duration=0.15_wp)
+      recorder%slips%interval = 1.0e-4_wp
+      recorder%slips%contacts = count
       select case (slider)
       case ("rigid")
          call new_parameters(parameters, [character(len=name_length) :: "mass", "stiffness", &
@@ -407,8 +412,8 @@ contains
          call new_parameters(parameters, [character(len=name_length) ::], [real(wp) ::])
       end select
       if (slider == "rigid" .or. slider == "layered") then
-         recorder%slip_velocity = 1.0e-6_wp
-         recorder%quiet_time = 0.012_wp
+         recorder%slips%slip_velocity = 1.0e-6_wp
+         recorder%slips%quiet_time = 0.012_wp
       end if
       call make_slider(simulation%slider, slider, parameters, error)
       call check(.not. allocated(error), "slider: " // slider)
@@ -416,7 +421,7 @@ contains
       call simulation%stages%open()
       call simulation%steady%open(0.0_wp, 1, 0.0_wp)
       call simulation%recorder%open(recorder)
-      call simulation%avalanches%open(avalanche_parameters_type(least_size=1.0_wp, &
+      call simulation%avalanches%open(avalanche_parameters_type(min_size=1.0_wp, &
          & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%individual_count())
    end subroutine build
 

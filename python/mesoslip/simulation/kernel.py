@@ -38,7 +38,7 @@ class Progress(NamedTuple):
     avalanche_slip: float
     """Displacement of the slider in avalanches [m]."""
     force_error: float
-    """Estimated error of the contact force [N]; 0 where contacts are followed one by one."""
+    """Estimated error of the contact force [N]; 0 where contacts are kept one by one."""
     advances: int
     """Advances of the slider, each to an event or less far."""
     avalanches: int
@@ -134,13 +134,13 @@ class Kernel:
         *,
         slips: int,
         displacement: float,
-        block_way: float,
+        block_distance: float,
         blocks: int,
         tolerance: float,
     ) -> None:
-        """What ends the run before its drive: slips, a displacement of the slider [m], a steady
-        state, told by blocks of so much way of the drive [m]; 0 for what does not."""
-        self._call(_core.set_stop, slips, displacement, block_way, blocks, tolerance)
+        """Set what ends the run before its drive: a number of slips, a displacement of the slider
+        [m], a steady state, by blocks of a displacement of the drive [m]; 0 for what does not."""
+        self._call(_core.set_stop, slips, displacement, block_distance, blocks, tolerance)
 
     def set_recorder(
         self,
@@ -152,7 +152,7 @@ class Kernel:
         duration: float,
         layers: int,
     ) -> None:
-        """What to record of the motion; intervals and times in s, 0 for what is not recorded."""
+        """Set what to record of the motion; intervals and times in s, 0 for what is not recorded."""
         self._call(
             _core.set_recorder,
             interval,
@@ -166,24 +166,24 @@ class Kernel:
     def set_avalanches(
         self,
         *,
-        least_size: float,
+        min_size: float,
         snapshot_size: float,
-        most_avalanches: int,
+        max_avalanches: int,
         snapshot_times: Array,
     ) -> None:
-        """What to record of avalanches; 0 for what is not recorded, and for no most number."""
-        self._call(_core.set_avalanches, least_size, snapshot_size, most_avalanches, snapshot_times)
+        """Set what to record of avalanches; 0 for what is not recorded, and for no bound."""
+        self._call(_core.set_avalanches, min_size, snapshot_size, max_avalanches, snapshot_times)
 
     def start(self, initial: str) -> None:
         """Draw the contacts in an initial state, and put the slider in balance with them."""
         self._call(_core.start_simulation, initial)
 
-    def advance(self, most_advances: int, most_work: float) -> None:
+    def advance(self, max_advances: int, max_work: float) -> None:
         """Go on for some advances or some work, until much waits to be drained, or to the end.
 
         Work is in units of an advance of a rigid slider or a contact that breaks.
         """
-        self._call(_core.advance_simulation, most_advances, most_work)
+        self._call(_core.advance_simulation, max_advances, max_work)
 
     def ask(self) -> Progress:
         """How far it has come."""

@@ -155,7 +155,7 @@ class Realization:
         Displacement of the slider [m].
     force_error
         Estimated error of the contact force [N], before the first slip if there is one; 0 where
-        contacts are followed one by one, NaN where it is not known yet.
+        contacts are kept one by one, NaN where it is not known yet.
     slip_time_error
         Estimated error of the time at which a slip starts, the greatest of all [s]; the same.
     integrator_counts
@@ -225,7 +225,7 @@ class Realization:
         kernel.set_stop(
             slips=stop.slips or 0,
             displacement=stop.displacement or 0.0,
-            block_way=config.steady_block,
+            block_distance=config.steady_block,
             blocks=stop.steady.blocks if stop.steady else 1,
             tolerance=stop.steady.tolerance * config.contacts.static_force if stop.steady else 0.0,
         )
@@ -238,9 +238,9 @@ class Realization:
             layers=slider.layers_recorded(config),
         )
         kernel.set_avalanches(
-            least_size=float(output.avalanche_size or 1) * config.has_avalanches,
+            min_size=float(output.avalanche_size or 1) * config.has_avalanches,
             snapshot_size=float(output.snapshot_size or 0),
-            most_avalanches=config.run.avalanches or 0,
+            max_avalanches=config.run.avalanches or 0,
             snapshot_times=np.array(output.snapshots, dtype=float),
         )
         if self._words is not None:
@@ -317,7 +317,7 @@ class Realization:
         while not self.finished and self.time < time:
             self.advance(advances)
             pace, before = self.time - before, self.time
-            # Half the way at the present pace, so as not to come past the time.
+            # Half the distance at the present pace, so as not to pass the time.
             wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
             advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
 

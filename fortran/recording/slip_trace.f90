@@ -1,0 +1,203 @@
+!> Finer samples of the motion around slips.
+!>
+!> They are taken from the start of a fall of the force, which may come to no slip: then they are
+!> dropped. They go on until the block has been slow for half a period, or another slip starts.
+module mesoslip_recording_slip_trace
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: name_length
+   use mesoslip_recording_buffer, only: buffer_type
+   use mesoslip_recording_trace, only: max_samples_in_step, pausing_samples, sample_of, &
+      & trace_columns
+   use mesoslip_sliders_base, only: slider_type
+   implicit none
+   private
+
+   public :: slip_trace_type, slip_trace_columns
+
+   !> A sample has the number of the slip as well.
+   character(len=*), parameter :: slip_trace_columns(*) = [character(len=name_length) :: &
+      & trace_columns, "slip"]
+   integer, parameter :: slip_trace_length = size(slip_trace_columns)
+
+   !> Traces of slips.
+   type :: slip_trace_type
+      !> Samples
+      type(buffer_type) :: rows
+      !> Time of the next sample [s]
+      real(wp) :: next_time = huge(1.0_wp)
+      !> Whether a trace is taken
+      logical :: is_active = .false.
+      !> Interval of the samples [s], 0 for none
+      real(wp), private :: interval = 0.0_wp
+      !> Samples that will not be dropped
+      integer, private :: kept_count = 0
+      !> Time of the first sample of the present fall [s], and its samples so far
+      real(wp), private :: start_time = 0.0_wp
+      integer(i8), private :: samples = 0
+      !> Number of the slip whose trace is taken
+      integer(i8), private :: slip = 0
+      !> Whether the present trace has been of a slip
+      logical, private :: has_slip = .false.
+   contains
+      !> Make room for samples
+      procedure, non_overridable :: open
+      !> Samples that can be taken away
+      procedure, non_overridable :: final_samples
+      !> Take samples away
+      procedure, non_overridable :: drain
+      !> Take the samples up to a time within the last advance of a slider
+      procedure, non_overridable :: take_samples
+      !> A fall of the force starts, comes to a slip, or to no slip
+      procedure, non_overridable :: begin
+      procedure, non_overridable :: confirm
+      procedure, non_overridable :: drop
+      procedure, non_overridable :: drop_or_stop
+      !> A slip is over; the trace goes on
+      procedure, non_overridable :: keep
+      !> End the trace
+      procedure, non_overridable :: stop
+      !> Put the state into an archive or take it out
+      procedure, non_overridable :: exchange
+   end type slip_trace_type
+
+contains
+
+   !> Make room for samples.
+   subroutine open(self, interval)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+      !> Interval of the samples [s], 0 for none
+      real(wp), intent(in) :: interval
+
+      self%interval = interval
+      call self%rows%open(slip_trace_length, pausing_samples + max_samples_in_step)
+   end subroutine open
+
+   !> Samples that can be taken away: not those of a fall that may come to no slip.
+   pure function final_samples(self, is_undecided) result(number)
+      !> The traces
+      class(slip_trace_type), intent(in) :: self
+      !> Whether there is such a fall
+      logical, intent(in) :: is_undecided
+      !> Their number
+      integer :: number
+
+      number = self%rows%count
+      if (is_undecided) number = self%kept_count
+   end function final_samples
+
+   !> Take samples away.
+   subroutine drain(self, values)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+      !> As many samples as can be taken or fewer, shape (slip_trace_length, samples)
+      real(wp), intent(out) :: values(:, :)
+
+      call self%rows%drain(values)
+      self%kept_count = max(0, self%kept_count - size(values, 2))
+   end subroutine drain
+
+   !> Take the samples up to a time within the last advance of a slider.
+   subroutine take_samples(self, slider, detached, end_time)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+      !> The slider after its advance
+      class(slider_type), intent(in) :: slider
+      !> Detached contacts during the advance; the time [s]
+      real(wp), intent(in) :: detached, end_time
+
+      do while (self%next_time <= end_time)
+         call self%rows%add([sample_of(slider%observe(self%next_time), detached), &
+            & real(self%slip, wp)])
+         self%samples = self%samples + 1
+         self%next_time = self%start_time + real(self%samples, wp) * self%interval
+      end do
+   end subroutine take_samples
+
+   !> A fall of the force starts; a trace of the slip before goes on in the samples of the fall.
+   subroutine begin(self, time, slip)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+      !> Time of the start [s]
+      real(wp), intent(in) :: time
+      !> Number of the slip that it may come to be
+      integer(i8), intent(in) :: slip
+
+      if (.not. self%is_active) then
+         self%is_active = .true.
+         self%slip = slip
+      end if
+      self%start_time = time
+      self%samples = 0
+      self%next_time = huge(1.0_wp)
+      if (self%interval > 0.0_wp) self%next_time = time
+      self%kept_count = self%rows%count
+   end subroutine begin
+
+   !> The fall has come to a slip: its samples are of this one.
+   subroutine confirm(self, slip)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+      !> Number of the slip
+      integer(i8), intent(in) :: slip
+
+      self%slip = slip
+      self%has_slip = .true.
+      self%rows%row(slip_trace_length, self%kept_count + 1:self%rows%count) = real(slip, wp)
+   end subroutine confirm
+
+   !> The fall has come to no slip: its samples are those of the slip before, if any.
+   subroutine drop(self)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+
+      if (.not. self%has_slip) self%rows%count = min(self%rows%count, self%kept_count)
+   end subroutine drop
+
+   !> The fall has come to no slip: the trace goes on only after a slip.
+   subroutine drop_or_stop(self)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+
+      call self%drop()
+      if (.not. self%has_slip) call self%stop()
+   end subroutine drop_or_stop
+
+   !> A slip is over; the trace goes on.
+   subroutine keep(self)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+
+      self%kept_count = self%rows%count
+   end subroutine keep
+
+   !> End the trace: no samples until the next fall.
+   subroutine stop(self)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+
+      self%is_active = .false.
+      self%has_slip = .false.
+      self%next_time = huge(1.0_wp)
+   end subroutine stop
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The traces
+      class(slip_trace_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call archive%section("slip trace")
+      call archive%exchange("next_time", self%next_time)
+      call archive%exchange("is_active", self%is_active)
+      call archive%exchange("kept_count", self%kept_count)
+      call archive%exchange("start_time", self%start_time)
+      call archive%exchange("samples", self%samples)
+      call archive%exchange("slip", self%slip)
+      call archive%exchange("has_slip", self%has_slip)
+      call self%rows%exchange("rows", archive)
+   end subroutine exchange
+
+end module mesoslip_recording_slip_trace

@@ -11,10 +11,10 @@
 !> - the block exceeds the drive's velocity by the slip velocity,
 !> - at least one contact breaks, and
 !> - the force falls by more than twice what it had regained by ringing, so that the block travels
-!>   farther beyond what ringing gives back than it rings. Regained is the height above the lowest
-!>   minimum of the last three quarters of a period of the setup: contacts only make the block ring
-!>   faster, so that ringing takes half a period, with damping a little more; what takes longer is
-!>   loading.
+!>   farther beyond what ringing gives back than it rings. Regained is the part of its rise that is
+!>   ringing (mesoslip_recording_minima), from a minimum in the last three quarters of a period of
+!>   the setup: contacts only make the block ring faster, so that ringing takes half a period, with
+!>   damping a little more; what takes longer is loading.
 !>
 !> A slip starts at the maximum. It ends at the lowest minimum, after which no lower one comes
 !> within half a period, or before the force has regained half its drop and most contacts are
@@ -46,8 +46,6 @@ module mesoslip_recording_slips
 
    !> A fall of the force makes a slip if it exceeds this many times what ringing regained.
    real(wp), parameter :: min_fall_ratio = 2.0_wp
-   !> Maximum time in which ringing leads from a minimum to a maximum, in half periods of the setup
-   real(wp), parameter :: max_ringing_rise = 1.5_wp
    !> Present state: neither fall nor slip, a fall that may come to be a slip, a slip
    integer, parameter :: phase_slow = 0, phase_fall = 1, phase_slip = 2
 
@@ -261,9 +259,8 @@ contains
       self%direction = slider%drive%direction
       self%last_excess = self%direction * (motion%velocity + motion%base_velocity &
          & - slider%drive%rate_at(slider%step_time))
-      ! What a faster drive stretches before the block has its velocity is regained too.
       call self%minima%clear()
-      call self%minima%add(motion, self%direction)
+      call self%minima%add(motion, self%direction, max(0.0_wp, -self%last_excess))
    end subroutine change_stage
 
    !> The slider has become faster than the drive: the force was at a maximum.
@@ -306,7 +303,7 @@ contains
 
       logical :: is_lower
 
-      call self%minima%add(motion, self%direction)
+      call self%minima%add(motion, self%direction, 0.0_wp)
       if (self%phase == phase_slow) return
       is_lower = .not. self%has_minimum &
          & .or. self%direction * (motion%elastic_force - self%force_after) < 0.0_wp
@@ -343,7 +340,7 @@ contains
       self%force_after = motion%elastic_force
       self%breaks_before = breaks
       self%regained_force = self%minima%regained_force(motion, self%direction, &
-         & motion%time - max_ringing_rise * self%parameters%quiet_time)
+         & self%parameters%quiet_time)
       self%peak_velocity = 0.0_wp
       self%later_peak_velocity = 0.0_wp
       self%was_fast = .false.
@@ -425,7 +422,7 @@ contains
 
       call archive%section("slips")
       call archive%exchange("phase", self%phase)
-      call archive%exchange("count", self%count)
+      call archive%exchange("slip_count", self%count)
       call archive%exchange("drive_changes", self%drive_changes)
       call archive%exchange("direction", self%direction)
       call archive%exchange("last_excess", self%last_excess)

@@ -1,10 +1,10 @@
 !> Whether a motion has come to a steady state, from means of the drive's force over blocks.
 !>
 !> Each block is an equal distance of the drive at a constant velocity. The state is steady as soon
-!> as the mean of the last blocks and that of as many before agree within the standard error of their
-!> difference, by the scatter of the last ones, or within a tolerance, and those before do not
-!> scatter twice as much. A force that drifts does not pass: where it changes evenly over twice n
-!> blocks, the difference is some sqrt(6 n) standard errors; nor does what dies away fast.
+!> as the mean of the last blocks and that of as many before agree within the standard error of
+!> their difference, by the scatter of the last ones, or within a tolerance, and those before do
+!> not scatter twice as much. A force that drifts does not pass: where it changes evenly over
+!> twice n blocks, the difference is some sqrt(6 n) standard errors; nor does what dies away fast.
 module mesoslip_recording_steady
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp

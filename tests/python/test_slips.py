@@ -107,6 +107,55 @@ def test_force_of_a_slip_is_an_extremum_whatever_the_base_does(klein):
         assert force[inside].min() == pytest.approx(one["force_after"].item(), abs=1e-8)
 
 
+def deep_falls(force, depth: float) -> int:
+    """Number of falls deeper than a depth between alternating extremes of a force."""
+    count, extreme, falls = 0, force[0], False
+    for value in force:
+        extreme = min(extreme, value) if falls else max(extreme, value)
+        if abs(value - extreme) > depth:
+            falls = not falls
+            extreme = value
+            count += falls
+    return count
+
+
+@pytest.mark.parametrize("velocity", [0.3e-6, 3e-6, 15e-6, 20e-6])
+def test_a_fast_drive_leaves_no_deep_fall_out(klein, velocity):
+    """The block sticks for less than a period of the setup, which is no ringing all the same."""
+    tree = mesoslip.run(
+        klein(
+            run__duration=max(0.5, 1e-6 / velocity),
+            drive__velocity=velocity,
+            contacts__delay=1e-3,
+            contacts__threshold={"law": "gaussian", "relative_width": 0.05},
+            output__interval=1e-4,
+        )
+    )
+    slips, force = catalogue(tree), tree["spring_force"].values[0]
+    # A fall at the end of the run is not over.
+    assert slips.sizes["slip"] == pytest.approx(deep_falls(force, 0.2 * STATIC_FORCE), abs=1)
+    assert np.argmax(slips["force_drop"].values) == 0
+    assert slips["force_drop"].values.min() > 0.2 * STATIC_FORCE
+
+
+@pytest.mark.parametrize("velocity", [2e-5, 5e-5])
+@pytest.mark.parametrize("damping_ratio", [0.02, 0.2])
+def test_ringing_about_fast_smooth_sliding_is_no_slip(klein, velocity, damping_ratio):
+    tree = mesoslip.run(
+        klein(
+            run__duration=0.5,
+            drive__velocity=velocity,
+            slider__damping_ratio=damping_ratio,
+            contacts__delay=0.0,
+            contacts__initial="steady",
+            contacts__threshold={"law": "gaussian", "relative_width": 0.3},
+            output__interval=1e-4,
+        )
+    )
+    assert deep_falls(tree["spring_force"].values[0], 0.2 * STATIC_FORCE) > 1
+    assert catalogue(tree).sizes["slip"] == 0
+
+
 def stages(*pairs: tuple[float, float]) -> dict[str, object]:
     return {"stage": [{"duration": time, "velocity": speed} for time, speed in pairs]}
 

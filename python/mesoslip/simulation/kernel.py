@@ -152,7 +152,7 @@ class Kernel:
         duration: float,
         layers: int,
     ) -> None:
-        """Set what to record of the motion; intervals and times in s, 0 for what is not recorded."""
+        """Set what to record of the motion; intervals, times in s, 0 for what is not recorded."""
         self._call(
             _core.set_recorder,
             interval,

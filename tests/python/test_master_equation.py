@@ -274,7 +274,7 @@ def test_contacts_are_conserved(klein, engine_slider):
     realization = Realization(klein(run__engine="me", **changes), 0)
     while realization.time < 3.9 and not realization.finished:
         realization.advance(20_000)
-        if realization.finished:
+        if realization.ending:
             break
         state = saved(realization)
         count = int(state.words[entries(state.words)["count"][0]][0])

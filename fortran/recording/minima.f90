@@ -7,9 +7,9 @@
 !>   period. If the block never stops, A w < v, then dX > (1 - 2/pi) dX_d: all of the rise is
 !>   regained by ringing.
 !> - So it is if the block moves backwards, at a slow drive above all: dX < -dX_d/10.
-!> - A block in between sticks, and is loaded by the drive: a quarter of the rise at most is
-!>   ringing, so that a slip gives back half of it, unless the rise took less than a quarter of a
-!>   period, as ringing against contacts does.
+!> - A block in between sticks, and is loaded by the drive. A quarter of the rise counts as ringing,
+!>   so that a slip gives back half of it.
+!> - A rise of less than a quarter of a period is ringing against contacts, all of it.
 !>
 !> Where the drive becomes faster by u the force is at no minimum. The block comes up with the drive
 !> in a quarter of a wave, in which the force rises by K u/w: so much is ringing there.

@@ -233,7 +233,10 @@ contains
       self%rate = rate
       self%acceleration = acceleration
       self%turn = huge(1.0_wp)
-      if (rate * acceleration < 0.0_wp) self%turn = time - rate / acceleration
+      ! A ramp to rest does not turn: its time of rest may be rounded to before its end.
+      if (rate * acceleration < 0.0_wp .and. rate * self%end_rate(self%part) < 0.0_wp) then
+         self%turn = time - rate / acceleration
+      end if
       if (abs(rate) > 0.0_wp) then
          self%direction = sign(1.0_wp, rate)
       else if (abs(acceleration) > 0.0_wp) then

@@ -85,8 +85,7 @@ contains
          state%advances = state%advances + 1
          if (state%advances >= last .or. state%contacts%breaks > segment%max_breaks) exit
          if (slider%is_settled .or. slider%is_unbound) exit
-         before = slider%pose()
-         call state%contacts%respond(before, before)
+         call state%contacts%respond(before, slider%pose())
          call state%avalanches%count_breaks(slider, state%contacts, law)
          if (allocated(state%contacts%failure) .or. state%avalanches%size > max_breaks) exit
          call shift_origin(state)

@@ -1,7 +1,7 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_loop_simulation
    use mesoslip_loop_endings, only: ending_none
-   use mesoslip_loop_events, only: advance_to_event, respond
+   use mesoslip_loop_events, only: advance_to_event
    use mesoslip_loop_instant, only: advance_in_equilibrium
    use mesoslip_loop_scheduled, only: advance_through_schedule
    use mesoslip_loop_segment, only: new_segment, segment_type

@@ -10,6 +10,7 @@ program test_drive
    implicit none
 
    call goes_through_parts()
+   call comes_to_rest()
    call keeps_value_and_work()
    call has_a_part()
    call pulls_a_spring()
@@ -45,6 +46,32 @@ contains
       call check(drive%is_last_part() .and. drive%stage() == 1, "the last stage")
       call check_close(drive%at(5.0_wp), 4.0_wp, 0.0_wp, "a drive at rest")
    end subroutine goes_through_parts
+
+   !> A ramp to rest does not turn round, wherever rounding takes its time of rest.
+   subroutine comes_to_rest()
+      integer, parameter :: cases = 200
+      type(error_type), allocatable :: error
+      integer :: first, second
+      real(wp) :: start, end
+      logical :: is_right
+
+      is_right = .true.
+      do first = 1, cases
+         start = 0.01_wp * first
+         do second = 1, 20
+            end = start + 0.07_wp * second
+            block
+               type(drive_type) :: drive
+
+               call drive%open([start, end], [0.03_wp, 0.03_wp], [0.03_wp, 0.0_wp], [0, 1], error)
+               call drive%begin(0.0_wp)
+               call drive%take_next_part(start)
+               is_right = is_right .and. .not. drive%next_change() < end
+            end block
+         end do
+      end do
+      call check(is_right .and. .not. allocated(error), "a ramp to rest ends at its end")
+   end subroutine comes_to_rest
 
    !> Another origin changes neither work nor impulse; a stage counts its impulse anew.
    subroutine keeps_value_and_work()

@@ -394,7 +394,7 @@ def test_ready_runs_run(name):
             RELAX,
             {"interaction": {"strength": 0.1, "columns": 60, "rows": 68}},
             "interaction",
-            "is not for contacts that age",
+            "is not for ageing contacts",
         ),
         (
             RELAX | {"initial_age": 1.0},

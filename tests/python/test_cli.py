@@ -283,7 +283,8 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     table.write_text("time [s],force [uN]\n0,0\n1,1\n2,2\n3,3\n")
     assert "mesoslip trace" in command("slips", table)[2]
     assert command("run", short, "-o", output)[0] == 0
-    assert "is an output already" in command("trace", output, "-o", tmp_path / "other.nc")[2]
+    _, _, refused = command("trace", output, "-o", tmp_path / "other.nc")
+    assert "is an output, not a table of measurements" in refused
     # Whose result is lost is printed.
     printed = command("run", short, "-o", output, "--set", "run.seed=7")[2]
     assert "the output of another configuration will be replaced" in printed

@@ -306,7 +306,7 @@ def test_a_report_reports_the_parameters(small_fit, tmp_path):
     page = (tmp_path / "fit.html").read_text()
     assert "contacts.static_force" in page
     assert "Agreement of the model with the trace" in page
-    with pytest.raises(FileError, match="fits are drawn one at a time"):
+    with pytest.raises(FileError, match="shows one output at a time"):
         mesoslip.plot([posterior, posterior])
 
 

@@ -93,7 +93,7 @@ def test_a_configuration_of_an_output_reads_no_file(output, tmp_path, command):
         status, shown, printed = command("run", output, "-o", tmp_path / "again.nc")
         assert status == 2
         assert "drive.history.file" in printed
-        assert "is not read from an output" in printed
+        assert "an output must not name a file" in printed
         assert "password" not in shown + printed
     # Who repeats a run may give a file.
     table = tmp_path / "history.csv"

@@ -176,7 +176,10 @@ def test_results_do_not_depend_on_how_they_are_computed(klein):
         piecewise.slip_trace[:, 4], single["slip_traces/spring_force"].values
     )
     for name, term in zip(ENERGY_COLUMNS, piecewise.energy, strict=True):
-        if name != "residual":
+        if name == "step_work":
+            # Contacts one by one have no steps.
+            assert term == 0
+        elif name != "residual":
             assert single["energy"][name].values[0] == term
 
 

@@ -78,7 +78,7 @@ def test_a_map_of_the_regime_has_the_lines_of_theory():
 def test_a_third_key_has_a_map_for_each_value():
     figure = mesoslip.plot(sweep_over_two_keys(third=[1e-7, 1e-6]), view="regime")
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
-    assert titles == ["regime; drive.velocity = 1e-07", "regime; drive.velocity = 1e-06"]
+    assert titles == ["regime; drive.velocity = 1e-7", "regime; drive.velocity = 1e-6"]
     with pytest.raises(mesoslip.FileError, match="no measure 'foo'; it has regime, growth_rate"):
         mesoslip.plot(sweep_over_two_keys(), view="foo")
 

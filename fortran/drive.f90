@@ -111,7 +111,7 @@ contains
       real(wp), intent(in) :: time
 
       self%part = 1
-      call self%change(time, self%start_rate(1), part_acceleration(self))
+      call take_part(self, time)
    end subroutine begin
 
    !> Take the rate of the next part.
@@ -122,8 +122,20 @@ contains
       real(wp), intent(in) :: time
 
       self%part = self%part + 1
-      call self%change(time, self%start_rate(self%part), part_acceleration(self))
+      call take_part(self, time)
    end subroutine take_next_part
+
+   !> Take the rate of the present part.
+   subroutine take_part(self, time)
+      type(drive_type), intent(inout) :: self
+      real(wp), intent(in) :: time
+
+      associate (start => self%start_rate(self%part), end => self%end_rate(self%part))
+         call self%change(time, start, part_acceleration(self))
+         ! A ramp to rest does not turn: its time of rest may be rounded to before its end.
+         if (.not. start * end < 0.0_wp) self%turn = huge(1.0_wp)
+      end associate
+   end subroutine take_part
 
    !> Turn round within a part.
    subroutine turn_round(self, time)
@@ -233,10 +245,7 @@ contains
       self%rate = rate
       self%acceleration = acceleration
       self%turn = huge(1.0_wp)
-      ! A ramp to rest does not turn: its time of rest may be rounded to before its end.
-      if (rate * acceleration < 0.0_wp .and. rate * self%end_rate(self%part) < 0.0_wp) then
-         self%turn = time - rate / acceleration
-      end if
+      if (rate * acceleration < 0.0_wp) self%turn = time - rate / acceleration
       if (abs(rate) > 0.0_wp) then
          self%direction = sign(1.0_wp, rate)
       else if (abs(acceleration) > 0.0_wp) then

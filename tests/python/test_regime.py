@@ -16,6 +16,7 @@ from mesoslip.analysis.regime import (
     SMOOTH,
     STICK_SLIP,
     TRANSIENT,
+    Scales,
     classify,
 )
 
@@ -45,7 +46,8 @@ def sawtooth(periods, falls):
 
 def result(config, force, velocity=None):
     velocity = np.full(len(TIME), 1e-7) if velocity is None else velocity
-    return classify(config, TIME, force, velocity, np.empty(0), np.empty(0))
+    scales = Scales.of_config(config, TIME[-1])
+    return classify(scales, TIME, force, velocity, np.empty(0), np.empty(0))
 
 
 def test_noise_of_steady_contacts_is_smooth(klein):
@@ -103,7 +105,8 @@ def test_a_run_that_ends_too_soon_is_transient(klein):
     # The drive has not moved by a breaking stretch.
     slow = klein(drive__velocity=1e-9)
     assert result(slow, np.full(len(TIME), 1e-5)).regime == TRANSIENT
-    assert classify(slow, *np.empty((3, 0)), np.empty(0), np.empty(0)).regime == TRANSIENT
+    scales = Scales.of_config(slow, 0.0)
+    assert classify(scales, *np.empty((3, 0)), np.empty(0), np.empty(0)).regime == TRANSIENT
 
 
 def test_the_rebound_of_a_slip_is_no_cycle(klein):

@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
-from mesoslip.configuration.config import Config
 from mesoslip.configuration.drive import DrivePart
-from mesoslip.errors import ConfigError, FileError
+from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 
 Array = NDArray[np.float64]
@@ -107,18 +107,21 @@ def _is_uniform(parts: Sequence[DrivePart]) -> bool:
 
 
 class Experiment:
-    """An output of a run, analysed like the record of an experiment.
+    """An output of a run or a measured trace, analysed like the record of an experiment.
 
     Attributes
     ----------
+    apparatus
+        What is known of the apparatus.
     config
-        Configuration of the run.
+        Configuration of the run; None for a measured trace without one.
     name
         Name in messages and pictures.
     time
         Times of the samples available in all realizations [s], shape (samples,).
     force, displacement
-        Force of the spring [N], and displacement of the slider [m], shape (realizations, samples).
+        Force of the spring, in the unit of the apparatus, and displacement of the slider [m],
+        shape (realizations, samples).
     drive
         Displacement of the load point [m], shape (samples,).
     stages
@@ -127,20 +130,13 @@ class Experiment:
     Raises
     ------
     FileError
-        If it is not the output of a run, or the drive is a force.
+        If it has no force, or its drive is unknown or a force.
     """
 
     def __init__(self, tree: xr.DataTree, name: str = "the output") -> None:
-        if "spring_force" not in tree.data_vars:
-            raise FileError(f"{name}: not an output of mesoslip run")
-        try:
-            self.config = Config.from_toml(tree.attrs["configuration"])
-        except ConfigError:
-            raise FileError(
-                f"{name}: has no configuration of a run; the velocities and holds of the drive and "
-                "the stiffness of the spring are unknown"
-            ) from None
-        if self.config.drive.force_rate is not None:
+        self.apparatus = apparatus_of(tree, name)
+        self.config = self.apparatus.config
+        if self.config is not None and self.config.drive.force_rate is not None:
             raise FileError(
                 f"{name}: is driven by a force (drive.force_rate); steady forces, velocity steps "
                 "and holds need a drive with velocities"
@@ -148,40 +144,70 @@ class Experiment:
         self.name = name
         self.tree = tree
         root = tree.to_dataset()
-        force = root["spring_force"].values
+        force = root[self.apparatus.force_name].values
         whole = np.isfinite(force).all(axis=0)
         count = int(np.argmin(whole)) if not whole.all() else whole.size
         if count == 0:
             raise FileError(f"{name}: has no sample common to all realizations")
         self.time: Array = root["time"].values[:count]
         self.force: Array = force[:, :count]
-        self.displacement: Array = root["displacement"].values[:, :count]
-        self.drive: Array = root["drive_displacement"].values[0, :count]
+        self.drive: Array = self._drive(root)[:count]
+        self.displacement: Array = self._displacement(root, count)
         self.stages = self._stages()
+
+    def _drive(self, root: xr.Dataset) -> Array:
+        """Displacement of the load point [m]; of a measured trace without one that of a constant
+        velocity."""
+        if "drive_displacement" in root:
+            drive: Array = root["drive_displacement"].values[0]
+            if np.isfinite(drive).any():
+                return drive
+        if not math.isfinite(self.apparatus.velocity):
+            raise FileError(
+                f"{self.name}: neither the load point nor its velocity is known; read the trace "
+                "again with a column of the load point, or with --velocity '42 um/s'"
+            )
+        time = root["time"].values
+        elapsed: Array = time - time[0]
+        return self.apparatus.velocity * elapsed
+
+    def _displacement(self, root: xr.Dataset, count: int) -> Array:
+        """Displacement of the slider [m]: recorded, or the load point less the stretch of the
+        spring, or that of the load point if the stiffness is unknown."""
+        if "displacement" in root:
+            displacement: Array = root["displacement"].values[:, :count]
+            if np.isfinite(displacement).any():
+                return displacement
+        stretch = self.force / self.stiffness if math.isfinite(self.stiffness) else 0.0
+        return self.drive - stretch + np.zeros_like(self.force)
 
     @property
     def static_force(self) -> float:
-        """F_s [N]."""
-        return self.config.contacts.static_force
+        """F_s of the configuration, in the unit of the force; NaN without one."""
+        return math.nan if self.config is None else self.config.contacts.static_force
 
     @property
     def stiffness(self) -> float:
-        """K [N/m]; infinite for a prescribed slider."""
-        return self.config.spring_stiffness
+        """K, unit of the force per metre; infinite for a prescribed slider, NaN if unknown."""
+        return self.apparatus.stiffness
 
     @property
     def peak_window(self) -> float:
         """Displacement of the slider after a change of the drive in which its peak is searched
-        [m]."""
+        [m]; infinite without a configuration, so that the whole stage is searched."""
+        if self.config is None:
+            return math.inf
         return PEAK_STRETCHES * self.config.contacts.break_stretch
 
     def _stages(self) -> tuple[Stage, ...]:
         last = float(self.time[-1])
-        found = (
-            self._recorded_stages()
-            if "stages" in self.tree.children
-            else self._configured_stages(last)
-        )
+        if "stages" in self.tree.children:
+            found = self._recorded_stages()
+        elif self.config is not None:
+            found = self._configured_stages(last)
+        else:
+            velocity = self.apparatus.velocity
+            found = [Stage(0, float(self.time[0]), last, velocity, velocity, True, {})]
         return tuple(one for one in found if one.start < last and one.duration > 0)
 
     def _configured_stages(self, last: float) -> list[Stage]:
@@ -197,7 +223,7 @@ class Experiment:
     def _parts(self) -> dict[int, list[DrivePart]]:
         """Parts of the drive by stage number."""
         parts: dict[int, list[DrivePart]] = {}
-        for one in self.config.drive_parts:
+        for one in self.config.drive_parts if self.config is not None else ():
             parts.setdefault(one.stage, []).append(one)
         return parts
 
@@ -260,7 +286,7 @@ class Experiment:
         The sum of the force drops over the loading by the drive, K v t; 1 for perfect stick-slip.
         """
         stiffness = self.stiffness
-        if not stage.is_steady or math.isinf(stiffness) or "slips" not in self.tree.children:
+        if not stage.is_steady or not math.isfinite(stiffness) or "slips" not in self.tree.children:
             return 0.0
         mean = self.mean_of(stage)
         first = self.samples(stage).start + (0 if mean is None else mean.start)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.cycles import (
     MAX_PATTERN,
     MIN_CYCLES,
@@ -27,8 +28,10 @@ from mesoslip.analysis.cycles import (
     trend,
     variation,
 )
+from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
+from mesoslip.analysis.sampled_slips import noise_level
 from mesoslip.configuration.config import Config
-from mesoslip.output.access import config_of, group_of
+from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.results import RunResults
 from mesoslip.output.variables import Group, Meaning
@@ -47,6 +50,9 @@ NAMES = ("smooth", "stick_slip", "irregular", "transient")
 # force times N^(-1/2), the noise of N contacts in steady sliding (0.6 N^(-1/2)) with a margin.
 SMOOTH_AMPLITUDE = 0.02
 NOISE_AMPLITUDE = 0.8
+# The same for the noise of a measured trace, over its standard deviation: the percentiles of normal
+# noise lie at 1.64 of it.
+MEASURED_NOISE_AMPLITUDE = 2.2
 # Percentiles of the force; the amplitude is half their distance.
 LOW, HIGH = 5.0, 95.0
 # Minimum mean force that amplitudes are divided by, over the static force.
@@ -170,7 +176,88 @@ class _Stage:
 
     @property
     def direction(self) -> float:
-        return math.copysign(1.0, self.velocity)
+        return -1.0 if self.velocity < 0 else 1.0
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a motion is compared with.
+
+    Attributes
+    ----------
+    stage
+        The evaluated stage of the drive.
+    static_force
+        Static force, in the unit of the force.
+    noise_amplitude
+        Amplitude that noise gives to smooth sliding, in the unit of the force.
+    renewal_displacement
+        Displacement of the drive in which all contacts break [m]; 0 if unknown.
+    is_rigid
+        Whether the slider moves as the drive, so that it neither sticks nor slips.
+    has_velocity
+        Whether the drive has a velocity with which that of the slider can be compared.
+    """
+
+    stage: _Stage
+    static_force: float
+    noise_amplitude: float
+    renewal_displacement: float
+    is_rigid: bool
+    has_velocity: bool
+
+    @classmethod
+    def of_config(cls, config: Config, reached: float) -> Scales:
+        """Those of a configuration.
+
+        Parameters
+        ----------
+        config
+            The configuration.
+        reached
+            Time that the run reached [s].
+        """
+        static = config.contacts.static_force
+        noise = 0.0
+        if config.contact_kind.is_discrete:
+            noise = NOISE_AMPLITUDE * static / math.sqrt(config.contacts.count)
+        return cls(
+            _stage(config, reached),
+            static,
+            noise,
+            config.contacts.break_stretch,
+            math.isinf(config.spring_stiffness),
+            config.drive.force_rate is None,
+        )
+
+    @classmethod
+    def of_measurement(
+        cls, apparatus: Apparatus, stage: _Stage, force: Array, noise: float
+    ) -> Scales:
+        """Those of a measured trace without a configuration.
+
+        The static force is the maximum of the force; which displacement renews the contacts is
+        unknown.
+
+        Parameters
+        ----------
+        apparatus
+            The apparatus.
+        stage
+            The evaluated stage.
+        force
+            The evaluated force.
+        noise
+            Standard deviation of the noise of the force.
+        """
+        return cls(
+            stage,
+            float(np.max(np.abs(force), initial=0.0)),
+            MEASURED_NOISE_AMPLITUDE * noise,
+            0.0,
+            math.isinf(apparatus.stiffness),
+            math.isfinite(stage.velocity),
+        )
 
 
 def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
@@ -179,7 +266,7 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     Parameters
     ----------
     tree
-        Output of a run, or a measured trace with the configuration of the experiment.
+        Output of a run, or a measured trace.
     name
         Name in messages.
 
@@ -192,35 +279,18 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     Raises
     ------
     FileError
-        If it has no configuration of a run.
+        If it has no force, or it is a run without its configuration.
     """
     import xarray as xr
 
-    root, slips = tree.to_dataset(), group_of(tree, "slips")
-    config = config_of(tree, name)
-    time = root["time"].values
-    owner = slips["realization_index"].values
-    starts, drops = slips["start_time"].values, slips["force_drop"].values
+    root = tree.to_dataset()
+    apparatus = apparatus_of(tree, name)
+    owner, starts, drops = _slips(tree)
     results = []
     for number in range(root.sizes["realization"]):
-        one = root.isel(realization=number)
-        # Samples after the end of an interrupted run are missing.
-        reached = int(np.sum(np.isfinite(one["spring_force"].values)))
-        stage = _stage(config, float(time[reached - 1]) if reached else 0.0)
-        first = int(np.searchsorted(time[:reached], stage.middle))
-        last = int(np.searchsorted(time[:reached], stage.end, side="right"))
-        inside = slice(first, last, _step(last - first))
         mine = owner == number
-        results.append(
-            classify(
-                config,
-                time[inside],
-                one["spring_force"][inside].values,
-                one["velocity"][inside].values,
-                starts[mine],
-                drops[mine],
-            )
-        )
+        window = _window(root.isel(realization=number), apparatus, tree)
+        results.append(classify(*window, starts[mine], drops[mine]))
     variables = {
         name: REGIME.variable(
             name,
@@ -233,13 +303,61 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     return xr.Dataset(variables, {"realization": root["realization"]})
 
 
+def _slips(tree: xr.DataTree) -> tuple[Array, Array, Array]:
+    """Realization, start [s] and force drop of each slip; none without a catalogue."""
+    if "slips" not in tree.children:
+        return np.empty(0), np.empty(0), np.empty(0)
+    data = group_of(tree, "slips")
+    return (
+        data["realization_index"].values,
+        data["start_time"].values,
+        data["force_drop"].values,
+    )
+
+
+def _window(
+    one: xr.Dataset, apparatus: Apparatus, tree: xr.DataTree
+) -> tuple[Scales, Array, Array, Array]:
+    """What a realization is compared with; time, force and velocity in its evaluated window."""
+    time, force = one["time"].values, one[apparatus.force_name].values
+    # Samples after the end of an interrupted run are missing.
+    reached = int(np.sum(np.isfinite(force)))
+    last_time = float(time[reached - 1]) if reached else 0.0
+    config = apparatus.config
+    stage = _stage(config, last_time) if config else _measured_stage(tree, apparatus, last_time)
+    first = int(np.searchsorted(time[:reached], stage.middle))
+    last = int(np.searchsorted(time[:reached], stage.end, side="right"))
+    inside = slice(first, last, _step(last - first))
+    velocity = np.full(len(time[inside]), np.nan)
+    if "velocity" in one:
+        velocity = one["velocity"][inside].values
+    time, force = time[inside], force[inside]
+    if config is not None:
+        return Scales.of_config(config, last_time), time, force, velocity
+    time, force, velocity = _even(time, force, velocity)
+    scales = Scales.of_measurement(apparatus, stage, force, noise_level(force))
+    return scales, time, force, velocity
+
+
+def _even(time: Array, *values: Array) -> tuple[Array, ...]:
+    """Times and values at equal intervals: several sampling rates would weight the statistics."""
+    if len(time) < 2 * MIN_CYCLES:
+        return time, *values
+    steps = np.diff(time)
+    count = min(MAX_SAMPLES, 1 + round((time[-1] - time[0]) / float(np.median(steps))))
+    if np.ptp(steps) <= INTERVAL_TOLERANCE * steps.max():
+        return time, *values
+    even = np.linspace(time[0], time[-1], count)
+    return even, *(np.interp(even, time, one) for one in values)
+
+
 def regime(output: OutputLike) -> xr.Dataset:
     """The regime of each realization of an output: smooth, stick-slip, irregular, or transient.
 
     Parameters
     ----------
     output
-        Output of a run, or a measured trace with the configuration of the experiment.
+        Output of a run, or a measured trace.
 
     Returns
     -------
@@ -250,7 +368,7 @@ def regime(output: OutputLike) -> xr.Dataset:
     Raises
     ------
     FileError
-        If the output cannot be read, or has no configuration of a run.
+        If the output cannot be read, or is neither of a run nor a measured trace.
     """
     with opened_run(output) as (tree, name):
         return regimes(tree, name)
@@ -263,7 +381,8 @@ def regimes_of_results(results: RunResults) -> Iterator[RegimeResult]:
     slip_index = {name: number for number, name in enumerate(SLIP_COLUMNS)}
     for one in results.realizations:
         rows = one.rows("trace")
-        stage = _stage(results.config, one.time)
+        scales = Scales.of_config(results.config, one.time)
+        stage = scales.stage
         step = _step(len(rows))
         blocks, start = [np.empty((0, len(wanted)))], 0
         for block in rows.blocks(MAX_SAMPLES):
@@ -276,9 +395,7 @@ def regimes_of_results(results: RunResults) -> Iterator[RegimeResult]:
             [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
         )
         drops = slips[:, slip_index["force_before"]] - slips[:, slip_index["force_after"]]
-        yield classify(
-            results.config, time, force, velocity, slips[:, slip_index["start_time"]], drops
-        )
+        yield classify(scales, time, force, velocity, slips[:, slip_index["start_time"]], drops)
 
 
 def results_of(data: xr.Dataset) -> list[RegimeResult]:
@@ -299,31 +416,29 @@ def summary(results: list[RegimeResult]) -> str:
 
 
 def classify(
-    config: Config, time: Array, force: Array, velocity: Array, starts: Array, drops: Array
+    scales: Scales, time: Array, force: Array, velocity: Array, starts: Array, drops: Array
 ) -> RegimeResult:
     """The regime of a motion.
 
     Parameters
     ----------
-    config
-        The configuration.
+    scales
+        What it is compared with.
     time, force, velocity
-        The evaluated window of the trace: time [s], spring force [N], velocity of the slider [m/s].
+        The evaluated window of the trace: time [s], force, velocity of the slider [m/s], NaN if it
+        is unknown.
     starts, drops
-        Starts [s] of the slips of the realization, and their force drops [N].
+        Starts [s] of the slips of the realization, and their force drops.
     """
     if len(time) < 2 * MIN_CYCLES:
         return RegimeResult()
-    stage = _stage(config, float(time[-1]))
+    stage = scales.stage
     force, velocity = stage.direction * force, stage.direction * velocity
-    static = config.contacts.static_force
     is_inside = (starts >= time[0]) & (starts <= time[-1])
     starts, drops = starts[is_inside], np.abs(drops[is_inside])
     mean = float(np.mean(force))
-    scale = max(abs(mean), MIN_MEAN * static)
-    smooth = SMOOTH_AMPLITUDE * scale
-    if config.contact_kind.is_discrete:
-        smooth += NOISE_AMPLITUDE * static / math.sqrt(config.contacts.count)
+    scale = max(abs(mean), MIN_MEAN * scales.static_force)
+    smooth = SMOOTH_AMPLITUDE * scale + scales.noise_amplitude
     low, high = np.percentile(force, [LOW, HIGH])
     amplitude = float(high - low) / 2
     half = len(force) // 2
@@ -356,21 +471,24 @@ def classify(
         "amplitude_change": change,
         "amplitude_change_error": error,
         "drift": float(np.mean(force[half:]) - np.mean(force[:half])) / scale,
-        "fast_share": float(np.mean(velocity > abs(stage.velocity))),
-        "stick_share": float(np.mean(velocity < STICKING * abs(stage.velocity))),
+        "fast_share": math.nan,
+        "stick_share": math.nan,
         "slips": len(starts),
         "window_start": float(time[0]),
         "window_end": float(time[-1]),
     }
-    if config.drive.force_rate is not None:
-        # The drive has no velocity.
-        numbers |= {"fast_share": math.nan, "stick_share": math.nan}
+    if not scales.has_velocity:
         moved = math.inf
-    is_renewed = moved >= config.contacts.break_stretch
+    elif np.isfinite(velocity).all():
+        numbers |= {
+            "fast_share": float(np.mean(velocity > abs(stage.velocity))),
+            "stick_share": float(np.mean(velocity < STICKING * abs(stage.velocity))),
+        }
+    is_renewed = moved >= scales.renewal_displacement
     result = RegimeResult(**numbers)  # type: ignore[arg-type]
     regime = _regime(result, [one / scale for one in halves], is_renewed=is_renewed)
     # A prescribed slider neither sticks nor slips.
-    if math.isinf(config.spring_stiffness) and regime in {STICK_SLIP, IRREGULAR}:
+    if scales.is_rigid and regime in {STICK_SLIP, IRREGULAR}:
         regime = SMOOTH
     return replace(result, regime=regime)
 
@@ -408,6 +526,20 @@ def _stage(config: Config, reached: float) -> _Stage:
         if velocity != 0:
             found = _Stage(begin, end, velocity)
         begin = end
+    return found
+
+
+def _measured_stage(tree: xr.DataTree, apparatus: Apparatus, reached: float) -> _Stage:
+    """The last stage of a measured trace in which the drive moves; the whole trace without one."""
+    start = float(tree.to_dataset()["time"].values[0])
+    found = _Stage(start, reached, apparatus.velocity)
+    if "stages" not in tree.children:
+        return found
+    data = group_of(tree, "stages")
+    columns = ("stage_start_time", "stage_end_time", "drive_start_velocity", "drive_end_velocity")
+    for begin, end, first, last in zip(*(data[name].values for name in columns), strict=True):
+        if begin < reached and (last or first):
+            found = _Stage(float(begin), min(float(end), reached), float(last or first))
     return found
 
 

@@ -194,6 +194,8 @@ def _averaged(start: Array, end: Array, length: float) -> Array:
 
 def record_of(experiment: Experiment) -> Record | str:
     """The record of an output from its first steady sliding on, or why no law can be fitted."""
+    if experiment.config is None:
+        return "no configuration: a scale of D_c and the noise of the contacts are unknown"
     stages = experiment.stages
     sliding = [index for index, one in enumerate(stages[:-1]) if one.is_steady]
     if not sliding:
@@ -254,7 +256,7 @@ def noise_of(experiment: Experiment, stages: Sequence[Stage]) -> Noise:
 
     The master equation has no noise.
     """
-    if not experiment.config.contact_kind.is_discrete:
+    if experiment.config is not None and not experiment.config.contact_kind.is_discrete:
         return Noise(0.0, 0.0)
     interval = float(np.median(np.diff(experiment.time)))
     squares, lengths = [], []

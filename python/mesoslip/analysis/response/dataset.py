@@ -124,7 +124,8 @@ def response_of(
         ),
         "rate_and_state": (_dataset(FIT, "fit", fits), FIT),
     }
-    static = {one.static_force for one in experiments}
+    # Unknown without a configuration.
+    static = {one.static_force for one in experiments if not math.isnan(one.static_force)}
     groups = {}
     for name, (data, group) in parts.items():
         if normal_force is not None:

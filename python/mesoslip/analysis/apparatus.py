@@ -1,0 +1,141 @@
+"""What is known of the apparatus behind an output: its force, spring, period and drive.
+
+A run knows its whole configuration. A measured trace may know no more than a friction coefficient
+and the displacement of a load point.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mesoslip.analysis.even_traces import first_velocity
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.units import to_si
+from mesoslip.errors import ConfigError, FileError
+from mesoslip.output.access import group_of, is_measured
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Variables that hold the force of an output, the first that is there, and their units.
+FORCES = {"spring_force": "N", "friction_coefficient": "1"}
+# Units of the stiffness that belong to them, with examples.
+STIFFNESSES = {"N": ("N/m", "97 N/m"), "1": ("1/m", "1.6e-3 1/um")}
+
+
+@dataclass(frozen=True)
+class Apparatus:
+    """What is known of an apparatus.
+
+    Attributes
+    ----------
+    force_name
+        Variable of the output with the force: "spring_force" or "friction_coefficient".
+    force_unit
+        Its unit, "N" or "1".
+    stiffness
+        Stiffness of the spring, unit of the force per metre; infinite for a prescribed slider, NaN
+        if unknown.
+    period
+        Period of the setup [s]; NaN if it is unknown or the slider has no inertia.
+    velocity
+        First velocity of the drive that is not 0 [m/s]; NaN if unknown, 0 without a drive. Of a
+        drive by force: its rate [N/s].
+    direction
+        Sign of the velocity, +1 if unknown.
+    config
+        The configuration of a run or of the whole experiment; None if it is not known.
+    """
+
+    force_name: str
+    force_unit: str
+    stiffness: float
+    period: float
+    velocity: float
+    config: Config | None
+
+    @property
+    def direction(self) -> float:
+        """Sign of the velocity of the drive, +1 if it is unknown or 0."""
+        return -1.0 if self.velocity < 0 else 1.0
+
+
+def apparatus_of(tree: xr.DataTree, name: str = "the output") -> Apparatus:
+    """What an output says about its apparatus.
+
+    Parameters
+    ----------
+    tree
+        Output of a run, or a measured trace.
+    name
+        Name in messages.
+
+    Raises
+    ------
+    FileError
+        If it has no force, or it is a run and its configuration is not one.
+    """
+    force = next((one for one in FORCES if one in tree.data_vars), None)
+    if force is None:
+        raise FileError(f"{name}: is neither the output of a run nor a measured trace")
+    unit = FORCES[force]
+    config = _config(tree, name)
+    if config is not None:
+        quiet = config.slider.quiet_time
+        return Apparatus(
+            force,
+            unit,
+            config.spring_stiffness,
+            2 * quiet if quiet > 0 else math.nan,
+            first_velocity(config),
+            config,
+        )
+    known = tomllib.loads(tree.attrs.get("configuration", ""))
+    stiffness = _known(known, ("slider", "stiffness"), *STIFFNESSES[unit])
+    velocity = _known(known, ("drive", "velocity"), "m/s", "42 um/s")
+    if math.isnan(velocity):
+        velocity = _driven_velocity(tree)
+    given = tree.attrs.get("setup_period_origin") == "given"
+    period = float(tree.attrs["setup_period"]) if given else math.nan
+    return Apparatus(force, unit, stiffness, period, velocity, None)
+
+
+def _config(tree: xr.DataTree, name: str) -> Config | None:
+    """The whole configuration; None for a measured trace with a part of it."""
+    try:
+        return Config.from_toml(tree.attrs["configuration"])
+    except (ConfigError, KeyError):
+        if is_measured(tree):
+            return None
+        raise FileError(f"{name}: has no configuration of a run") from None
+
+
+def _known(tables: dict[str, Any], key: tuple[str, str], unit: str, example: str) -> float:
+    """A key of the known part of a configuration in SI; NaN without it."""
+    value = tables.get(key[0], {}).get(key[1])
+    if value is None:
+        return math.nan
+    return float(value) if isinstance(value, int | float) else to_si(value, unit, example)
+
+
+def _driven_velocity(tree: xr.DataTree) -> float:
+    """First velocity of the recorded stages that is not 0, or the mean one of the load point."""
+    if "stages" in tree.children:
+        data = group_of(tree, "stages")
+        both = [data[f"drive_{one}_velocity"].values for one in ("start", "end")]
+        moving = np.stack(both, axis=1).ravel()
+        moving = moving[np.isfinite(moving) & (moving != 0)]
+        return float(moving[0]) if moving.size else 0.0
+    if "drive_displacement" in tree.data_vars:
+        root = tree.to_dataset()
+        drive, time = np.atleast_2d(root["drive_displacement"].values)[0], root["time"].values
+        known = np.flatnonzero(np.isfinite(drive))
+        if known.size > 1:
+            first, last = known[0], known[-1]
+            return float((drive[last] - drive[first]) / (time[last] - time[first]))
+    return math.nan

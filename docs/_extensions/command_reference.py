@@ -25,6 +25,8 @@ def command_page() -> str:
     group: Any = typer.main.get_command(app)
     parts = [INTRODUCTION]
     for name, command in group.commands.items():
+        # Help that is made when it is asked for.
+        getattr(command, "complete_help", lambda: None)()
         parts += [f"## {name}", "", _usage(name, command), "", _help(command), ""]
         parts += [*_rows(command), ""]
     return "\n".join(parts)

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -318,6 +319,40 @@ def test_a_drive_that_the_run_cuts_is_reported(short, tmp_path, command):
     assert printed in command("info", stages, *cut)[1]
     assert f"warning: {printed}" in command("run", stages, *cut, "-o", tmp_path / "cut.nc")[2]
     assert "ends the run" not in command("info", stages, "--set", "run.duration=6 s")[1]
+
+
+def test_an_ending_that_is_not_reached_is_reported(short, tmp_path, command):
+    """The drive moves 0.22 µm, and the spring holds 0.19 µm at most: 1 mm is out of reach."""
+    far = ("--set", "run.stop.displacement=1 mm", "-o", tmp_path / "far.nc")
+    printed = command("run", short, *far)[2]
+    assert re.search(r"before run.stop.displacement was reached: .* of 1 mm", printed)
+    assert "out of reach: the drive moves" in command("info", short, *far[:2])[1]
+    near = ("--set", "run.stop.displacement=5 nm", "-o", tmp_path / "near.nc")
+    printed = command("run", short, *near)[2]
+    assert "displacement of the slider reached" in printed
+    assert "warning" not in printed
+    assert "out of reach" not in command("info", short, *near[:2])[1]
+    many = ("--set", "run.stop.slips=9", "--set", "run.realizations=2", "-o", tmp_path / "many.nc")
+    printed = command("run", short, *many)[2]
+    assert "the drive ended before run.stop.slips was reached in 2 realizations" in printed
+
+
+def test_printed_digits_are_those_that_a_number_deserves(short, command):
+    """Four of what follows from keys; of a curve as many as its error leaves; two of errors."""
+    lines = {line.split()[0]: line.split() for line in command("info", short)[1].splitlines()}
+    assert lines["omega_s"][1:3] == ["256.9", "1/s"]
+    rough = ("--set", "contacts.threshold.law=uniform")
+    lines = {
+        line.split()[0]: line.split() for line in command("curve", short, *rough)[1].splitlines()
+    }
+    assert len(lines["K_star"][1].replace(".", "")) <= 4
+    assert re.fullmatch(r"\d(\.\d)?e-\d+", lines["error"][1])
+
+
+def test_help_lists_the_views(command):
+    printed = " ".join(command("plot", "--help")[1].split())
+    for part in ("Of a run: run (force, velocity", "steady forces, velocity steps", "of a measure"):
+        assert part in printed
 
 
 def test_whole_numbers_may_have_an_exponent(short, command):

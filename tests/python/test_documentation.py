@@ -25,6 +25,7 @@ from mesoslip import Config
 from mesoslip.campaign.plan import Plan
 from mesoslip.command_line.main import app
 from mesoslip.inference.plan import Plan as FitPlan
+from mesoslip.plots.views import VIEWS
 
 DOCS = ROOT / "docs"
 PAGES = [
@@ -216,6 +217,8 @@ def test_sentences_that_a_page_quotes_are_printed(command):
     text = (DOCS / "how-to" / "which-motion.md").read_text(encoding="utf-8")
     quoted = re.findall(r"^> .*(?:\n> .*)*", text, re.MULTILINE)
     sentences = [" ".join(one.replace("\n>", "").removeprefix("> ").split()) for one in quoted]
+    (table,) = re.findall(r"^```text\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    sentences.append(table)
     assert len(sentences) == 2
     printed = "".join(command(name, "klein.toml")[1] for name in ("info", "curve"))
     for sentence in sentences:
@@ -271,6 +274,10 @@ def test_every_command_and_variable_is_in_the_reference():
         for one in parser.params:
             label = one.opts[-1] if one.param_type_name == "option" else ""
             assert label in commands
+    # The views are listed by the views themselves.
+    for view in VIEWS:
+        if view.kind == "run":
+            assert view.summary in commands
     outputs = output_page()
     groups = [one for one in vars(variables).values() if isinstance(one, variables.Group)]
     for name in {name for group in groups for name in group}:

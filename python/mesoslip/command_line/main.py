@@ -77,7 +77,7 @@ def _common(
 
 
 for _command in COMMANDS:
-    app.command()(_command)
+    app.command(cls=pictures.PlotCommand if _command is pictures.plot else None)(_command)
 
 
 def main() -> None:

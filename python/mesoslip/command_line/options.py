@@ -93,8 +93,10 @@ def show(
     unit: str,
     meaning: str,
     error: float | bool | None = None,
+    digits: int = 6,
 ) -> None:
-    """A line for a quantity in SI, in a suitable unit, with its error if that is known."""
+    """A line for a quantity in SI, in a suitable unit, with its error if that is known; without one
+    the number has as many significant digits as ``digits`` states."""
     from mesoslip.quantities import with_error, with_unit
 
     if isinstance(value, bool) or value is None:
@@ -102,9 +104,9 @@ def show(
     elif math.isnan(value):
         shown = "unknown"
     elif error:
-        shown = with_error(value, error, unit, 6)
+        shown = with_error(value, error, unit, digits)
     else:
-        shown = with_unit(value, unit, 6)
+        shown = with_unit(value, unit, digits)
     typer.echo(f"{name:22} {shown:20} {meaning}")
 
 

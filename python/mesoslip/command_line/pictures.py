@@ -5,11 +5,31 @@ from __future__ import annotations
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperOption
 
 from mesoslip.command_line.options import OutputsArgument, time_of
+
+VIEW_HELP = "What to draw; each kind of output has a default"
+
+
+class PlotCommand(TyperCommand):
+    """The command, whose help lists the views; they are imported only for that."""
+
+    def complete_help(self) -> None:
+        """Add the views to the help of ``--view``."""
+        from mesoslip.plots.views import summary_of_views
+
+        for option in self.params:
+            if isinstance(option, TyperOption) and option.name == "view":
+                option.help = f"{VIEW_HELP}. {summary_of_views()}"
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        self.complete_help()
+        super().format_help(ctx, formatter)
 
 
 class Against(StrEnum):
@@ -34,9 +54,7 @@ def plot(
     view: Annotated[
         str | None,
         typer.Option(
-            help="Of a run: run, what happened; avalanches, their sizes; lattice, the contacts on "
-            "it; layers, waves in an elastic slider; response, steady forces, steps and holds. Of "
-            "a sweep: a measure",
+            help=VIEW_HELP,
             metavar="VIEW",
         ),
     ] = None,

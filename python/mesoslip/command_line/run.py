@@ -168,5 +168,34 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
         say(f"{path}: warning: {known['audit']}")
     if config.unreached_drive is not None:
         say(f"{path}: warning: {config.unreached_drive}")
+    unreached = _unreached_conditions(results, config)
+    if unreached:
+        say(f"{path}: warning: {unreached}")
     if known["ending"] != ENDINGS["drive"]:
         say(f"{path}: end of the run: {known['ending']}")
+
+
+def _unreached_conditions(results: Results, config: Config) -> str:
+    """A message about conditions that should have ended the run before its drive did; empty if
+    one of them did in every realization."""
+    from mesoslip.quantities import with_unit
+    from mesoslip.simulation.realization import ENDINGS
+
+    stops = config.run.stops
+    given = {
+        "run.avalanches": config.run.avalanches,
+        "run.stop.slips": stops.slips,
+        "run.stop.displacement": stops.displacement,
+        "run.stop.steady": stops.steady,
+    }
+    names = [name for name, value in given.items() if value is not None]
+    cut = [one for one in results.realizations if one.ending == ENDINGS["drive"]]
+    if not names or not cut:
+        return ""
+    where = "" if len(results.realizations) == 1 else f" in {counted(len(cut), 'realization')}"
+    message = f"the drive ended before {' or '.join(names)} was reached{where}"
+    if stops.displacement is None:
+        return message
+    largest = max((one.displacement for one in cut), key=abs)
+    target = with_unit(stops.displacement, "m")
+    return f"{message}: the slider was at {with_unit(largest, 'm')} of {target}"

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import PoolOption, SchedulerOption, SetOption, executor_of
+from mesoslip.command_line.options import (
+    PoolOption,
+    SchedulerOption,
+    SetOption,
+    counted,
+    executor_of,
+)
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.errors import WriteError
 from mesoslip.execution.stop import Stop, stopped_by_signals
@@ -76,7 +82,7 @@ def sweep(
         except WriteError as error:
             kept = len(store.names())
             raise WriteError(
-                f"{error}; {kept} points are stored: the same command continues"
+                f"{error}; {counted(kept, 'point')} stored: the same command continues"
             ) from error
         status = _write(done, path, stop)
     _report(done, path, quiet)
@@ -112,7 +118,8 @@ def _report(done: Sweep, path: Path, quiet: bool) -> None:
         )
     if not quiet and done.complete:
         failed = f", {len(done.failures)} failed" if done.failures else ""
-        say(f"{path}: {done.computed} points computed, {done.stored} read from the store{failed}")
+        computed = counted(done.computed, "point")
+        say(f"{path}: {computed} computed, {done.stored} read from the store{failed}")
 
 
 def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
@@ -127,7 +134,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
         + [f"{plan.realizations} realization{'s' * (plan.realizations > 1)}"]
     )
     typer.echo(f"points   {expected.points} ({axes}), {expected.stored} of them done")
-    typer.echo(f"time     about {_duration(expected.seconds)} with {count} workers")
+    typer.echo(f"time     about {_duration(expected.seconds)} with {counted(count, 'worker')}")
     typer.echo(f"memory   about {expected.memory_bytes / 1e6:.0f} MB")
     typer.echo(f"disk     about {expected.disk_bytes / 1e6:.1f} MB")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,17 @@ from mesoslip.command_line.options import (
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
+    from mesoslip.theory.force_curve import ForceCurve
+
+# Significant digits of what follows from keys, which have two to four themselves; of what is
+# computed, if its error allows; and of errors. `--json` has all digits.
+DERIVED_DIGITS = 4
+COMPUTED_DIGITS = 5
+ERROR_DIGITS = 2
+# Quantities of the slope of a force curve, which has fewer digits than the force.
+OF_SLOPE = frozenset({"K_star", "D2", "D3"})
+
+LIMITS_HEADER = "spring stiffer than"
 
 # Maximum work for the stability of steady sliding, some seconds.
 MAX_WORK = 400_000
@@ -33,8 +45,8 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         print_json({name: one.value for name, one in quantities.items()})
         return
     for name, one in quantities.items():
-        show(name, one.value, one.unit, one.meaning)
-    for message in (verdict(checked), checked.unreached_drive):
+        show(name, one.value, one.unit, one.meaning, digits=DERIVED_DIGITS)
+    for message in (verdict(checked), checked.unreached_drive, checked.unreachable_stop):
         if message is not None:
             typer.echo(message)
 
@@ -51,7 +63,7 @@ def curve(
     """Force curve of the master equation, and its elastic instability."""
     from mesoslip.output import targets, writing
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
-    from mesoslip.theory.steady_sliding import steady_sliding, stiffness_summary
+    from mesoslip.theory.steady_sliding import steady_sliding
 
     checked = load(config, changes)
     if output is not None:
@@ -65,15 +77,12 @@ def curve(
         print_json(summary)
     else:
         for name, value in summary.items():
-            show(name, value, *SUMMARY[name])
+            show(name, value, *SUMMARY[name], digits=_digits(name, force_curve))
         typer.echo(force_curve.verdict)
         sliding = steady_sliding(checked, MAX_WORK)
-        for message in (
-            None if sliding is None else sliding.summary,
-            stiffness_summary(checked, MAX_WORK),
-        ):
-            if message is not None:
-                typer.echo(message)
+        if sliding is not None:
+            typer.echo(sliding.summary)
+        _print_limits(checked, force_curve.K_star[0])
     if force_curve.error > checked.curve.tolerance:
         typer.echo(
             f"the force has {force_curve.digits} digits: its threshold law is not smooth, or too "
@@ -108,8 +117,43 @@ def onset(
         print_json(summary)
         return
     for name, value in summary.items():
-        show(name, value, *slip_onset.SUMMARY[name])
+        show(name, value, *slip_onset.SUMMARY[name], digits=DERIVED_DIGITS)
     typer.echo(tree.attrs["comment"])
+
+
+def _digits(name: str, curve: ForceCurve) -> int:
+    """Significant digits that a quantity of the force curve deserves."""
+    if name.endswith("error"):
+        return ERROR_DIGITS
+    reliable = curve.digits
+    if name in OF_SLOPE:
+        error = curve.slope_error * curve.config.contacts.stiffness
+        steepest = abs(curve.K_star[0])
+        reliable = int(math.log10(steepest / error)) + 1 if 0 < error < steepest else ERROR_DIGITS
+    return max(ERROR_DIGITS, min(COMPUTED_DIGITS, reliable))
+
+
+def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
+    """Print the stiffnesses of the spring above which sliding is stable, in each sense."""
+    from mesoslip.quantities import with_unit
+    from mesoslip.theory.steady_sliding import stiffness_limits
+
+    limits = stiffness_limits(config, MAX_WORK)
+    if limits is None:
+        return
+    speed = with_unit(limits.velocity, "m/s", 3)
+    rows = [
+        (K_star, "slow sliding from this start has no instability (K*)"),
+        (limits.in_step, f"steady sliding at {speed} is linearly stable, with delay"),
+        (limits.out_of_step, "the same for contacts that break out of step"),
+    ]
+    width = len(LIMITS_HEADER)
+    typer.echo(f"{LIMITS_HEADER}  consequence")
+    for stiffness, meaning in rows:
+        if stiffness is not None:
+            typer.echo(f"{with_unit(stiffness, 'N/m', 3):>{width}}  {meaning}")
+    if limits.out_of_step is not None:
+        typer.echo("between the last two an instability may be self-limiting: only a run shows it")
 
 
 def _warn_of_interaction(config: Config) -> None:

@@ -230,6 +230,23 @@ class Config(Table):
         )
 
     @property
+    def unreachable_stop(self) -> str | None:
+        """A message about a displacement that should end the run, but is farther away than the
+        drive and the contacts can move the slider; None if it can be reached."""
+        target = self.run.stops.displacement
+        if target is None or self.drive.force_rate is not None or not self.spring_stiffness:
+            return None
+        length = math.fsum(part.path_length for part in self.drive_parts)
+        # A slip goes beyond the equilibrium of the spring by at most what the spring was stretched.
+        beyond = self.contacts.static_force / self.spring_stiffness
+        if not length + beyond < abs(target):
+            return None
+        return (
+            f"run.stop.displacement = {with_unit(target, 'm')} is out of reach: the drive moves "
+            f"{with_unit(length, 'm')} in the run"
+        )
+
+    @property
     def output_interval(self) -> float:
         """Interval of the trace [s]; a ten-thousandth of the run unless given."""
         return self.output.interval or self.expected_duration / 10000

@@ -189,16 +189,22 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
     yield Quantity(
         "loading_time", loading, "s", "time in which the spring alone loads to F_s, F_s/(K v_d)"
     )
-    yield Quantity("D1", d_1, "1", "v_d (K M)^(1/2)/F_s (S46)")
+    yield Quantity(
+        "D1",
+        d_1,
+        "1",
+        "velocity of the drive over the scale Omega_S F_s/K of slips, v_d (K M)^(1/2)/F_s (S46)",
+    )
     alpha = (6 / d_1) ** (1 / 3)
     yield Quantity(
         "alpha",
         alpha,
         "1",
-        "duration of a slip by sequential breaking times Omega_S, (6/D1)^(1/3)",
+        "duration of a slip in which contacts break one after another (S46), in 1/Omega_S: "
+        "(6/D1)^(1/3)",
     )
     yield Quantity(
-        "slip_time_sequential", alpha / omega_s, "s", "duration of a slip by sequential breaking"
+        "slip_time_sequential", alpha / omega_s, "s", "duration of such a slip, alpha/Omega_S"
     )
     # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
     start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s
@@ -206,7 +212,9 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
         "B",
         start / 2,
         "1",
-        "(D0 - eta D1/Omega_S)/2, the film melting at once, estimate with D0 = 1 - delta",
+        "start of a slip in which the whole film melts at once (S47), where the spring force falls "
+        "by B F_s (Omega_S t)^2: (D0 - eta D1/Omega_S)/2, estimate with D0 = 1 - delta; mesoslip "
+        "onset computes D0",
     )
     if start > 0:
         beta = math.sqrt(2 / start)
@@ -214,9 +222,8 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
             "beta",
             beta,
             "1",
-            "duration of a slip by instant melting times Omega_S, [2/(D0 - eta D1/Omega_S)]^(1/2), "
-            "estimate with D0 = 1 - delta; mesoslip onset computes D0",
+            "duration of such a slip, in 1/Omega_S: B^(-1/2)",
         )
         yield Quantity(
-            "slip_time_melting", beta / omega_s, "s", "duration of a slip by instant melting"
+            "slip_time_melting", beta / omega_s, "s", "duration of such a slip, beta/Omega_S"
         )

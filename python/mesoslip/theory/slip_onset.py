@@ -35,12 +35,17 @@ SUMMARY = {
     "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
     "alpha": (
         "1",
-        "(6/D1)^(1/3), slip time of sequential breaking times Omega_S",
+        "duration of a slip in which contacts break one after another (S46), in 1/Omega_S: "
+        "(6/D1)^(1/3)",
     ),
-    "slip_time_sequential": ("s", "slip time of sequential breaking"),
-    "B": ("1", "(D0 - eta D1/Omega_S)/2: the spring force drops by B tau^2 F_s as the film melts"),
-    "beta": ("1", "B^(-1/2), slip time of instant melting times Omega_S"),
-    "slip_time_melting": ("s", "slip time of instant melting"),
+    "slip_time_sequential": ("s", "duration of such a slip, alpha/Omega_S"),
+    "B": (
+        "1",
+        "start of a slip in which the whole film melts at once (S47), where the spring force falls "
+        "by B F_s (Omega_S t)^2: (D0 - eta D1/Omega_S)/2",
+    ),
+    "beta": ("1", "duration of such a slip, in 1/Omega_S: B^(-1/2)"),
+    "slip_time_melting": ("s", "duration of such a slip, beta/Omega_S"),
     "expansion_end": ("1", "x up to which the expansion S46 describes the contacts"),
     "expansion_end_time": ("1", "tau = Omega_S (t - t_c) at that x"),
 }

@@ -703,9 +703,27 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     return None
 
 
-def stiffness_summary(config: Config, max_work: int) -> str | None:
-    """Range of stable spring stiffnesses in words; None if it takes more than some ten times the
-    work for one stiffness, or there is none."""
+class StiffnessLimits(NamedTuple):
+    """Stiffnesses of the spring above which steady sliding is linearly stable.
+
+    Attributes
+    ----------
+    velocity
+        Velocity of sliding [m/s], that of the drive.
+    in_step
+        With delay [N/m].
+    out_of_step
+        The same for contacts that break out of step [N/m]; None if that is no smaller.
+    """
+
+    velocity: float
+    in_step: float
+    out_of_step: float | None
+
+
+def stiffness_limits(config: Config, max_work: int) -> StiffnessLimits | None:
+    """Stiffnesses above which steady sliding is stable; None if they take more than some ten times
+    the work for one stiffness, or there are none."""
     sliding = steady_sliding(config, max_work // 10)
     if sliding is None or sliding.delay == 0 or not 0 < config.spring_stiffness < math.inf:
         return None
@@ -716,13 +734,6 @@ def stiffness_summary(config: Config, max_work: int) -> str | None:
         return None
     if stable is None:
         return None
-    sentence = (
-        f"steady sliding at {with_unit(sliding.velocity, 'm/s', 3)} is linearly stable with "
-        f"springs stiffer than {with_unit(stable, 'N/m', 3)}"
-    )
-    if out_of_step is None or out_of_step >= stable:
-        return sentence
-    return (
-        f"{sentence}; for contacts that break out of step, stiffer than "
-        f"{with_unit(out_of_step, 'N/m', 3)}. Between the two an instability may be self-limiting"
-    )
+    if out_of_step is not None and out_of_step >= stable:
+        out_of_step = None
+    return StiffnessLimits(sliding.velocity, stable, out_of_step)

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import quantity_or_none
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def _option(help_text: str, example: str, name: str | None = None) -> typer.models.OptionInfo:
+    names = () if name is None else (name,)
+    option: typer.models.OptionInfo = typer.Option(*names, help=help_text, metavar=f"'{example}'")
+    return option
 
 
 def trace(
-    table: Annotated[
+    file: Annotated[
         Path,
         typer.Argument(
-            help="Table with units in its header, such as 'time [s], force [uN]'",
-            metavar="FILE.csv",
+            help="File of the measurement, or an EXPERIMENT.toml that names it", metavar="FILE"
         ),
     ],
     output: Annotated[
@@ -29,7 +35,7 @@ def trace(
         str | None,
         typer.Option(
             "--config",
-            help="Configuration of the experiment, which some commands need",
+            help="Configuration of a model of the experiment, which `fit` needs",
             metavar="CONFIG",
         ),
     ] = None,
@@ -40,63 +46,89 @@ def trace(
             metavar="HEADERS",
         ),
     ] = None,
-    rate: Annotated[
-        str | None, typer.Option(help="Sampling rate, if the table has no times", metavar="1 kHz")
+    decimal: Annotated[
+        str | None, typer.Option(help="Decimal sign, if the file allows two", metavar="','")
     ] = None,
+    rate: Annotated[str | None, _option("Sampling rate, if the file has no times", "1 kHz")] = None,
     velocity: Annotated[
-        str | None, typer.Option(help="Velocity of the drive", metavar="'0.1 um/s'")
+        str | None, _option("Velocity of the drive, if no load point was recorded", "42 um/s")
     ] = None,
     stiffness: Annotated[
-        str | None, typer.Option(help="Spring constant", metavar="'97 N/m'")
+        str | None,
+        _option("Spring constant; of friction coefficients as in '1.6e-3 1/um'", "1002 N/m"),
+    ] = None,
+    normal_force: Annotated[
+        str | None, _option("Normal force; friction coefficients become forces", "301 mN")
+    ] = None,
+    normal_stress: Annotated[str | None, _option("Normal stress, with --area", "20 MPa")] = None,
+    area: Annotated[str | None, _option("Area by which stresses become forces", "25 cm^2")] = None,
+    start: Annotated[str | None, _option("Time from which samples are used", "100 s")] = None,
+    end: Annotated[str | None, _option("Time until which samples are used", "160 s")] = None,
+    hum: Annotated[str | None, _option("Frequency of a hum to take off", "50 Hz")] = None,
+    trend: Annotated[
+        str | None,
+        typer.Option(
+            help="Trend of the friction with displacement, for rates and states: none, linear",
+            metavar="TREND",
+        ),
     ] = None,
     noise: Annotated[
-        str | None,
-        typer.Option(
-            help="Standard deviation of the noise; estimated by default", metavar="'0.1 uN'"
-        ),
+        str | None, _option("Standard deviation of the noise; estimated by default", "0.1 uN")
     ] = None,
-    period: Annotated[
-        str | None,
-        typer.Option(
-            help="Period of the setup; by default from --config, or estimated", metavar="'25 ms'"
-        ),
-    ] = None,
-    max_gap: Annotated[
-        str | None,
-        typer.Option(
-            help="Maximum duration of gaps that are filled by straight lines", metavar="'10 ms'"
-        ),
-    ] = None,
+    period: Annotated[str | None, _option("Period of the setup, if it is known", "25 ms")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print what is understood, and write nothing")
+    ] = False,
 ) -> None:
-    """Read a measured trace, find its slips, and write an output like that of a run."""
-    from mesoslip.measured.trace import read_trace
+    """Read a measured trace as the laboratory wrote it, and write an output like that of a run."""
+    from mesoslip.measured.trace import trace_of, understand
     from mesoslip.output import targets, writing
+
+    path = output or Path("out") / f"{file.name.partition('.')[0]}.nc"
+    if not dry_run:
+        targets.check_output(path, [file, *([] if config is None else [config])])
+    understood = understand(
+        file,
+        config=config,
+        headers=columns,
+        decimal=decimal,
+        rate=rate,
+        velocity=velocity,
+        stiffness=stiffness,
+        normal_force=normal_force,
+        normal_stress=normal_stress,
+        area=area,
+        start=start,
+        end=end,
+        hum=hum,
+        trend=trend,
+        noise=noise,
+        period=period,
+    )
+    for line in understood.report:
+        typer.echo(line)
+    if dry_run:
+        return
+    tree = trace_of(understood)
+    writing.write(tree, path)
+    typer.echo(f"{path}: {', '.join(_summary(tree))}", err=True)
+    if tree.attrs["comment"]:
+        typer.echo(f"{path}: {tree.attrs['comment']}", err=True)
+
+
+def _summary(tree: xr.DataTree) -> list[str]:
+    """What the output has, in a few words."""
     from mesoslip.quantities import with_unit
 
-    path = output or Path("out") / f"{table.stem}.nc"
-    targets.check_output(path, [table, *([] if config is None else [config])])
-    tree = read_trace(
-        table,
-        columns=columns,
-        rate=quantity_or_none(rate, "--rate", "1/s", "1 kHz", positive=True),
-        max_gap=quantity_or_none(max_gap, "--max-gap", "s", "10 ms", positive=True),
-        drive_velocity=quantity_or_none(velocity, "--velocity", "m/s", "0.1 um/s"),
-        stiffness=quantity_or_none(stiffness, "--stiffness", "N/m", "97 N/m", positive=True),
-        config=config,
-        noise=quantity_or_none(noise, "--noise", "N", "0.1 uN"),
-        period=quantity_or_none(period, "--period", "s", "25 ms", positive=True),
-    )
-    writing.write(tree, path)
     time, known = tree.to_dataset()["time"].values, tree.attrs
+    unit = "N" if "spring_force" in tree.data_vars else "1"
     report = [
         f"{time.size} samples",
         with_unit(time[-1] - time[0], "s", 6),
-        f"noise {with_unit(known['noise'], 'N', 3)}",
+        f"noise {with_unit(known['noise'], unit, 3)}",
         f"{tree['slips'].sizes['slip']} slips",
     ]
     if math.isfinite(known["setup_period"]):
         period = with_unit(known["setup_period"], "s", 3)
         report.insert(3, f"period of the setup {period} ({known['setup_period_origin']})")
-    typer.echo(f"{path}: {', '.join(report)}", err=True)
-    if known["comment"]:
-        typer.echo(f"{path}: {known['comment']}", err=True)
+    return report

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,16 @@ from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, find_s
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.measured.table import Measurements, read_table
+from mesoslip.measured.description import (
+    Experiment,
+    config_of_file,
+    describe,
+    option_name,
+)
+from mesoslip.measured.record import Record, RecordedColumn
+from mesoslip.measured.table import read_record
 from mesoslip.output import variables
-from mesoslip.output.inputs import ConfigLike, as_config
+from mesoslip.output.inputs import ConfigLike
 from mesoslip.output.provenance import program_attributes
 
 if TYPE_CHECKING:
@@ -47,82 +55,160 @@ class PartialConfig:
         return tomli_w.dumps(tables)
 
 
+@dataclass(frozen=True)
+class Understood:
+    """A file as it was understood, before anything is computed from it.
+
+    Attributes
+    ----------
+    record
+        Samples and columns.
+    experiment
+        The description, with what was found in the file.
+    config
+        Configuration of a model, if there is one.
+    stiffness
+        Spring constant, in the unit of the force over metre; None if unknown.
+    """
+
+    record: Record
+    experiment: Experiment
+    config: Config | None
+    stiffness: float | None
+    name: str
+
+    @property
+    def report(self) -> list[str]:
+        """Lines about what was understood."""
+        return list(self.record.report)
+
+
+def understand(
+    file: PathLike, *, config: ConfigLike | None = None, **options: str | float | None
+) -> Understood:
+    """Read the file of a measurement, with keys of the table [trace]; see `read_trace`."""
+    path = as_path(file)
+    experiment, path, beside = describe(path, options)
+    model = beside if config is None else config_of_file(config)
+    trace = experiment.trace
+    if model is not None:
+        given = [name for name in ("velocity", "stiffness") if options.get(name) is not None]
+        if given:
+            message = "is given in the configuration; change it there"
+            raise ConfigError([Problem("", option_name(name), message) for name in given])
+    record = read_record(path, trace)
+    stiffness = trace.si("stiffness") if model is None else model.spring_stiffness
+    return Understood(record, experiment, model, stiffness, path.name)
+
+
 def read_trace(
     file: PathLike,
     *,
     columns: str | None = None,
-    rate: float | None = None,
-    max_gap: float | None = None,
-    drive_velocity: float | None = None,
-    stiffness: float | None = None,
+    decimal: str | None = None,
+    rate: str | float | None = None,
+    velocity: str | float | None = None,
+    stiffness: str | float | None = None,
+    normal_force: str | float | None = None,
+    normal_stress: str | float | None = None,
+    area: str | float | None = None,
+    start: str | float | None = None,
+    end: str | float | None = None,
+    hum: str | float | None = None,
+    trend: str | None = None,
     config: ConfigLike | None = None,
-    noise: float | None = None,
-    period: float | None = None,
+    noise: str | float | None = None,
+    period: str | float | None = None,
 ) -> xr.DataTree:
-    """Read a measured trace from a table, as an output like that of a run, with its slips.
+    """Read a measured trace as the laboratory wrote it, as an output like that of a run.
 
-    Missing columns are computed where possible: the displacement of the drive from its velocity,
-    that of the slider from the drive and the stretch of the spring, the velocity of the slider from
-    its displacement. Other variables, such as the detached contacts, are NaN.
+    Quantities are texts with units, such as "1002 N/m", or numbers in SI. They replace keys of the
+    table [trace] of a file such as EXPERIMENT.toml.
 
     Parameters
     ----------
     file
-        The table: columns with units in their headers, such as ``time [s]``, ``force [uN]``,
-        ``displacement [nm]``.
+        The file of the measurement, or a TOML file with a table [trace] that names it.
     columns
         Headers instead of those of the file, such as "time [s], force [uN], -".
+    decimal
+        Decimal sign, "." or ",", if the file allows both.
     rate
-        Sampling rate [1/s], for a table without times.
-    max_gap
-        Maximum length [s] of gaps, which are interpolated linearly; by default gaps are errors.
-    drive_velocity
-        Velocity of the drive [m/s].
+        Sampling rate [1/s], for a file without times.
+    velocity
+        Velocity of the drive [m/s], where no load point was recorded.
     stiffness
-        Spring constant [N/m].
+        Spring constant [N/m]; for friction coefficients with a unit such as "1.6e-3 1/um".
+    normal_force
+        Normal force [N]; friction coefficients become forces with it.
+    normal_stress, area
+        Normal stress [Pa], and the area [m^2] by which stresses become forces.
+    start, end
+        Times of the file from which, and until which, samples are used [s].
+    hum
+        Frequency of a hum to take off [1/s].
+    trend
+        "none" or "linear": trend of the friction with displacement, for rates and states.
     config
-        Configuration of the experiment as far as it is known, with drive and spring. The output
-        contains it, so that every command works on the output.
+        Configuration of a model of the experiment, with drive and spring. The output contains it,
+        so that every command works on the output.
     noise
-        Standard deviation of the noise of the force [N]; estimated by default.
+        Standard deviation of the noise, in the unit of the force; estimated by default.
     period
         Period of the setup [s]; by default that of the configuration, or an estimate.
 
     Returns
     -------
     xarray.DataTree
-        The layout of a run's output; attribute ``origin`` is "measured". Slips are found by the
-        rule of `mesoslip.analysis.sampled_slips`.
+        The layout of a run's output. Attribute ``origin`` is "measured"; ``trace`` repeats the
+        reading. Root: ``spring_force`` [N] or ``friction_coefficient``, dimensions (realization,
+        time) at any increasing times, and displacements and velocity as far as they are known.
+        Groups: ``slips``; ``recorded`` with the columns of the file as they were.
 
     Raises
     ------
     FileError
-        If the table cannot be read or is invalid; the message names the line.
+        If the file cannot be read or understood; the message names the line.
     ConfigError
-        If the arguments contradict each other.
+        If the description is wrong, or arguments contradict each other.
     """
-    path = as_path(file)
+    return trace_of(
+        understand(
+            file,
+            config=config,
+            headers=columns,
+            decimal=decimal,
+            rate=rate,
+            velocity=velocity,
+            stiffness=stiffness,
+            normal_force=normal_force,
+            normal_stress=normal_stress,
+            area=area,
+            start=start,
+            end=end,
+            hum=hum,
+            trend=trend,
+            noise=noise,
+            period=period,
+        )
+    )
+
+
+def trace_of(understood: Understood) -> xr.DataTree:
+    """The output of a file that was understood; see `read_trace`."""
+    record, trace = understood.record, understood.experiment.trace
+    title = understood.experiment.title or f"Measured: {understood.name}"
+    velocity, stiffness = trace.si("velocity"), understood.stiffness
+    noise, period = trace.si("noise"), trace.si("period")
+    known: Config | PartialConfig = PartialConfig(title, velocity, stiffness)
+    config = understood.config
     if config is not None:
-        config = as_config(config)
-    measured = read_table(path, columns=columns, rate=rate, max_gap=max_gap)
-    if config is not None and (drive_velocity is not None or stiffness is not None):
-        name = "drive_velocity" if drive_velocity is not None else "stiffness"
-        message = "is given in the configuration; change it there"
-        raise ConfigError([Problem("", name, message)])
-    if noise is not None and noise < 0:
-        raise ConfigError([Problem("", "noise", "must not be negative", noise)])
-    if period is not None and period <= 0:
-        raise ConfigError([Problem("", "period", "must be greater than 0", period)])
-    title = f"Measured: {path.name}"
-    known: Config | PartialConfig = PartialConfig(title, drive_velocity, stiffness)
-    if config is not None:
-        known = _as_measured(config, measured, title)
-        stiffness = config.spring_stiffness
+        known = _as_measured(config, record, title)
         if period is None and config.slider.quiet_time > 0:
             period = 2 * config.slider.quiet_time
-    drive, velocity = _drive(measured, drive_velocity, config, stiffness)
-    displacement = _displacement(measured, drive, stiffness)
-    time, force = evenly_sampled(measured.time, measured.force)
+    drive, velocity = _drive(record, velocity, config, stiffness)
+    displacement = _displacement(record, drive, stiffness)
+    time, force = evenly_sampled(record.time, record.force)
     noise = noise_level(force) if noise is None else noise
     estimated = period is None
     direction = -1.0 if velocity is not None and velocity < 0 else 1.0
@@ -130,7 +216,8 @@ def read_trace(
     found = find_slips(time, force, noise=noise, period=period, direction=direction)
     details = {
         "origin": "measured",
-        "measured_file": path.name,
+        "measured_file": understood.name,
+        "trace": trace.to_toml(),
         "complete": "true",
         "comment": "; ".join(_comments(direction * force, noise, period)),
         "noise": noise,
@@ -138,7 +225,7 @@ def read_trace(
         "setup_period_origin": "estimated" if estimated else "given",
     }
     attributes = program_attributes(known, "trace") | details
-    return _tree(measured, drive, displacement, found, velocity, stiffness, period, attributes)
+    return _tree(record, drive, displacement, found, velocity, stiffness, period, attributes)
 
 
 def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
@@ -152,9 +239,9 @@ def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
         yield "no fall of the force exceeds the noise: no slips, and no period of the setup"
 
 
-def _as_measured(config: Config, measured: Measurements, title: str) -> Config:
+def _as_measured(config: Config, record: Record, title: str) -> Config:
     """The configuration of an experiment with the duration and sampling interval of its trace."""
-    time = measured.time
+    time = record.time
     # Rounded, as differences of times have rounding errors.
     duration, interval = (
         float(f"{one:.9g}") for one in (time[-1] - time[0], np.median(np.diff(time)))
@@ -169,17 +256,17 @@ def _as_measured(config: Config, measured: Measurements, title: str) -> Config:
 
 
 def _drive(
-    measured: Measurements,
+    record: Record,
     velocity: float | None,
     config: Config | None,
     stiffness: float | None,
 ) -> tuple[Array | None, float | None]:
     """Displacement of the drive [m] and its first nonzero velocity [m/s], as far as known."""
-    time = measured.time - measured.time[0]
+    time = record.time - record.time[0]
     start = 0.0
     if stiffness is not None and 0 < stiffness < math.inf:
         # The slider starts at 0.
-        start = measured.force[0] / stiffness
+        start = record.force[0] / stiffness
     if config is not None and config.drive.force_rate is None:
         velocity = first_velocity(config)
         drive = start + _drive_displacement(config, time)
@@ -187,10 +274,10 @@ def _drive(
         drive = start + velocity * time
     else:
         drive = None
-    if measured.drive is not None:
+    if record.load_point is not None:
         if velocity is None:
-            velocity = float(np.polyfit(time, measured.drive, 1)[0])
-        drive = measured.drive
+            velocity = float(np.polyfit(time, record.load_point, 1)[0])
+        drive = record.load_point
     return drive, velocity
 
 
@@ -209,18 +296,16 @@ def _drive_displacement(config: Config, time: Array) -> Array:
     return displacement
 
 
-def _displacement(
-    measured: Measurements, drive: Array | None, stiffness: float | None
-) -> Array | None:
-    if measured.displacement is not None:
-        return measured.displacement
+def _displacement(record: Record, drive: Array | None, stiffness: float | None) -> Array | None:
+    if record.displacement is not None:
+        return record.displacement
     if drive is None or stiffness is None or not 0 < stiffness < math.inf:
         return None
-    return drive - measured.force / stiffness
+    return drive - record.force / stiffness
 
 
 def _tree(
-    measured: Measurements,
+    record: Record,
     drive: Array | None,
     displacement: Array | None,
     found: FoundSlips,
@@ -231,24 +316,23 @@ def _tree(
 ) -> xr.DataTree:
     import xarray as xr
 
-    unknown = np.full(len(measured.time), np.nan)
+    velocities = None if displacement is None else _velocity(record.time, displacement, period)
     traces = {
-        "drive_displacement": unknown if drive is None else drive,
-        "displacement": unknown if displacement is None else displacement,
-        "velocity": unknown
-        if displacement is None
-        else _velocity(measured.time, displacement, period),
-        "spring_force": measured.force,
-        "contact_force": unknown,
-        "detached_contacts": unknown,
+        "drive_displacement": drive,
+        "displacement": displacement,
+        "velocity": velocities,
+        "friction_coefficient" if record.is_friction else "spring_force": record.force,
+        "normal_force": record.normal_force,
+        "normal_stress": record.normal_stress,
     }
     root = {
         name: variables.ROOT.variable(name, ("realization", "time"), values[np.newaxis])
         for name, values in traces.items()
+        if values is not None
     }
     coordinates = {
         "realization": variables.ROOT.variable("realization", ("realization",), [0]),
-        "time": variables.ROOT.variable("time", ("time",), measured.time),
+        "time": variables.ROOT.variable("time", ("time",), record.time),
     }
     speed = np.full(len(found), np.nan)
     if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
@@ -266,18 +350,36 @@ def _tree(
     slips = {
         name: variables.SLIPS.variable(name, ("slip",), values) for name, values in columns.items()
     }
-    return xr.DataTree.from_dict(
-        {"/": xr.Dataset(root, coordinates, attributes), "/slips": xr.Dataset(slips)}
-    )
+    groups = {"/": xr.Dataset(root, coordinates, attributes), "/slips": xr.Dataset(slips)}
+    recorded = {
+        name: xr.Variable(("row",), one.values, {"long_name": one.header, "units": one.unit})
+        for name, one in _names(record).items()
+    }
+    groups["/recorded"] = xr.Dataset(recorded)
+    return xr.DataTree.from_dict(groups)
+
+
+def _names(record: Record) -> dict[str, RecordedColumn]:
+    """Columns of the file by names that netCDF takes, each once."""
+    found: dict[str, RecordedColumn] = {}
+    for number, one in enumerate(record.columns, 1):
+        name = re.sub(r"\W+", "_", one.header, flags=re.ASCII).strip("_")
+        if not name or name[0].isdigit() or name in {*found, "time", "realization"}:
+            name = f"column_{number}_{name}".rstrip("_")
+        found[name] = one
+    return found
 
 
 def _velocity(time: Array, displacement: Array, period: float) -> Array:
-    """Derivative of the displacement [m/s], by linear fits over a sixteenth of a period."""
-    from scipy.signal import savgol_filter
-
+    """Rate of the displacement [m/s]: differences of means over a sixteenth of a period."""
     interval = float(np.median(np.diff(time)))
-    samples = period / 16 / interval if math.isfinite(period) else 1
-    width = min(2 * max(1, round(samples / 2)) + 1, len(time) - 1 + len(time) % 2)
-    even, values = evenly_sampled(time, displacement)
-    rate: Array = savgol_filter(values, width, 1, deriv=1, delta=interval, mode="nearest")
-    return np.interp(time, even, rate)
+    samples = period / 32 / interval if math.isfinite(period) else 1
+    half = max(1, min(round(samples), len(time) // 2))
+    index = np.arange(len(time))
+    # At the ends there are fewer samples on one side.
+    below, above = np.maximum(index - half, 0), np.minimum(index + half + 1, len(time))
+    sums = [np.concatenate([[0.0], np.cumsum(one - one[0])]) for one in (time, displacement)]
+    after = [(one[above] - one[index]) / (above - index) for one in sums]
+    before = [(one[index + 1] - one[below]) / (index + 1 - below) for one in sums]
+    rate: Array = (after[1] - before[1]) / (after[0] - before[0])
+    return rate

@@ -16,6 +16,7 @@ from mesoslip.output.file_locks import lock_held
 from mesoslip.output.hdf5 import LOCK, check_links
 from mesoslip.output.old_names import renamed
 from mesoslip.output.validity import check_layout, check_signature
+from mesoslip.output.variables import has_force
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,7 +132,7 @@ def check_run(tree: xr.DataTree, path: str | Path) -> None:
     FileError
         If it is not.
     """
-    if "spring_force" not in tree.data_vars:
+    if not has_force(tree.data_vars):
         kind = " but of mesoslip sweep" if "status" in tree.data_vars else ""
         raise FileError(f"{path}: not an output of mesoslip run{kind}")
 

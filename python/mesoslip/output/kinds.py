@@ -12,6 +12,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from mesoslip.errors import FileError
+from mesoslip.output.variables import has_force
 
 
 class Kind(NamedTuple):
@@ -23,7 +24,7 @@ class Kind(NamedTuple):
 
 # The kind of an output is the first that fits.
 KINDS = {
-    "run": Kind("a run", lambda tree: "spring_force" in tree.data_vars),
+    "run": Kind("a run", lambda tree: has_force(tree.data_vars)),
     "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mesoslip.errors import FileError
 from mesoslip.output import variables
+from mesoslip.output.access import is_measured
 from mesoslip.output.provenance import version
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 # Dimensions and variables that commands need of an output of a run: of its root, and of groups that
 # it may have.
 ROOT_NEEDS = tuple(variables.TRACE)[:6]
+
+SLIPS = (("slip",), tuple(variables.SLIPS))
 
 NEEDS = {
     "stages": (("stage",), tuple(variables.STAGES)),
@@ -71,8 +74,14 @@ def check_layout(tree: xr.DataTree, path: Path) -> None:
         for name in ("configuration", "title", "comment", "complete")
         if not isinstance(tree.attrs.get(name, ""), str)
     ]
-    if "spring_force" in tree.data_vars:
-        needed = {"": (("realization", "time"), ROOT_NEEDS), "slips": (("slip",), variables.SLIPS)}
+    if variables.has_force(tree.data_vars):
+        root, slips = ROOT_NEEDS, {"slips": SLIPS}
+        if is_measured(tree):
+            # What was not measured is absent.
+            known = (*variables.TRACE, *variables.MEASURED)
+            root = tuple(name for name in known if name in tree.data_vars)
+            slips = {name: one for name, one in slips.items() if name in tree.children}
+        needed = {"": (("realization", "time"), root), **slips}
         needed |= {name: one for name, one in NEEDS.items() if name in tree.children}
         for group, (dimensions, names) in needed.items():
             if group and group not in tree.children:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -70,8 +70,24 @@ TRACE = Group(
     base_displacement=Meaning("m", "displacement of the base"),
 )
 
+# Variables of a measured trace that a run does not have. Its force is the spring force, or the
+# friction coefficient where no normal force is known.
+MEASURED = Group(
+    friction_coefficient=Meaning("1", "friction coefficient"),
+    normal_force=Meaning("N", "normal force"),
+    normal_stress=Meaning("Pa", "normal stress"),
+)
+FORCES = ("spring_force", "friction_coefficient")
+
+
+def has_force(names: Container[Any]) -> bool:
+    """Whether variables are those of a run or of a measured trace."""
+    return any(one in names for one in FORCES)
+
+
 ROOT = Group(
     TRACE,
+    **MEASURED,
     realization=Meaning("1", "number of the realization", np.int64),
     time=Meaning("s", "time"),
     layer=Meaning("1", "number of the layer, 1 at the contacts", np.int64),

@@ -24,7 +24,8 @@ def is_known(tree: xr.DataTree, name: str) -> bool:
     """Whether an output has values of a variable of the trace: a measured one may not."""
     if not is_measured(tree):
         return True
-    return bool(np.isfinite(tree.to_dataset()[name][0, 0].item()))
+    # Files of earlier versions have variables without values.
+    return name in tree.data_vars and bool(np.isfinite(tree.to_dataset()[name][0]).any())
 
 
 def force_of(tree: xr.DataTree) -> str:

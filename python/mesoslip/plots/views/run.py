@@ -154,6 +154,7 @@ def _compare(
             zorder=1.9 if is_measured(tree) else 2.0,
         )
         for number, (tree, one, label) in enumerate(zip(trees, names, labels, strict=True))
+        if name is None or is_known(tree, name)
     ]
     quantities = ", ".join(dict.fromkeys(NAMES[one] for one in names))
     draw_curves(axes, curves, names[0], horizontal, quantities)

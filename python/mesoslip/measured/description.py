@@ -1,0 +1,318 @@
+"""The description of a measured trace: the table [trace] of a file such as EXPERIMENT.toml."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.files import read_toml
+from mesoslip.configuration.messages import problems
+from mesoslip.configuration.table import Table, Text, Whole, problem
+from mesoslip.configuration.units import number_of, to_si
+from mesoslip.errors import ConfigError, Problem, shown
+
+
+def _checked_quantity(
+    value: object, units: tuple[str, ...], example: str, minimum: float | None, is_open: bool
+) -> str:
+    """A quantity as text with its unit, checked for its dimension; numbers are in the first."""
+    if isinstance(value, str):
+        # A plain number is in SI, as everywhere.
+        with suppress(ValueError):
+            value = number_of(value.strip())
+    errors = []
+    for unit in units:
+        try:
+            number = to_si(value, unit, example)
+        except ValueError as error:
+            errors.append(error)
+            continue
+        if minimum is not None and (number < minimum or (is_open and number == minimum)):
+            raise ValueError(f"must be {'greater than' if is_open else 'at least'} {minimum:g}")
+        return value if isinstance(value, str) else f"{number!r} {unit}".removesuffix(" 1")
+    raise errors[0]
+
+
+def _quantity(*units: str, example: str, minimum: float | None = None, is_open: bool = True) -> Any:
+    """A quantity in one of several SI units, kept as it was written."""
+    function = partial(
+        _checked_quantity, units=units, example=example, minimum=minimum, is_open=is_open
+    )
+    return BeforeValidator(function)
+
+
+# SI units of the quantities of a description, by key.
+UNITS = {
+    "rate": ("1/s",),
+    "start": ("s",),
+    "end": ("s",),
+    "normal_force": ("N",),
+    "normal_stress": ("Pa",),
+    "area": ("m^2",),
+    "stiffness": ("N/m", "1/m"),
+    "velocity": ("m/s",),
+    "hum": ("1/s",),
+    "noise": ("N", "1"),
+    "period": ("s",),
+}
+Rate = Annotated[str, _quantity(*UNITS["rate"], example="1 kHz", minimum=0)]
+Time = Annotated[str, _quantity(*UNITS["start"], example="100 s")]
+NormalForce = Annotated[str, _quantity(*UNITS["normal_force"], example="301 mN", minimum=0)]
+NormalStress = Annotated[str, _quantity(*UNITS["normal_stress"], example="20 MPa", minimum=0)]
+Area = Annotated[str, _quantity(*UNITS["area"], example="25 cm^2", minimum=0)]
+Stiffness = Annotated[str, _quantity(*UNITS["stiffness"], example="1002 N/m", minimum=0)]
+Velocity = Annotated[str, _quantity(*UNITS["velocity"], example="42 um/s")]
+Frequency = Annotated[str, _quantity(*UNITS["hum"], example="50 Hz", minimum=0)]
+Noise = Annotated[str, _quantity(*UNITS["noise"], example="0.1 uN", minimum=0, is_open=False)]
+Period = Annotated[str, _quantity(*UNITS["period"], example="25 ms", minimum=0)]
+
+
+def _column(value: object) -> object:
+    """A column given by its name or number alone."""
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        return value
+    return {"column": value}
+
+
+def _name_or_number(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        raise ValueError("must be the name of a column, or its number from 1")
+    if isinstance(value, int) and value < 1:
+        raise ValueError("columns are numbered from 1")
+    return str(value) if isinstance(value, int) else value
+
+
+class Column(Table):
+    """A column of the file, and how its numbers become a quantity: (number - offset) x factor."""
+
+    column: Annotated[Text, BeforeValidator(_name_or_number)]
+    """Name of the column in the file's header, with or without its unit; or its number from 1."""
+    unit: Text | None = None
+    """Unit of the column, if its header has none or a wrong one."""
+    factor: Text | None = None
+    """Quantity for one unit of the column, such as "12.4 mN/V", "9.80665e-3 N" or "1"."""
+    offset: Text | None = None
+    """Number to subtract, in the unit of the column, such as "0.3 V"."""
+
+
+ColumnField = Annotated[Column | None, BeforeValidator(_column)]
+
+
+class Columns(Table):
+    """The columns of the file by what they hold; others are not used."""
+
+    time: ColumnField = None
+    """Time."""
+    force: ColumnField = None
+    """Force of the spring, along the interface."""
+    shear_stress: ColumnField = None
+    """Shear stress, a force with `trace.area`."""
+    friction: ColumnField = None
+    """Friction coefficient."""
+    normal_force: ColumnField = None
+    """Normal force."""
+    normal_stress: ColumnField = None
+    """Normal stress, a force with `trace.area`."""
+    load_point: ColumnField = None
+    """Displacement of the drive (load point)."""
+    displacement: ColumnField = None
+    """Displacement of the slider."""
+
+
+class TraceDescription(Table):
+    """What a file of a measurement does not say by itself.
+
+    Quantities are texts with units, as they were written; `si` has them in SI.
+    """
+
+    file: Text
+    """The file of the measurement, relative to the file of this table."""
+    columns: Columns = Columns()
+    """Columns of the file by what they hold; by default found from its header."""
+    headers: Text | None = None
+    """Headers instead of those of the file, such as "time [s], force [uN], -"."""
+    decimal: Literal[".", ","] | None = None
+    """Decimal sign; by default found from the numbers, if they allow one only."""
+    rate: Rate | None = None
+    """Sampling rate, for a file without times."""
+    part: Annotated[Whole, Field(ge=1)] | None = None
+    """Which part of a file whose clock starts again, from 1; by default the longest."""
+    start: Time | None = None
+    """Time of the file from which samples are used."""
+    end: Time | None = None
+    """Time of the file until which samples are used."""
+    normal_force: NormalForce | None = None
+    """Normal force, if it was not recorded; friction coefficients become forces with it."""
+    normal_stress: NormalStress | None = None
+    """Normal stress, if it was not recorded; with `area` a normal force."""
+    area: Area | None = None
+    """Nominal area, by which stresses become forces."""
+    stiffness: Stiffness | None = None
+    """Spring constant; for friction coefficients over displacement, such as "1.6e-3 1/um"."""
+    velocity: Velocity | None = None
+    """Velocity of the drive, where no load point was recorded."""
+    hum: Frequency | None = None
+    """Frequency of a hum to take off."""
+    trend: Literal["none", "linear"] | None = None
+    """Trend of the friction with displacement, taken off for rates and states."""
+    noise: Noise | None = None
+    """Standard deviation of the noise; estimated by default."""
+    period: Period | None = None
+    """Period of the setup, 2 pi (M/K)^1/2."""
+
+    @model_validator(mode="after")
+    def _keys_agree(self) -> Self:
+        if self.headers is not None and self.columns.model_fields_set:
+            raise problem("headers", "give either this or trace.columns")
+        if self.normal_force is not None and self.normal_stress is not None:
+            raise problem("normal_stress", "give either this or trace.normal_force")
+        start, end = self.si("start"), self.si("end")
+        if start is not None and end is not None and start >= end:
+            raise problem("end", "must be after trace.start")
+        return self
+
+    def si(self, name: str) -> float | None:
+        """A quantity in SI; None if it is not given. Stiffnesses are in N/m or 1/m."""
+        text = getattr(self, name)
+        if text is None:
+            return None
+        for unit in UNITS[name]:
+            try:
+                return to_si(text if not _is_plain(text) else float(text), unit, "")
+            except ValueError:
+                continue
+        raise AssertionError(name)
+
+    @property
+    def stiffness_is_relative(self) -> bool:
+        """Whether the stiffness is one of friction coefficients, in 1/m."""
+        if self.stiffness is None:
+            return False
+        try:
+            to_si(self.stiffness, "1/m", "")
+        except ValueError:
+            return False
+        return True
+
+    def to_toml(self) -> str:
+        """The table as TOML, with its name."""
+        import tomli_w
+
+        return tomli_w.dumps({"trace": self.model_dump(exclude_none=True, exclude_defaults=True)})
+
+
+def _is_plain(text: str) -> bool:
+    """Whether a quantity has no unit, as those of dimension 1."""
+    try:
+        number_of(text)
+    except ValueError:
+        return False
+    return True
+
+
+class Experiment(Table):
+    """A file with a table [trace], and tables of a model that it may have beside it."""
+
+    title: Text | None = None
+    """Title of the experiment."""
+    trace: TraceDescription
+    """The measurement."""
+
+
+# Tables of such a file that other commands read.
+OTHER_TABLES = ("fit", "trace")
+
+
+def describe(file: Path, options: Mapping[str, Any]) -> tuple[Experiment, Path, Config | None]:
+    """The description of a measurement.
+
+    Parameters
+    ----------
+    file
+        The file of the measurement, or a TOML file with a table [trace] that names it.
+    options
+        Keys of the table that replace those of the file.
+
+    Returns
+    -------
+    tuple
+        The description, the path of the measurement, and the configuration of a model if the file
+        has one.
+
+    Raises
+    ------
+    FileError
+        If a TOML file cannot be read.
+    ConfigError
+        If the description is wrong; all errors at once.
+    """
+    changes = {name: value for name, value in options.items() if value is not None}
+    if file.suffix.lower() != ".toml":
+        tables = {"trace": {"file": file.name, **changes}}
+        try:
+            return _checked(tables, ""), file, None
+        except ConfigError as error:
+            raise ConfigError(
+                [replace(one, key=option_name(one.key)) for one in error.problems]
+            ) from None
+    tables = read_toml(file).tables
+    table = tables.get("trace")
+    if not isinstance(table, Mapping):
+        message = "missing; it names the file of the measurement" if table is None else "no table"
+        raise ConfigError([Problem(str(file), "trace", message)])
+    experiment = _checked({"title": tables.get("title"), "trace": {**table, **changes}}, str(file))
+    return experiment, file.parent / experiment.trace.file, model_of(tables, str(file))
+
+
+def option_name(key: str) -> str:
+    """The option of a command for a key of the table."""
+    name = key.removeprefix("trace.")
+    return "--columns" if name == "headers" else f"--{name.replace('_', '-')}"
+
+
+def _checked(tables: Mapping[str, Any], source: str) -> Experiment:
+    try:
+        return Experiment.model_validate(tables)
+    except ValidationError as error:
+        raise ConfigError(problems(error, source, Experiment)) from None
+
+
+def model_of(tables: Mapping[str, Any], source: str) -> Config | None:
+    """The configuration of the model in a file, beside tables of other commands; None without."""
+    rest = {name: table for name, table in tables.items() if name not in OTHER_TABLES}
+    if not rest.keys() - {"title"}:
+        return None
+    return Config.from_dict(rest, source)
+
+
+def config_of_file(config: object) -> Config:
+    """The configuration of an experiment, from a file that may have [fit] and [trace] beside it.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read.
+    ConfigError
+        If it is wrong.
+    """
+    from mesoslip.output.inputs import as_config
+
+    if isinstance(config, Mapping):
+        return _model({**config}, "configuration")
+    if isinstance(config, str | Path) and Path(config).suffix != ".nc":
+        return _model(read_toml(Path(config)).tables, str(config))
+    return as_config(config)  # type: ignore[arg-type]
+
+
+def _model(tables: Mapping[str, Any], source: str) -> Config:
+    config = model_of(tables, source)
+    if config is None:
+        raise ConfigError([Problem(source, "", f"has no model; {shown('[trace]')} alone is FILE")])
+    return config

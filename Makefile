@@ -19,7 +19,7 @@ SOURCES := meson.build meson.options pyproject.toml \
   $(wildcard $(addsuffix /*.py,python/mesoslip python/mesoslip/* python/mesoslip/*/*)) \
   $(wildcard python/mesoslip/*.py.in python/mesoslip/*.pyi runs/meson.build .git/logs/HEAD)
 
-SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev libsundials-fortran-dev
+SYSTEM_PACKAGES := gcc gfortran libc6-dev libsundials-dev
 # meson and meson-python find ninja here.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export UV_PROJECT_ENVIRONMENT := $(CURDIR)/$(VENV)

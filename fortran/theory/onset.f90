@@ -1,11 +1,10 @@
 !> The onset of slip, Eqs. S46 and S47, dimensionless: x = K (X - X_c)/F_s, time times Omega_S.
 module mesoslip_theory_onset
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
-   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length
-   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_bdf
+   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_bdf, vector_values
    implicit none
    private
 
@@ -82,7 +81,7 @@ contains
    function rates(time, state, rate, user_data) bind(c, name="mesoslip_onset_rates") &
       & result(status)
       real(c_double), value :: time
-      type(N_Vector) :: state, rate
+      type(c_ptr), value :: state, rate
       type(c_ptr), value :: user_data
       integer(c_int) :: status
 
@@ -90,8 +89,8 @@ contains
       real(c_double), pointer :: y(:), dy(:)
 
       call c_f_pointer(user_data, onset)
-      y => FN_VGetArrayPointer(state)
-      dy => FN_VGetArrayPointer(rate)
+      y => vector_values(state)
+      dy => vector_values(rate)
       dy(1) = y(2)
       dy(3) = onset%damping * (y(2) - y(3))
       if (onset%equation == equation_sequential) then
@@ -106,7 +105,7 @@ contains
    function ends(time, state, value, user_data) bind(c, name="mesoslip_onset_ends") &
       & result(status)
       real(c_double), value :: time
-      type(N_Vector) :: state
+      type(c_ptr), value :: state
       real(c_double) :: value(*)
       type(c_ptr), value :: user_data
       integer(c_int) :: status
@@ -115,7 +114,7 @@ contains
       real(c_double), pointer :: y(:)
 
       call c_f_pointer(user_data, onset)
-      y => FN_VGetArrayPointer(state)
+      y => vector_values(state)
       if (onset%equation == equation_sequential) then
          value(1) = onset%end_displacement - y(1)
       else

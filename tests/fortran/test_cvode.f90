@@ -1,7 +1,7 @@
 !> CVODE is there and right: a damped oscillator against its closed form.
 module oscillator
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_funptr, c_int, c_ptr
-   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector
+   use mesoslip_numerics_sundials_cvode, only: vector_values
    implicit none
    private
 
@@ -18,16 +18,15 @@ contains
    !> Right side of the first-order system, for CVODE.
    function right_side(time, state, rate, user_data) bind(c) result(status)
       real(c_double), value :: time
-      type(N_Vector) :: state, rate
-      type(c_ptr), value :: user_data
+      type(c_ptr), value :: state, rate, user_data
       integer(c_int) :: status
 
       type(oscillator_type), pointer :: parameters
       real(c_double), pointer :: y(:), dy(:)
 
       call c_f_pointer(user_data, parameters)
-      y => FN_VGetArrayPointer(state)
-      dy => FN_VGetArrayPointer(rate)
+      y => vector_values(state)
+      dy => vector_values(rate)
       dy(1) = y(2)
       dy(2) = -2 * parameters%damping * y(2) - parameters%frequency**2 * y(1)
       status = 0
@@ -36,8 +35,7 @@ contains
    !> A system whose rates cannot be computed.
    function no_rates(time, state, rate, user_data) bind(c) result(status)
       real(c_double), value :: time
-      type(N_Vector) :: state, rate
-      type(c_ptr), value :: user_data
+      type(c_ptr), value :: state, rate, user_data
       integer(c_int) :: status
 
       status = -1
@@ -55,18 +53,15 @@ end module oscillator
 program test_cvode
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_funloc, c_int, c_loc, c_long, &
       & c_ptr
-   use fcvode_mod, only: CV_ADAMS, CV_NORMAL, FCVode, FCVodeCreate, FCVodeFree, FCVodeGetDky, &
-      & FCVodeInit, FCVodeSetMaxNumSteps, FCVodeSetNonlinearSolver, FCVodeSetUserData, &
-      & FCVodeSStolerances
-   use fnvector_serial_mod, only: FN_VMake_Serial
-   use fsundials_core_mod, only: FN_VDestroy, FSUNContext_Create, FSUNContext_Free, &
-      & FSUNNonlinSolFree, N_Vector, SUN_COMM_NULL, SUNNonlinearSolver
-   use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_sundials_cvode, only: cvode_type, method_adams, method_bdf, &
       & sundials_version
    use mesoslip_numerics_sundials_index, only: sunindextype
+   use mesoslip_numerics_sundials_library, only: CV_ADAMS, CV_NORMAL, CVode, CVodeCreate, &
+      & CVodeFree, CVodeGetDky, CVodeInit, CVodeSetMaxNumSteps, CVodeSetNonlinearSolver, &
+      & CVodeSetUserData, CVodeSStolerances, N_VDestroy, N_VMake_Serial, SUNContext_Free, &
+      & SUNNonlinSol_FixedPoint, SUNNonlinSolFree, create_context
    use oscillator, only: failing_rates, oscillator_type, right_side
    use testing, only: check, check_close, finish
    implicit none
@@ -74,40 +69,38 @@ program test_cvode
    real(c_double), parameter :: end_time = 20.0_c_double
    type(oscillator_type), target :: parameters
    real(c_double), target :: values(2), middle(2)
-   real(c_double) :: time(1), between
-   type(N_Vector), pointer :: state, dense
-   type(SUNNonlinearSolver), pointer :: solver
-   type(c_ptr) :: context, memory
+   real(c_double) :: time, between
+   type(c_ptr) :: context, memory, solver, state, dense
 
    values = [1.0_c_double, 0.0_c_double]
-   call succeed(FSUNContext_Create(SUN_COMM_NULL, context), "context")
-   state => FN_VMake_Serial(2_sunindextype, values, context)
-   dense => FN_VMake_Serial(2_sunindextype, middle, context)
-   memory = FCVodeCreate(CV_ADAMS, context)
+   call succeed(create_context(context), "context")
+   state = N_VMake_Serial(2_sunindextype, c_loc(values), context)
+   dense = N_VMake_Serial(2_sunindextype, c_loc(middle), context)
+   memory = CVodeCreate(CV_ADAMS, context)
    call check(c_associated(memory), "CVODE is created")
-   call succeed(FCVodeInit(memory, c_funloc(right_side), 0.0_c_double, state), "problem")
-   call succeed(FCVodeSetUserData(memory, c_loc(parameters)), "user data")
-   call succeed(FCVodeSStolerances(memory, 1.0e-11_c_double, 1.0e-12_c_double), "tolerances")
-   call succeed(FCVodeSetMaxNumSteps(memory, 100000_c_long), "number of steps")
-   solver => FSUNNonlinSol_FixedPoint(state, 0_c_int, context)
-   call succeed(FCVodeSetNonlinearSolver(memory, solver), "nonlinear solver")
+   call succeed(CVodeInit(memory, c_funloc(right_side), 0.0_c_double, state), "problem")
+   call succeed(CVodeSetUserData(memory, c_loc(parameters)), "user data")
+   call succeed(CVodeSStolerances(memory, 1.0e-11_c_double, 1.0e-12_c_double), "tolerances")
+   call succeed(CVodeSetMaxNumSteps(memory, 100000_c_long), "number of steps")
+   solver = SUNNonlinSol_FixedPoint(state, 0_c_int, context)
+   call succeed(CVodeSetNonlinearSolver(memory, solver), "nonlinear solver")
 
    time = 0.0_c_double
-   call succeed(FCVode(memory, end_time, state, time, CV_NORMAL), "integration")
-   call check_close(time(1), end_time, 0.0_wp, "the end is reached")
+   call succeed(CVode(memory, end_time, state, time, CV_NORMAL), "integration")
+   call check_close(time, end_time, 0.0_wp, "the end is reached")
    call check_close(values(1), exact(end_time), 1.0e-8_wp, "displacement at the end")
 
    between = end_time - 1.0e-3_c_double
-   call succeed(FCVodeGetDky(memory, between, 0_c_int, dense), "dense output")
+   call succeed(CVodeGetDky(memory, between, 0_c_int, dense), "dense output")
    call check_close(middle(1), exact(between), 1.0e-8_wp, "displacement in between")
 
    call check(index(sundials_version(), ".") > 1, "SUNDIALS states its version")
 
-   call FCVodeFree(memory)
-   call succeed(FSUNNonlinSolFree(solver), "end of the solver")
-   call FN_VDestroy(state)
-   call FN_VDestroy(dense)
-   call succeed(FSUNContext_Free(context), "end of the context")
+   call CVodeFree(memory)
+   call succeed(SUNNonlinSolFree(solver), "end of the solver")
+   call N_VDestroy(state)
+   call N_VDestroy(dense)
+   call succeed(SUNContext_Free(context), "end of the context")
    call wrapped(method_adams)
    call wrapped(method_bdf)
    call fails()

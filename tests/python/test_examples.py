@@ -101,5 +101,5 @@ def test_a_missing_library_is_reported_in_a_line(monkeypatch, command):
     monkeypatch.setattr(examples, "examples", broken)
     status, _, errors = command("example")
     assert status == 1
-    assert "libsundials-fortran-dev" in errors
+    assert "libsundials-dev" in errors
     assert errors.count("\n") == 1

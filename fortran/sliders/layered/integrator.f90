@@ -4,12 +4,9 @@
 !> It starts anew after each event, and events are found in the polynomial of each of its steps.
 module mesoslip_sliders_layered_integrator
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
-   use fsundials_core_mod, only: FN_VGetArrayPointer, N_Vector, SUNMatrix
-   use fsunmatrix_band_mod, only: FSUNBandMatrix_Data, FSUNBandMatrix_LDim, &
-      & FSUNBandMatrix_StoredUpperBandwidth
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_sundials_cvode, only: cvode_type
+   use mesoslip_numerics_sundials_cvode, only: band_entries, cvode_type, vector_values
    use mesoslip_sliders_layered_system, only: accelerate, push, solver_bdf, system_type
    implicit none
    private
@@ -167,7 +164,7 @@ contains
    function rates(time, state, rate, user_data) bind(c, name="mesoslip_layers_rates") &
       & result(status)
       real(c_double), value :: time
-      type(N_Vector) :: state, rate
+      type(c_ptr), value :: state, rate
       type(c_ptr), value :: user_data
       integer(c_int) :: status
 
@@ -176,8 +173,8 @@ contains
       real(wp), allocatable :: acceleration(:)
 
       call c_f_pointer(user_data, system)
-      y => FN_VGetArrayPointer(state)
-      dy => FN_VGetArrayPointer(rate)
+      y => vector_values(state)
+      dy => vector_values(rate)
       allocate (acceleration(0:system%parameters%layers))
       call accelerate(system, 1.0_wp, 0.0_wp, y(1::2), y(2::2), acceleration)
       call push(system, time, acceleration)
@@ -190,23 +187,17 @@ contains
    function jacobian(time, state, rate, matrix, user_data, first, second, third) &
       & bind(c, name="mesoslip_layers_jacobian") result(status)
       real(c_double), value :: time
-      type(N_Vector) :: state, rate, first, second, third
-      type(SUNMatrix) :: matrix
-      type(c_ptr), value :: user_data
+      type(c_ptr), value :: state, rate, matrix, user_data, first, second, third
       integer(c_int) :: status
 
       type(system_type), pointer :: system
-      real(c_double), pointer :: start(:), entries(:)
+      real(c_double), pointer, contiguous :: entries(:, :)
       real(wp) :: spring, dashpot, base
-      integer :: stride, upper, layer, last
+      integer :: upper, layer, last
 
       call c_f_pointer(user_data, system)
-      stride = int(FSUNBandMatrix_LDim(matrix))
-      upper = int(FSUNBandMatrix_StoredUpperBandwidth(matrix))
+      call band_entries(matrix, entries, upper)
       last = system%parameters%layers
-      ! What SUNDIALS returns is a pointer to the first entry.
-      start => FSUNBandMatrix_Data(matrix)
-      call c_f_pointer(c_loc(start), entries, [stride * 2 * (last + 1)])
       entries = 0.0_c_double
       spring = system%spring / system%layer_mass
       dashpot = system%dashpot / system%layer_mass
@@ -251,8 +242,8 @@ contains
 
          integer :: place
 
-         place = (column - 1) * stride + upper + row - column + 1
-         entries(place) = entries(place) + value
+         place = upper + 1 + row - column
+         entries(place, column) = entries(place, column) + value
       end subroutine add
 
    end function jacobian

@@ -46,7 +46,7 @@ COMMANDS = (
 )
 
 # How to install the libraries that the kernels are linked to.
-LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev libsundials-fortran-dev"
+LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev"
 
 app = typer.Typer(
     name="mesoslip",

@@ -1,22 +1,17 @@
-!> The integrator CVODE of SUNDIALS, with the names of version 7; for version 6 see sundials_6.f90.
+!> The integrator CVODE of SUNDIALS.
 module mesoslip_numerics_sundials_cvode
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_funptr, &
-      & c_int, c_long, c_null_char, c_null_ptr, c_ptr
-   use fcvode_mod, only: CV_ADAMS, CV_BDF, CV_NORMAL, CV_ONE_STEP, CV_ROOT_RETURN, FCVode, &
-      & FCVodeCreate, FCVodeFree, FCVodeGetDky, FCVodeGetLastOrder, FCVodeGetLastStep, &
-      & FCVodeGetNumErrTestFails, FCVodeGetNumRhsEvals, FCVodeGetNumSteps, FCVodeInit, &
-      & FCVodeReInit, FCVodeRootInit, FCVodeSetJacFn, FCVodeSetLinearSolver, &
-      & FCVodeSetMaxNumSteps, FCVodeSetNonlinearSolver, FCVodeSetStopTime, FCVodeSetUserData, &
-      & FCVodeSStolerances
-   use fnvector_serial_mod, only: FN_VMake_Serial
-   use fsundials_core_mod, only: FN_VDestroy, FSUNContext_Create, FSUNContext_Free, &
-      & FSUNLinSolFree, FSUNMatDestroy, FSUNNonlinSolFree, N_Vector, SUN_COMM_NULL, &
-      & SUNLinearSolver, SUNMatrix, SUNNonlinearSolver
-   use fsunlinsol_band_mod, only: FSUNLinSol_Band
-   use fsunmatrix_band_mod, only: FSUNBandMatrix
-   use fsunnonlinsol_fixedpoint_mod, only: FSUNNonlinSol_FixedPoint
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_funptr, c_int, c_loc, &
+      & c_long, c_null_char, c_null_ptr, c_ptr
    use mesoslip_numerics_errors, only: error_type, raise, status_failed
    use mesoslip_numerics_sundials_index, only: sunindextype
+   use mesoslip_numerics_sundials_library, only: CV_ADAMS, CV_BDF, CV_NORMAL, CV_ONE_STEP, &
+      & CV_ROOT_RETURN, CVode, CVodeCreate, CVodeFree, CVodeGetDky, CVodeGetLastOrder, &
+      & CVodeGetLastStep, CVodeGetNumErrTestFails, CVodeGetNumRhsEvals, CVodeGetNumSteps, &
+      & CVodeInit, CVodeReInit, CVodeRootInit, CVodeSetJacFn, CVodeSetLinearSolver, &
+      & CVodeSetMaxNumSteps, CVodeSetNonlinearSolver, CVodeSetStopTime, CVodeSetUserData, &
+      & CVodeSStolerances, N_VDestroy, N_VMake_Serial, SUNBandMatrix, SUNContext_Free, &
+      & SUNDIALSGetVersion, SUNLinSol_Band, SUNLinSolFree, SUNMatDestroy, &
+      & SUNNonlinSol_FixedPoint, SUNNonlinSolFree, band_entries, create_context, vector_values
    use mesoslip_numerics_sundials_messages, only: collect_messages
    use mesoslip_numerics_sundials_text, only: message_type
    implicit none
@@ -24,6 +19,7 @@ module mesoslip_numerics_sundials_cvode
 
    public :: sundials_version, cvode_type
    public :: method_adams, method_bdf
+   public :: band_entries, vector_values
 
    !> Adams-Moulton's formulas with a fixed-point iteration, for what is not stiff
    integer, parameter :: method_adams = 1
@@ -33,11 +29,8 @@ module mesoslip_numerics_sundials_cvode
    !> An integration by CVODE. The state is an array of the caller, which must be a target as long
    !> as the integrator lives; close frees everything.
    type :: cvode_type
-      type(c_ptr), private :: context = c_null_ptr, memory = c_null_ptr
-      type(N_Vector), pointer, private :: state => null()
-      type(SUNNonlinearSolver), pointer, private :: fixed_point => null()
-      type(SUNLinearSolver), pointer, private :: linear => null()
-      type(SUNMatrix), pointer, private :: matrix => null()
+      type(c_ptr), private :: context = c_null_ptr, memory = c_null_ptr, state = c_null_ptr
+      type(c_ptr), private :: fixed_point = c_null_ptr, linear = c_null_ptr, matrix = c_null_ptr
       type(message_type), pointer, private :: message => null()
       !> Steps, evaluations of the rates and failed steps before the last restart
       integer(c_long), private :: counts_before(3) = 0_c_long
@@ -65,20 +58,6 @@ module mesoslip_numerics_sundials_cvode
       procedure, non_overridable, private :: expect
    end type cvode_type
 
-   interface
-      !> Version of the SUNDIALS library; its Fortran modules have no such function.
-      function get_version(version, length) bind(c, name="SUNDIALSGetVersion") result(status)
-         import :: c_char, c_int
-         implicit none
-         !> The version, a C string
-         character(kind=c_char), intent(out) :: version(*)
-         !> Room for it
-         integer(c_int), value, intent(in) :: length
-         !> 0 means success
-         integer(c_int) :: status
-      end function get_version
-   end interface
-
 contains
 
    !> Set up an integration.
@@ -105,30 +84,30 @@ contains
       length = size(state, kind=sunindextype)
       band = min(int(half_bandwidth, sunindextype), length - 1_sunindextype)
       allocate (self%message)
-      call self%expect(FSUNContext_Create(SUN_COMM_NULL, self%context), "context", error)
+      call self%expect(create_context(self%context), "context", error)
       if (allocated(error)) return
-      self%state => FN_VMake_Serial(length, state, self%context)
-      self%memory = FCVodeCreate(merge(CV_ADAMS, CV_BDF, method == method_adams), self%context)
-      if (.not. (associated(self%state) .and. c_associated(self%memory))) then
+      self%state = N_VMake_Serial(length, c_loc(state), self%context)
+      self%memory = CVodeCreate(merge(CV_ADAMS, CV_BDF, method == method_adams), self%context)
+      if (.not. (c_associated(self%state) .and. c_associated(self%memory))) then
          call self%expect(-1_c_int, "memory", error)
          return
       end if
       call collect_messages(self%context, self%memory, self%message)
-      call self%expect(FCVodeInit(self%memory, right_side, time, self%state), "start", error)
+      call self%expect(CVodeInit(self%memory, right_side, time, self%state), "start", error)
       if (allocated(error)) return
-      call self%expect(FCVodeSetUserData(self%memory, user_data), "data", error)
+      call self%expect(CVodeSetUserData(self%memory, user_data), "data", error)
       if (allocated(error)) return
-      call self%expect(FCVodeSStolerances(self%memory, relative, absolute), "tolerances", error)
+      call self%expect(CVodeSStolerances(self%memory, relative, absolute), "tolerances", error)
       if (allocated(error)) return
-      call self%expect(FCVodeSetMaxNumSteps(self%memory, most_steps), "steps", error)
+      call self%expect(CVodeSetMaxNumSteps(self%memory, most_steps), "steps", error)
       if (allocated(error)) return
       if (method == method_adams) then
-         self%fixed_point => FSUNNonlinSol_FixedPoint(self%state, 0_c_int, self%context)
-         call self%expect(FCVodeSetNonlinearSolver(self%memory, self%fixed_point), "solver", error)
+         self%fixed_point = SUNNonlinSol_FixedPoint(self%state, 0_c_int, self%context)
+         call self%expect(CVodeSetNonlinearSolver(self%memory, self%fixed_point), "solver", error)
       else
-         self%matrix => FSUNBandMatrix(length, band, band, self%context)
-         self%linear => FSUNLinSol_Band(self%state, self%matrix, self%context)
-         call self%expect(FCVodeSetLinearSolver(self%memory, self%linear, self%matrix), "solver", &
+         self%matrix = SUNBandMatrix(length, band, band, self%context)
+         self%linear = SUNLinSol_Band(self%state, self%matrix, self%context)
+         call self%expect(CVodeSetLinearSolver(self%memory, self%linear, self%matrix), "solver", &
             & error)
       end if
    end subroutine open
@@ -152,7 +131,7 @@ contains
       !> Set if it fails; the integrator is then closed
       type(error_type), allocatable, intent(out) :: error
 
-      call self%expect(FCVodeSetJacFn(self%memory, jacobian), "Jacobian", error)
+      call self%expect(CVodeSetJacFn(self%memory, jacobian), "Jacobian", error)
    end subroutine set_jacobian
 
    !> Start anew from the state in the caller's array.
@@ -165,7 +144,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%counts_before = self%counts()
-      call self%expect(FCVodeReInit(self%memory, time, self%state), "restart", error)
+      call self%expect(CVodeReInit(self%memory, time, self%state), "restart", error)
    end subroutine restart
 
    !> Make one step, not beyond a time.
@@ -180,22 +159,19 @@ contains
       !> Set if it fails; the integrator is then closed
       type(error_type), allocatable, intent(out) :: error
 
-      real(c_double) :: reached(1), last(1)
-      integer(c_int) :: orders(1), status
+      integer(c_int) :: last_order, status
 
       time = stop_time
       length = 0.0_c_double
       order = 0
-      call self%expect(FCVodeSetStopTime(self%memory, stop_time), "stop time", error)
+      call self%expect(CVodeSetStopTime(self%memory, stop_time), "stop time", error)
       if (allocated(error)) return
-      status = FCVode(self%memory, stop_time, self%state, reached, CV_ONE_STEP)
+      status = CVode(self%memory, stop_time, self%state, time, CV_ONE_STEP)
       call self%expect(status, "integration", error)
       if (allocated(error)) return
-      status = FCVodeGetLastStep(self%memory, last)
-      status = FCVodeGetLastOrder(self%memory, orders)
-      time = reached(1)
-      length = last(1)
-      order = int(orders(1))
+      status = CVodeGetLastStep(self%memory, length)
+      status = CVodeGetLastOrder(self%memory, last_order)
+      order = int(last_order)
    end subroutine step
 
    !> Derivative of the interpolating polynomial of the last step.
@@ -210,12 +186,12 @@ contains
       !> Set if it fails; the integrator is then closed
       type(error_type), allocatable, intent(out) :: error
 
-      type(N_Vector), pointer :: vector
+      type(c_ptr) :: vector
       integer(c_int) :: status
 
-      vector => FN_VMake_Serial(size(values, kind=sunindextype), values, self%context)
-      status = FCVodeGetDky(self%memory, time, int(order, c_int), vector)
-      call FN_VDestroy(vector)
+      vector = N_VMake_Serial(size(values, kind=sunindextype), c_loc(values), self%context)
+      status = CVodeGetDky(self%memory, time, int(order, c_int), vector)
+      call N_VDestroy(vector)
       call self%expect(status, "interpolation", error)
    end subroutine derivative
 
@@ -226,17 +202,17 @@ contains
       !> These three
       integer(c_long) :: counts(3)
 
-      integer(c_long) :: number(1)
+      integer(c_long) :: number
       integer(c_int) :: status
 
       counts = self%counts_before
       if (.not. self%is_open()) return
-      status = FCVodeGetNumSteps(self%memory, number)
-      if (status >= 0) counts(1) = counts(1) + number(1)
-      status = FCVodeGetNumRhsEvals(self%memory, number)
-      if (status >= 0) counts(2) = counts(2) + number(1)
-      status = FCVodeGetNumErrTestFails(self%memory, number)
-      if (status >= 0) counts(3) = counts(3) + number(1)
+      status = CVodeGetNumSteps(self%memory, number)
+      if (status >= 0) counts(1) = counts(1) + number
+      status = CVodeGetNumRhsEvals(self%memory, number)
+      if (status >= 0) counts(2) = counts(2) + number
+      status = CVodeGetNumErrTestFails(self%memory, number)
+      if (status >= 0) counts(3) = counts(3) + number
    end function counts
 
    !> Have the integration stop where functions are zero.
@@ -249,7 +225,7 @@ contains
       !> Set if it fails; the integrator is then closed
       type(error_type), allocatable, intent(out) :: error
 
-      call self%expect(FCVodeRootInit(self%memory, int(number, c_int), functions), "roots", error)
+      call self%expect(CVodeRootInit(self%memory, int(number, c_int), functions), "roots", error)
    end subroutine find_roots
 
    !> Integrate up to a time, or to a root before it. The state is in the array given to open.
@@ -265,12 +241,10 @@ contains
       !> Set if it fails; the integrator is then closed
       type(error_type), allocatable, intent(out) :: error
 
-      real(c_double) :: reached(1)
       integer(c_int) :: status
 
-      reached = end_time
-      status = FCVode(self%memory, end_time, self%state, reached, CV_NORMAL)
-      time = reached(1)
+      time = end_time
+      status = CVode(self%memory, end_time, self%state, time, CV_NORMAL)
       has_root = status == CV_ROOT_RETURN
       if (status < 0) call self%expect(status, "integration", error)
    end subroutine integrate
@@ -300,16 +274,19 @@ contains
 
       integer(c_int) :: status
 
-      if (c_associated(self%memory)) call FCVodeFree(self%memory)
-      if (associated(self%fixed_point)) status = FSUNNonlinSolFree(self%fixed_point)
-      if (associated(self%linear)) status = FSUNLinSolFree(self%linear)
-      if (associated(self%matrix)) call FSUNMatDestroy(self%matrix)
-      if (associated(self%state)) call FN_VDestroy(self%state)
-      if (c_associated(self%context)) status = FSUNContext_Free(self%context)
+      if (c_associated(self%memory)) call CVodeFree(self%memory)
+      if (c_associated(self%fixed_point)) status = SUNNonlinSolFree(self%fixed_point)
+      if (c_associated(self%linear)) status = SUNLinSolFree(self%linear)
+      if (c_associated(self%matrix)) call SUNMatDestroy(self%matrix)
+      if (c_associated(self%state)) call N_VDestroy(self%state)
+      if (c_associated(self%context)) status = SUNContext_Free(self%context)
       if (associated(self%message)) deallocate (self%message)
       self%memory = c_null_ptr
       self%context = c_null_ptr
-      nullify (self%fixed_point, self%linear, self%matrix, self%state)
+      self%state = c_null_ptr
+      self%fixed_point = c_null_ptr
+      self%linear = c_null_ptr
+      self%matrix = c_null_ptr
    end subroutine close
 
    !> Version of the SUNDIALS library in use; empty if it does not tell.
@@ -323,7 +300,7 @@ contains
 
       text = c_null_char
       version = ""
-      if (get_version(text, int(longest, c_int)) /= 0) return
+      if (SUNDIALSGetVersion(text, int(longest, c_int)) /= 0) return
       do place = 1, longest
          if (text(place) == c_null_char) exit
          version = version // text(place)

@@ -38,9 +38,12 @@ module mesoslip_drive
       integer, private :: part = 1
       real(wp), allocatable, private :: part_end(:), start_rate(:), end_rate(:)
       integer, allocatable, private :: stage_of_part(:)
+      !> Value at the start of each part, if it may jump there
+      real(wp), allocatable, private :: start_value(:)
    contains
-      !> Set the parts
+      !> Set the parts, and the values at which they start
       procedure, non_overridable :: open
+      procedure, non_overridable :: set_values
       procedure, non_overridable :: is_open
       !> Take the rate of the first part, of the next, or turn round
       procedure, non_overridable :: begin
@@ -93,6 +96,24 @@ contains
       self%stage_of_part = stage_of_part
    end subroutine open
 
+   !> Set the values at which the parts start; otherwise the value is continuous.
+   subroutine set_values(self, start_value, error)
+      !> The drive, open
+      class(drive_type), intent(inout) :: self
+      !> Value at the start of each part
+      real(wp), intent(in) :: start_value(:)
+      !> Set if there are not as many as parts
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. self%is_open()) then
+         call raise(error, status_invalid, "the parts of a drive come before their values")
+      else if (size(start_value) /= size(self%part_end)) then
+         call raise(error, status_invalid, "each part of a drive has one value at its start")
+      else
+         self%start_value = start_value
+      end if
+   end subroutine set_values
+
    !> Whether the parts are set.
    pure function is_open(self)
       !> The drive
@@ -135,6 +156,11 @@ contains
          ! A ramp to rest does not turn: its time of rest may be rounded to before its end.
          if (.not. start * end < 0.0_wp) self%turn = huge(1.0_wp)
       end associate
+      if (.not. allocated(self%start_value)) return
+      self%value = self%start_value(self%part)
+      if (.not. abs(self%rate) > 0.0_wp .and. abs(self%value) > 0.0_wp) then
+         self%direction = sign(1.0_wp, self%value)
+      end if
    end subroutine take_part
 
    !> Turn round within a part.

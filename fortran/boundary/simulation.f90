@@ -119,6 +119,34 @@ subroutine set_drive(handle, parts, part_end, start_rate, end_rate, stage, statu
    call report(error, status, message)
 end subroutine set_drive
 
+!> Give a simulation, which has its drive, the values at which the parts of the drive start.
+subroutine set_drive_values(handle, parts, start_value, status, message)
+   !f2py threadsafe
+   use mesoslip_boundary_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_loop_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Number of parts; value at the start of each, a force [N]
+   integer, intent(in) :: parts
+   real(8), intent(in) :: start_value(parts)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) then
+      if (allocated(simulation%slider)) then
+         call simulation%slider%drive%set_values(start_value, error)
+      else
+         call raise(error, status_invalid, "the slider comes before its drive")
+      end if
+   end if
+   call report(error, status, message)
+end subroutine set_drive_values
+
 !> Set when a simulation stops before its drive ends.
 subroutine set_stop(handle, slips, displacement, block_distance, blocks, tolerance, status, message)
    !f2py threadsafe

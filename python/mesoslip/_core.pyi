@@ -110,6 +110,11 @@ def set_drive(
     stage: NDArray[np.int32],
     parts: int = ...,
 ) -> tuple[int, bytes]: ...
+def set_drive_values(
+    handle: NDArray[np.int64],
+    start_value: NDArray[np.float64],
+    parts: int = ...,
+) -> tuple[int, bytes]: ...
 def set_recorder(
     handle: NDArray[np.int64],
     interval: float,

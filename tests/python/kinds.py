@@ -41,6 +41,18 @@ RAMPS = {
 }
 AGEING = {"contacts__coupling": "equal", "contacts__ageing": RELAX}
 
+# Jumps and ramps of a force, with slips in between.
+FORCE = {
+    "slider": {"kind": "force", "mass": 1.47e-3, "damping": 50.0},
+    "drive": {
+        "stage": [
+            {"duration": 0.04, "force": 1.2e-5},
+            {"duration": 0.02, "start_force": 1.2e-5, "end_force": 2.0e-5},
+            {"duration": 0.04, "force": -3e-6},
+        ]
+    },
+}
+
 KINDS: dict[str, dict[str, Any]] = {
     "rigid": {},
     "rigid, three realizations": {"run__realizations": 3, "contacts__coupling": "equal"},
@@ -82,6 +94,8 @@ KINDS: dict[str, dict[str, Any]] = {
         "contacts__reattach": False,
         "contacts__count": 2000,
     },
+    "force": FORCE,
+    "force, me": FORCE | {"run__engine": "me"},
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},

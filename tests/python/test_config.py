@@ -65,7 +65,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         (
             "slider",
             {"kind": "quasistatic", "stiffness": 97.0, "mass": 1.0},
-            ["slider.mass", 'is for slider.kind = "rigid" or "layered" only'],
+            ["slider.mass", 'is for slider.kind = "rigid" or "layered" or "force" only'],
         ),
         ("slider", LAYERED | {"layers": 0}, ["slider.layers", "greater than or equal to 1"]),
         ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", '"rigid" only']),
@@ -112,7 +112,7 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("drive__velocity", "3 s", ["drive.velocity", "um/s"]),
         ("drive__velocity", None, ["drive.velocity", "either"]),
         ("drive__force_rate", "1 uN/s", ["drive.velocity", "either", "force_rate"]),
-        ("drive", {"force_rate": "1 uN/s"}, ["drive.force_rate", '"quasistatic" only']),
+        ("drive", {"force_rate": "1 uN/s"}, ["drive.force_rate", '"quasistatic" or "force" only']),
         ("drive", {"force_rate": 0.0}, ["drive.force_rate", "must not be 0"]),
         ("run__drive_displacement", "1 um", ["run.drive_displacement", "run.duration"]),
         ("run__avalanches", 10, ["run.avalanches", "[interaction]", "quasistatic"]),
@@ -491,7 +491,7 @@ def test_another_kind_keeps_what_it_has_too(changes, expected, tmp_path):
 def test_another_kind_refuses_what_was_set_beside_it():
     path = ROOT / "runs" / "klein.toml"
     for changes in (["kind=quasistatic", "mass=1 g"], ["mass=1 g", "kind=quasistatic"]):
-        with pytest.raises(ConfigError, match=r'slider\.mass.*"rigid" or "layered" only'):
+        with pytest.raises(ConfigError, match=r'slider\.mass.*"rigid" or "layered" or "force"'):
             Config.load(path, [f"slider.{change}" for change in changes])
 
 
@@ -977,7 +977,8 @@ def test_a_kind_of_slider_is_named_once():
         assert SLIDERS[kind] is table
         keys = {"kind": kind} | dict.fromkeys(("mass", "stiffness", "layers"), 1)
         keys = {key: value for key, value in keys.items() if key in table.model_fields}
-        assert type(Config.from_dict(klein_tables(slider=keys)).slider) is table
+        drive = {"force": 1e-6} if table.takes_forces else {"velocity": 1e-7}
+        assert type(Config.from_dict(klein_tables(slider=keys, drive=drive)).slider) is table
 
 
 def test_a_configuration_is_checked_however_it_is_made():

@@ -37,9 +37,17 @@ def drive_problems(config: Setting) -> Complaints:
     if drive.force_rate is not None and not config.slider.driven_by_force:
         named = _named(kind for kind, table in SLIDERS.items() if table.driven_by_force)
         yield Complaint("drive.force_rate", f"is for {named} only", drive.force_rate)
+    elif drive.is_force and drive.force_rate is None and not config.slider.takes_forces:
+        named = _named(kind for kind, table in SLIDERS.items() if table.takes_forces)
+        key = "drive.force" if drive.force is not None else "drive.stage"
+        yield Complaint(key, f"a force is for {named} only")
     if run.drive_displacement is not None:
         distance = run.drive_displacement
-        if run.duration is not None:
+        if drive.is_force:
+            yield Complaint(
+                "run.drive_displacement", "is not for a force; give run.duration", distance
+            )
+        elif run.duration is not None:
             yield Complaint("run.drive_displacement", "give either this or run.duration", distance)
         elif not drive.last_velocity and not any(part.path_length for part in drive.parts):
             yield Complaint(
@@ -97,8 +105,8 @@ def _stop_problems(config: Setting) -> Complaints:
             yield Complaint(
                 "run.stop.steady", "needs a drive that ends at a constant velocity other than 0"
             )
-        elif config.drive.force_rate is not None:
-            yield Complaint("run.stop.steady", "is not for a force that grows")
+        elif config.drive.is_force:
+            yield Complaint("run.stop.steady", "is not for a force")
 
 
 def output_problems(config: Setting) -> Complaints:

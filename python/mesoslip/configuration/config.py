@@ -160,6 +160,8 @@ class Config(Table):
         contacts = self.contacts
         if self.drive.force_rate is not None:
             return contacts.static_force / abs(self.drive.force_rate)
+        if self.drive.is_force:
+            return math.inf
         stiffness = self.spring_stiffness
         stretch = contacts.break_stretch
         loading = stretch + contacts.static_force / stiffness
@@ -202,7 +204,7 @@ class Config(Table):
 
         For a ramp the maximum, for a measured history the mean.
         """
-        if self.drive.force_rate is not None:
+        if self.drive.is_force:
             return 0.0
         if self.drive.history is not None:
             return math.fsum(part.path_length for part in self.drive_parts) / self.duration

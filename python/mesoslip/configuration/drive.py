@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -23,6 +23,7 @@ from mesoslip.configuration.table import (
     MeasuredLength,
     MeasuredTime,
     Rate,
+    SignedForce,
     Table,
     Text,
     Time,
@@ -115,7 +116,8 @@ class DrivePart(NamedTuple):
 
 class Stage(Table):
     """A stage of the drive, which ends after a duration or a displacement: a constant velocity of
-    either sign, a ramp from one velocity to another, or a hold."""
+    either sign, a ramp from one velocity to another, or a hold; or a force, constant or a ramp,
+    which ends after a duration."""
 
     duration: Annotated[Time, Field(gt=0)] | None = None
     """Duration of the stage."""
@@ -129,21 +131,37 @@ class Stage(Table):
     """Velocity at the end of a ramp."""
     hold: StrictBool | None = None
     """Whether the drive stands still."""
+    force: SignedForce | None = None
+    """Force on a slider without a spring, of either sign."""
+    start_force: SignedForce | None = None
+    """Force at the start of a ramp."""
+    end_force: SignedForce | None = None
+    """Force at the end of a ramp."""
 
     @model_validator(mode="after")
     def _is_one_motion(self) -> Self:
-        ramp = (self.start_velocity, self.end_velocity)
-        given = [self.velocity is not None, ramp != (None, None), bool(self.hold)]
+        given = [
+            self.velocity is not None,
+            self._is_ramp("velocity"),
+            bool(self.hold),
+            self.force is not None,
+            self._is_ramp("force"),
+        ]
         if sum(given) != 1:
             raise problem(
                 "velocity",
                 "give "
                 + ("only one of " if any(given) else "")
-                + "a velocity, start_velocity with end_velocity, or hold = true",
+                + "a velocity, start_velocity with end_velocity, hold = true, a force, or "
+                "start_force with end_force",
             )
-        if ramp.count(None) == 1:
-            missing = "start_velocity" if self.start_velocity is None else "end_velocity"
-            raise problem(missing, "missing; a ramp has start_velocity and end_velocity")
+        for which in ("velocity", "force"):
+            keys = (f"start_{which}", f"end_{which}")
+            missing = [key for key in keys if getattr(self, key) is None]
+            if self._is_ramp(which) and missing:
+                raise problem(missing[0], f"missing; a ramp has {keys[0]} and {keys[1]}")
+        if self.is_force and self.displacement is not None:
+            raise problem("displacement", "is not for a force; give a duration")
         if (self.duration is None) == (self.displacement is None):
             raise problem("duration", "give either a duration or a displacement")
         if self.displacement is not None:
@@ -156,8 +174,28 @@ class Stage(Table):
                 raise problem("displacement", "is never reached at velocity 0; give a duration")
         return self
 
+    def _is_ramp(self, which: str) -> bool:
+        """Whether one end of a ramp of the velocity or the force is given."""
+        return (getattr(self, f"start_{which}"), getattr(self, f"end_{which}")) != (None, None)
+
+    @property
+    def is_force(self) -> bool:
+        """Whether a force is prescribed."""
+        return self.force is not None or self._is_ramp("force")
+
+    @property
+    def first_force(self) -> float:
+        """Force at its start [N]."""
+        return self.force if self.force is not None else self.start_force or 0.0
+
     @property
     def _velocities(self) -> tuple[float, float]:
+        """Velocities at start and end [m/s], or rates of the force [N/s]."""
+        if self.is_force:
+            assert self.duration is not None
+            last = self.force if self.force is not None else self.end_force or 0.0
+            rate = (last - self.first_force) / self.duration
+            return rate, rate
         if self.hold:
             return 0.0, 0.0
         if self.velocity is not None:
@@ -297,7 +335,7 @@ def read_history(path: Path) -> dict[str, list[float]]:
 
 class Drive(Table):
     """The drive: one velocity, stages (which may be repeated), oscillation, a measured history, or
-    a force that grows."""
+    a force, constant or growing."""
 
     velocity: Velocity | None = None
     """One velocity for the whole run."""
@@ -309,22 +347,26 @@ class Drive(Table):
     """An oscillating drive."""
     history: History | None = None
     """A measured motion of the drive."""
+    force: SignedForce | None = None
+    """Constant force on a slider of kind "force", from the start of the run on."""
     force_rate: ForceRate | None = None
-    """Rate of a force that acts on a quasi-static slider without a spring."""
+    """Rate of a force that acts on a slider without a spring, from 0 on."""
 
     @model_validator(mode="after")
     def _one_of_them(self) -> Self:
-        given = [self.velocity, self.stage, self.cycle, self.history, self.force_rate]
+        given = [self.velocity, self.stage, self.cycle, self.history, self.force, self.force_rate]
         if given.count(None) != len(given) - 1:
             raise problem(
                 "velocity",
                 "give either a velocity, [[drive.stage]] tables, [drive.cycle], [drive.history], "
-                "or a force_rate to a quasistatic slider",
+                "or a force or force_rate to a slider without a spring",
             )
         if self.force_rate == 0:
             raise problem("force_rate", "must not be 0")
         if self.stage is not None and not self.stage:
             raise problem("stage", "must have at least one stage")
+        if self.stage is not None and len({one.is_force for one in self.stage}) > 1:
+            raise problem("stage", "must all have forces, or all velocities and holds")
         if self.repeat is not None:
             if self.stage is None:
                 raise problem("repeat", "needs [[drive.stage]] tables, which it repeats")
@@ -347,8 +389,37 @@ class Drive(Table):
         return () if given is None else tuple(given.parts())
 
     @property
+    def is_force(self) -> bool:
+        """Whether it prescribes a force instead of a displacement."""
+        return (
+            self.force is not None
+            or self.force_rate is not None
+            or bool(self.stage and self.stage[0].is_force)
+        )
+
+    def start_forces(self, parts: Sequence[DrivePart]) -> tuple[float, ...] | None:
+        """Force at the start of each part [N]; None where the drive's value is continuous.
+
+        Parameters
+        ----------
+        parts
+            The parts of a run, as of `until`.
+        """
+        if self.force is not None:
+            return (self.force,) * len(parts)
+        if self.stage is None or not self.is_force:
+            return None
+        given = [one.first_force for one in self.stage] * (self.repeat or 1)
+        last = parts[-1]
+        if last.stage == len(given):
+            # The force stays where the last stage left it.
+            final = self.stage[-1]
+            given.append(final.force if final.force is not None else final.end_force or 0.0)
+        return tuple(given[part.stage] for part in parts)
+
+    @property
     def continues(self) -> bool:
-        """Whether it continues at its last velocity after its given parts."""
+        """Whether it continues after its parts, at its last velocity or with its last force."""
         return self.cycle is None and self.history is None
 
     @cached_property
@@ -359,6 +430,8 @@ class Drive(Table):
     @property
     def last_velocity(self) -> float:
         """Velocity after its parts [m/s], or the rate of the force [N/s]."""
+        if self.parts and self.is_force:
+            return 0.0
         if self.parts:
             return self.parts[-1].end_velocity
         return (self.velocity if self.force_rate is None else self.force_rate) or 0.0

@@ -16,7 +16,7 @@ from mesoslip.errors import ConfigError, FileError, Problem
 # Keys that exclude each other: one replaces another one of the base.
 EXCLUSIVE = {
     "run": ("duration", "drive_displacement"),
-    "drive": ("velocity", "stage", "cycle", "history", "force_rate"),
+    "drive": ("velocity", "stage", "cycle", "history", "force", "force_rate"),
     "cycle": ("velocity", "frequency"),
     "history": ("file", "time", "displacement"),
     "slider": ("damping", "damping_ratio"),

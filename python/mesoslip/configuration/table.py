@@ -65,6 +65,7 @@ Mass = Annotated[float, _quantity("kg", "1.47 g", 1e-27, 1e24)]
 Stiffness = Annotated[float, _quantity("N/m", "97 N/m", 1e-18, 1e18)]
 Rate = Annotated[float, _quantity("1/s", "51.4 1/s", 1e-18, 1e24)]
 Force = Annotated[float, _quantity("N", "18 uN", 1e-18, 1e18)]
+SignedForce = Annotated[float, _quantity("N", "10 uN", 0.0, 1e18)]
 ForceRate = Annotated[float, _quantity("N/s", "1 uN/s", 1e-24, 1e18)]
 # From an atom's nucleus to the Earth.
 Area = Annotated[float, _quantity("m^2", "1e-10 m^2", 1e-24, 1e15)]

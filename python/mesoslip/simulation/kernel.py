@@ -129,6 +129,10 @@ class Kernel:
         the end [m/s], and the number of the stage that it is of."""
         self._call(_core.set_drive, part_end, start_velocity, end_velocity, stage)
 
+    def set_drive_values(self, start_value: Array) -> None:
+        """Force at the start of each part of the drive [N], shape (parts)."""
+        self._call(_core.set_drive_values, start_value)
+
     def set_stop(
         self,
         *,

@@ -115,10 +115,10 @@ def _time_in_slips(config: Config) -> float:
 
 
 def _breaks(config: Config) -> float:
-    """About how many contacts break: one after each mean breaking stretch, and under a force that
-    grows each of them about once, before the slider slides without end."""
+    """About how many contacts break: one after each mean breaking stretch, and under a force each
+    of them about once, before the slider slides without end."""
     contacts = config.contacts
-    if not contacts.reattach or config.drive.force_rate is not None:
+    if not contacts.reattach or config.drive.is_force:
         return contacts.count
     path_length = math.fsum(part.path_length for part in config.drive_parts)
     return contacts.count * path_length / contacts.break_stretch

@@ -221,6 +221,9 @@ class Realization:
         )
         ends = np.minimum(np.cumsum(durations), NEVER)
         kernel.set_drive(ends, start_velocities, end_velocities, stages)
+        forces = config.drive.start_forces(config.drive_parts)
+        if forces is not None:
+            kernel.set_drive_values(np.array(forces))
         stop = config.run.stops
         kernel.set_stop(
             slips=stop.slips or 0,

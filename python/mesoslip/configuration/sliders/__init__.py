@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 from pydantic import Discriminator, Tag
 
 from mesoslip.configuration.sliders.base import SliderTable
+from mesoslip.configuration.sliders.force import ForceSlider
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
@@ -23,6 +24,7 @@ KINDS: tuple[type[SliderTable], ...] = (
     LayeredSlider,
     PrescribedSlider,
     QuasistaticSlider,
+    ForceSlider,
 )
 
 # The first one is the default.

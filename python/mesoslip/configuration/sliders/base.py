@@ -55,12 +55,15 @@ class SliderTable(Table):
     ignores_delay
         Whether contacts attach at once and bear no drag, whatever their delay and film.
     driven_by_force
-        Whether the drive may be a force, without a spring.
+        Whether the drive may be a force that grows from 0, without a spring.
+    takes_forces
+        Whether the drive may be any force, which may jump.
     """
 
     jumps: ClassVar[bool] = False
     ignores_delay: ClassVar[bool] = False
     driven_by_force: ClassVar[bool] = False
+    takes_forces: ClassVar[bool] = False
 
     kind: str
     """Kind of the slider."""

@@ -1,0 +1,348 @@
+!> A slider with mass under a force, without a spring: M V' = F_ext - F - M eta_S V.
+!>
+!> Under a linear law of the contact force the motion is that of a linear system with constant
+!> coefficients, advanced by its Taylor series as that of a rigid slider. A motion that has settled
+!> to uniform creep is advanced in one step, however long.
+module mesoslip_sliders_force
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_quadrature, only: gauss_legendre
+   use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, slider_type
+   use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, second_integral
+   use mesoslip_step_filter, only: step_filter_type
+   implicit none
+   private
+
+   public :: slider_force_type, make_slider_force
+
+   !> Terms of the series, and the length of the longest step in units of the fastest rate: what the
+   !> series leaves out is less than 1e-16 of its leading terms.
+   integer, parameter :: terms = 17
+   real(wp), parameter :: max_step = 0.5_wp
+   !> Points of the rule for the losses of a step
+   integer, parameter :: nodes = 6
+   !> Forces that differ by this part are equal up to rounding.
+   real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
+
+   !> A slider with mass under a force.
+   type, extends(slider_type) :: slider_force_type
+      !> Mass M [kg], damping rate eta_S [1/s]
+      real(wp), private :: mass = 1.0_wp, damping = 0.0_wp
+      !> Contact force during the last advance, and displacement at its start [m]
+      type(interface_law_type), private :: law
+      real(wp), private :: start_displacement = 0.0_wp
+      !> Taylor coefficients of the velocity in the time since then
+      real(wp), private :: series(0:terms - 1) = 0.0_wp
+      !> Gauss-Legendre rule on [0, 1]
+      real(wp), private :: point(nodes), weight(nodes)
+   contains
+      procedure :: start
+      procedure :: advance
+      procedure :: observe
+      procedure :: energy
+      procedure :: note_extreme
+      procedure :: select_extremes
+      procedure :: shift_origin
+      procedure :: exchange
+   end type slider_force_type
+
+contains
+
+   !> Set up a slider under a force from named numbers.
+   subroutine make_slider_force(slider, parameters, error)
+      !> The slider
+      class(slider_type), allocatable, intent(out) :: slider
+      !> Mass and damping
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(slider_force_type), allocatable :: self
+
+      allocate (self)
+      call parameters%take("mass", self%mass, error)
+      call parameters%take("damping", self%damping, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      self%inverse_mass = 1.0_wp / self%mass
+      call gauss_legendre(self%point, self%weight)
+      call move_alloc(self, slider)
+   end subroutine make_slider_force
+
+   !> Put the slider at rest; the force is not in balance with the contacts, but acts from now on.
+   subroutine start(self, law)
+      !> The slider, its displacement zero
+      class(slider_force_type), intent(inout) :: self
+      !> Contact force at the start
+      type(interface_law_type), intent(in) :: law
+
+      self%law = law
+      self%velocity = 0.0_wp
+      self%start_displacement = self%displacement
+      self%series = 0.0_wp
+   end subroutine start
+
+   !> Move until the first end of a window, or less far.
+   subroutine advance(self, law, window)
+      !> The slider
+      class(slider_force_type), intent(inout) :: self
+      !> Contact force
+      type(interface_law_type), intent(in) :: law
+      !> Where the law holds
+      type(window_type), intent(in) :: window
+
+      real(wp) :: force, step
+
+      self%law = law
+      self%step_time = self%time
+      self%start_displacement = self%displacement
+      force = self%drive%at(self%time)
+      self%start_acceleration = acceleration_under(self, force, 0.0_wp)
+
+      if (is_settled(self, force)) then
+         call glide(self, window, step)
+      else
+         call move(self, window, step)
+      end if
+
+      call add_work(self, force, step)
+      self%acceleration = acceleration_under(self, self%drive%at(self%time), step)
+      if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
+   end subroutine advance
+
+   !> Acceleration of the slider where it is.
+   pure function acceleration_under(self, force, since) result(acceleration)
+      type(slider_force_type), intent(in) :: self
+      !> Force [N], and time since the start of the advance [s]
+      real(wp), intent(in) :: force, since
+      !> Acceleration [m/s2]
+      real(wp) :: acceleration
+
+      acceleration = self%inverse_mass * ((force - (self%law%stiffness * self%displacement &
+         & - self%law%offset + self%law%rate * since)) - self%law%drag * self%velocity) &
+         & - self%damping * self%velocity
+   end function acceleration_under
+
+   !> Velocity of uniform creep under a force that changes linearly.
+   pure function creep_velocity(self) result(velocity)
+      type(slider_force_type), intent(in) :: self
+      !> Velocity [m/s]
+      real(wp) :: velocity
+
+      velocity = (self%drive%rate - self%law%rate) / self%law%stiffness
+   end function creep_velocity
+
+   !> Whether the motion differs from uniform creep by rounding only. Contacts that hold the slider
+   !> and a damper bring it there.
+   pure function is_settled(self, force) result(settled)
+      type(slider_force_type), intent(in) :: self
+      !> Force [N]
+      real(wp), intent(in) :: force
+      logical :: settled
+
+      real(wp) :: noise
+
+      settled = .false.
+      if (.not. (self%law%stiffness > 0.0_wp &
+         & .and. self%law%drag + self%mass * self%damping > 0.0_wp)) return
+      noise = rounding * (abs(force) + abs(self%law%stiffness * self%displacement) &
+         & + abs(self%law%offset))
+      settled = self%mass * abs(self%start_acceleration) <= noise &
+         & .and. sqrt(self%mass * self%law%stiffness) &
+         & * abs(self%velocity - creep_velocity(self)) <= noise
+   end function is_settled
+
+   !> Creep uniformly to the first end of the window.
+   subroutine glide(self, window, step)
+      type(slider_force_type), intent(inout) :: self
+      type(window_type), intent(in) :: window
+      !> Duration [s]
+      real(wp), intent(out) :: step
+
+      real(wp) :: velocity, gap, target
+
+      velocity = creep_velocity(self)
+      self%velocity = velocity
+      self%series = 0.0_wp
+      self%series(0) = velocity
+      step = window%end_time - self%time
+      target = merge(window%upper, window%lower, velocity > 0.0_wp)
+      gap = abs(target - self%displacement)
+      if (abs(velocity) * step >= gap .and. abs(velocity) > 0.0_wp) then
+         step = gap / abs(velocity)
+         self%time = self%time + step
+         self%displacement = target
+      else
+         self%time = window%end_time
+         self%displacement = self%displacement + velocity * step
+      end if
+   end subroutine glide
+
+   !> Move as far as a series reaches, or to the first end of the window or turning point before.
+   subroutine move(self, window, step)
+      type(slider_force_type), intent(inout) :: self
+      type(window_type), intent(in) :: window
+      !> Duration [s]
+      real(wp), intent(out) :: step
+
+      real(wp) :: rate, change, target, direction
+      logical :: ends, crosses, turns
+      integer :: term
+
+      rate = sqrt(abs(self%law%stiffness) * self%inverse_mass) &
+         & + self%law%drag * self%inverse_mass + self%damping
+      step = window%end_time - self%time
+      ends = step * rate <= max_step
+      if (.not. ends) step = max_step / rate
+      call expand(self)
+      change = 0.0_wp
+      do term = terms - 1, 1, -1
+         change = (change + abs(self%series(term))) * step
+      end do
+      associate (longest => window%end_time - self%time)
+         call first_end(self%series, terms, window%upper - self%displacement, &
+            & window%lower - self%displacement, change, step, crosses, turns, direction)
+         ends = ends .and. .not. (crosses .or. turns) .and. step >= longest
+      end associate
+      target = merge(window%upper, window%lower, direction > 0.0_wp)
+      if (crosses) then
+         self%displacement = target
+      else
+         self%displacement = self%displacement + integral(self%series, terms, step)
+      end if
+      if (ends) then
+         self%time = window%end_time
+      else
+         self%time = self%time + step
+      end if
+      self%velocity = horner(self%series, terms, step)
+      if (turns) self%velocity = 0.0_wp
+   end subroutine move
+
+   !> Taylor coefficients of the velocity, from the equation of motion.
+   subroutine expand(self)
+      type(slider_force_type), intent(inout) :: self
+
+      real(wp) :: driving, drag
+      integer :: term
+
+      driving = (self%drive%rate - self%law%rate) * self%inverse_mass
+      drag = self%law%drag * self%inverse_mass + self%damping
+      self%series(0) = self%velocity
+      self%series(1) = self%start_acceleration
+      do term = 2, terms - 1
+         self%series(term) = inverse(term) * (inverse(term - 1) * (driving &
+            & - self%law%stiffness * self%inverse_mass * self%series(term - 2)) &
+            & - drag * self%series(term - 1))
+         driving = 0.0_wp
+      end do
+   end subroutine expand
+
+   !> Add the work and the impulse of the force in a step, and the losses, to the energy balance.
+   subroutine add_work(self, force, step)
+      type(slider_force_type), intent(inout) :: self
+      !> Force at the start [N], and duration [s]
+      real(wp), intent(in) :: force, step
+
+      real(wp) :: distance, swept, squares
+      integer :: node
+
+      distance = self%displacement - self%start_displacement
+      swept = second_integral(self%series, terms, step)
+      squares = 0.0_wp
+      do node = 1, nodes
+         squares = squares + self%weight(node) &
+            & * horner(self%series, terms, self%point(node) * step)**2
+      end do
+      squares = squares * step
+      call self%drive%earlier_work%add(force * distance &
+         & + self%drive%rate * (step * distance - swept))
+      call self%drive%earlier_impulse%add(step * (force + 0.5_wp * self%drive%rate * step))
+      call self%drag_loss%add(self%law%drag * squares)
+      call self%damping_loss%add(self%mass * self%damping * squares)
+   end subroutine add_work
+
+   !> The motion at a time of the last advance.
+   pure function observe(self, time) result(motion)
+      !> The slider
+      class(slider_force_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> The motion; the drive is where the slider is
+      type(motion_type) :: motion
+
+      real(wp) :: step, displacement
+
+      step = time - self%step_time
+      displacement = self%start_displacement + integral(self%series, terms, step)
+      motion%time = time
+      motion%displacement = self%origin + displacement
+      motion%drive_displacement = motion%displacement
+      motion%velocity = horner(self%series, terms, step)
+      motion%pulled_velocity = motion%velocity
+      motion%spring_force = self%drive%at(time)
+      motion%elastic_force = motion%spring_force
+      motion%contact_force = self%law%stiffness * displacement - self%law%offset &
+         & + self%law%drag * motion%velocity + self%law%rate * step
+   end function observe
+
+   !> Kinetic energy.
+   pure function energy(self)
+      !> The slider
+      class(slider_force_type), intent(in) :: self
+      !> Energy [J]
+      real(wp) :: energy
+
+      energy = 0.5_wp * self%mass * self%velocity**2
+   end function energy
+
+   !> The force is prescribed: its extremes are where the drive changes.
+   subroutine note_extreme(self)
+      !> The slider
+      class(slider_force_type), intent(inout) :: self
+
+   end subroutine note_extreme
+
+   !> No step has an extreme of the force.
+   pure subroutine select_extremes(self, filter)
+      !> The slider
+      class(slider_force_type), intent(in) :: self
+      !> The filter
+      type(step_filter_type), intent(inout) :: filter
+
+   end subroutine select_extremes
+
+   !> Move the origin of displacements, which the force does not depend on.
+   subroutine shift_origin(self, shift)
+      !> The slider
+      class(slider_force_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      call self%drive%rebase(self%time, 0.0_wp)
+      self%displacement = self%displacement - shift
+      self%origin = self%origin + shift
+   end subroutine shift_origin
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The slider
+      class(slider_force_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      real(wp), allocatable :: series(:)
+
+      call archive%section("slider under a force")
+      call exchange_slider(self, archive)
+      call exchange_law(self%law, archive)
+      call archive%exchange("start_displacement", self%start_displacement)
+      series = self%series
+      call archive%exchange("series", series)
+      if (size(series) == size(self%series)) self%series = series
+   end subroutine exchange
+
+end module mesoslip_sliders_force

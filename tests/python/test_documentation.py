@@ -241,6 +241,31 @@ def test_scripts_of_the_gallery(script):
     plt.close("all")
 
 
+def test_names_of_the_glossary_are_those_of_the_program():
+    """Keys, lines of info and curve, variables of outputs, tables of fits, and commands."""
+    from mesoslip.analysis.rate_and_state import rows
+    from mesoslip.configuration.messages import all_keys
+    from mesoslip.output import variables
+    from mesoslip.theory import force_curve, slip_onset
+    from mesoslip.theory.derived import derived
+
+    text = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    lines = [line.split("|") for line in text.splitlines() if line.startswith("| ")]
+    names = {name for line in lines for name in re.findall(r"`([^`]+)`", line[4])}
+    groups = [one for one in vars(variables).values() if isinstance(one, variables.Group)]
+    known = {
+        *all_keys(Config),
+        *(f"mesoslip {name}" for name in typer.main.get_command(app).commands),
+        *(name for group in groups for name in group),
+        *derived(ROOT / "runs" / "klein.toml"),
+        *force_curve.SUMMARY,
+        *slip_onset.SUMMARY,
+        *rows.FIT,
+    }
+    assert len(names) > 50
+    assert names <= known, names - known
+
+
 @pytest.fixture
 def references(monkeypatch):
     """The makers of the references, which need no Sphinx."""

@@ -176,3 +176,66 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
    end if
    call report(error, status, message)
 end subroutine evaluate_threshold_law
+
+!> Motions of a slider on a spring with rate-and-state friction, for several sets of parameters.
+subroutine rate_and_state_motions(evolution, states, sets, parameters, reference_velocity, stages, &
+   & duration, start_velocity, end_velocity, points, times, tolerance, force, displacement, failed, &
+   & status, message)
+   !f2py threadsafe
+   use mesoslip_boundary_handles, only: report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_parameters, only: choose
+   use mesoslip_theory_rate_and_state, only: evolution_names, friction_type, load_type, move_slider
+   implicit none
+   !> "ageing" or "slip", and the number of state variables, 1 or 2
+   character(len=*), intent(in) :: evolution
+   integer, intent(in) :: states
+   !> Number of sets, and of each: a, b1, D1, b2, D2, stiffness, trend
+   integer, intent(in) :: sets
+   real(8), intent(in) :: parameters(7, sets)
+   !> V_0
+   real(8), intent(in) :: reference_velocity
+   !> Stages of the load point: number, durations, velocities at start and end
+   integer, intent(in) :: stages
+   real(8), intent(in) :: duration(stages), start_velocity(stages), end_velocity(stages)
+   !> Times in ascending order
+   integer, intent(in) :: points
+   real(8), intent(in) :: times(points)
+   !> Tolerance of the logarithms of velocity and state
+   real(8), intent(in) :: tolerance
+   !> Force without F_0, and displacement
+   real(8), intent(out) :: force(points, sets), displacement(points, sets)
+   !> 1 for each unstable motion
+   integer, intent(out) :: failed(sets)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(friction_type) :: friction
+   type(load_type) :: load
+   type(error_type), allocatable :: error
+   integer :: set
+   logical :: is_unstable
+
+   force = 0.0d0
+   displacement = 0.0d0
+   failed = 0
+   call choose("evolution", evolution, evolution_names, friction%evolution, error)
+   if (.not. allocated(error)) then
+      friction%states = states
+      friction%reference_velocity = reference_velocity
+      load%duration = duration
+      load%start_velocity = start_velocity
+      load%end_velocity = end_velocity
+      do set = 1, sets
+         friction%a = parameters(1, set)
+         friction%b = parameters([2, 4], set)
+         friction%distance = parameters([3, 5], set)
+         friction%stiffness = parameters(6, set)
+         friction%trend = parameters(7, set)
+         call move_slider(friction, load, times, tolerance, force(:, set), displacement(:, set), &
+            & is_unstable)
+         if (is_unstable) failed(set) = 1
+      end do
+   end if
+   call report(error, status, message)
+end subroutine rate_and_state_motions

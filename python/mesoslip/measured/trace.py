@@ -22,6 +22,7 @@ from mesoslip.measured.description import (
     describe,
     option_name,
 )
+from mesoslip.measured.load_point import drive_stages, stage_table
 from mesoslip.measured.record import Record, RecordedColumn
 from mesoslip.measured.table import read_record
 from mesoslip.output import variables
@@ -225,7 +226,17 @@ def trace_of(understood: Understood) -> xr.DataTree:
         "setup_period_origin": "estimated" if estimated else "given",
     }
     attributes = program_attributes(known, "trace") | details
-    return _tree(record, drive, displacement, found, velocity, stiffness, period, attributes)
+    return _tree(
+        record,
+        drive,
+        displacement,
+        found,
+        velocity,
+        stiffness,
+        period,
+        attributes,
+        has_config=config is not None,
+    )
 
 
 def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
@@ -313,6 +324,8 @@ def _tree(
     stiffness: float | None,
     period: float,
     attributes: dict[str, Any],
+    *,
+    has_config: bool,
 ) -> xr.DataTree:
     import xarray as xr
 
@@ -356,6 +369,8 @@ def _tree(
         for name, one in _names(record).items()
     }
     groups["/recorded"] = xr.Dataset(recorded)
+    if record.load_point is not None and not has_config:
+        groups["/stages"] = stage_table(drive_stages(record.time, record.load_point))
     return xr.DataTree.from_dict(groups)
 
 

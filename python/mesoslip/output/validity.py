@@ -83,6 +83,8 @@ def check_layout(tree: xr.DataTree, path: Path) -> None:
             slips = {name: one for name, one in slips.items() if name in tree.children}
         needed = {"": (("realization", "time"), root), **slips}
         needed |= {name: one for name, one in NEEDS.items() if name in tree.children}
+        if is_measured(tree) and "stages" in needed:
+            needed["stages"] = (("stage",), tuple(variables.MEASURED_STAGES))
         for group, (dimensions, names) in needed.items():
             if group and group not in tree.children:
                 wrong.append(f"group {group}")

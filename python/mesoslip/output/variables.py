@@ -148,6 +148,22 @@ STAGES = Group(
     mean_force=Meaning("N", "mean of the spring force over the time of the stage"),
 )
 
+# Stages that were found in a measured load point.
+MEASURED_STAGES = Group(
+    **{
+        name: STAGES[name]
+        for name in (
+            "realization_index",
+            "stage_number",
+            "stage_start_time",
+            "stage_end_time",
+            "drive_start_velocity",
+            "drive_end_velocity",
+        )
+    },
+    drive_velocity_error=Meaning("m s-1", "standard error of the mean velocity of the stage"),
+)
+
 SLIP_TRACES = Group(
     TRACE,
     realization_index=REALIZATION_INDEX,

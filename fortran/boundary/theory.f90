@@ -178,14 +178,15 @@ subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, ar
 end subroutine evaluate_threshold_law
 
 !> Motions of a slider on a spring with rate-and-state friction, for several sets of parameters.
-subroutine rate_and_state_motions(evolution, states, sets, parameters, reference_velocity, stages, &
-   & duration, start_velocity, end_velocity, points, times, tolerance, force, displacement, failed, &
-   & status, message)
+subroutine rate_and_state_motions(evolution, states, sets, parameters, reference_velocity, &
+   & stages, duration, start_velocity, end_velocity, points, times, tolerance, force, &
+   & displacement, failed, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: report
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: choose
-   use mesoslip_theory_rate_and_state, only: evolution_names, friction_type, load_type, move_slider
+   use mesoslip_theory_rate_and_state, only: evolution_names, friction_type, load_type, &
+      & max_states, move_slider
    implicit none
    !> "ageing" or "slip", and the number of state variables, 1 or 2
    character(len=*), intent(in) :: evolution
@@ -221,7 +222,7 @@ subroutine rate_and_state_motions(evolution, states, sets, parameters, reference
    failed = 0
    call choose("evolution", evolution, evolution_names, friction%evolution, error)
    if (.not. allocated(error)) then
-      friction%states = states
+      friction%states = min(max(states, 1), max_states)
       friction%reference_velocity = reference_velocity
       load%duration = duration
       load%start_velocity = start_velocity

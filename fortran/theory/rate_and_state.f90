@@ -1,16 +1,17 @@
-!> A slider without inertia on a spring, with rate-and-state friction of one or two state variables.
+!> A slider without inertia on a spring, with rate-and-state friction of one or two states.
 !>
-!> Friction is F = F_0 + a u + sum_i b_i psi_i + c X, with u = ln(V/V_0), psi = ln(V_0 theta/D) and a
-!> linear trend c over the displacement X of the slider. The force of the spring gives
-!> a du/dt = k V_lp - (k + c) V - sum_i b_i dpsi_i/dt, which is stiff. A Rosenbrock method of order 4
-!> integrates it, RODAS of E. Hairer and G. Wanner, Solving Ordinary Differential Equations II (1996):
-!> the matrix of its linear equations is an arrowhead, solved by hand.
+!> Friction is F = F_0 + a u + sum_i b_i psi_i + c X, with u = ln(V/V_0), psi = ln(V_0 theta/D), and
+!> a linear trend c over the displacement X of the slider. The force of the spring gives
+!> a du/dt = k V_lp - (k + c) V - sum_i b_i dpsi_i/dt, which is stiff. A Rosenbrock method of fourth
+!> order integrates it: RODAS of E. Hairer and G. Wanner, Solving Ordinary Differential Equations II
+!> (1996). The matrix of its linear equations is an arrowhead, solved by hand.
 module mesoslip_theory_rate_and_state
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
-   public :: friction_type, load_type, move_slider, evolution_ageing, evolution_slip, evolution_names
+   public :: friction_type, load_type, move_slider
+   public :: evolution_ageing, evolution_slip, evolution_names, max_states
 
    !> dtheta/dt = 1 - V theta/D
    integer, parameter :: evolution_ageing = 1
@@ -117,7 +118,8 @@ contains
       displacement = 0.0_wp
       motion%friction = friction
       associate (k => friction%stiffness, trend => friction%trend)
-         motion%state(0) = log(load%start_velocity(1) * k / (k + trend) / friction%reference_velocity)
+         motion%state(0) = log(load%start_velocity(1) * k / (k + trend) &
+            & / friction%reference_velocity)
          motion%state(1:) = -motion%state(0)
          first = variable_part(friction, motion%state)
          begin = 0.0_wp

@@ -80,6 +80,20 @@ def open_simulation(handle: NDArray[np.int64]) -> None: ...
 def philox(
     counter: NDArray[np.int64], key: NDArray[np.int64], length: int = ...
 ) -> NDArray[np.int64]: ...
+def rate_and_state_motions(
+    evolution: str,
+    states: int,
+    parameters: NDArray[np.float64],
+    reference_velocity: float,
+    duration: NDArray[np.float64],
+    start_velocity: NDArray[np.float64],
+    end_velocity: NDArray[np.float64],
+    times: NDArray[np.float64],
+    tolerance: float,
+    sets: int = ...,
+    stages: int = ...,
+    points: int = ...,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32], int, bytes]: ...
 def restore_simulation(
     handle: NDArray[np.int64], words: NDArray[np.int64], length: int = ...
 ) -> tuple[int, bytes]: ...

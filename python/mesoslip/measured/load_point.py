@@ -157,9 +157,7 @@ def drive_stages(time: Array, load_point: Array) -> tuple[DriveStage, ...]:
         if finer.size == edges.size:
             break
         edges = finer
-    pieces = [
-        _fitted(points, first, after) for first, after in pairwise(bounds)
-    ]
+    pieces = [_fitted(points, first, after) for first, after in pairwise(bounds)]
     pieces = _merged(points, pieces)
     return _stages(time, points, pieces, origin)
 
@@ -365,9 +363,7 @@ def _merged(points: _Points, pieces: list[_Piece]) -> list[_Piece]:
     """Pieces without changes of the velocity that are wander of the drive."""
     top = max(max(abs(one.velocity) for one in pieces), 1e-300)
     while len(pieces) > 1:
-        changes = [
-            _change(points, one, other, top) for one, other in pairwise(pieces)
-        ]
+        changes = [_change(points, one, other, top) for one, other in pairwise(pieces)]
         least = int(np.argmin(changes))
         if changes[least] < MIN_CHANGE:
             joined = [_fitted(points, pieces[least].first, pieces[least + 1].after)]

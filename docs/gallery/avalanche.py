@@ -1,9 +1,10 @@
 """
-An avalanche on the lattice
-===========================
+An avalanche through a lattice of contacts
+==========================================
 
 Interacting contacts on a lattice. With strong interaction the first avalanche breaks nearly all of
-them at one instant. Colours are the generations of the avalanche.
+them at one instant. On the left the lattice after it, nearly all grey: detached. On the right the
+generations of the avalanche: it starts in the bright spot.
 """
 
 import mesoslip

@@ -2,16 +2,17 @@
 A map of regimes
 ================
 
-A sweep over two keys, with the regime of each run: 0 smooth, 1 stick-slip, 2 irregular,
-3 transient. More realizations and finer axes take two numbers; see the page on campaigns.
+A sweep over two keys, and the regime of each run. More realizations and finer axes take two
+numbers; see the page on campaigns.
 """
 
 import mesoslip
+import xarray as xr
 
 data = mesoslip.sweep(
     {
         "base": "klein.toml",
-        "run": {"duration": "15 s"},
+        "run": {"duration": "30 s"},
         "contacts": {"count": 200, "threshold": {"relative_width": 0.05}},
         "output": {"interval": "5 ms", "slip_interval": "5 ms"},
         "sweep": {
@@ -28,13 +29,14 @@ data = mesoslip.sweep(
         },
     }
 )
-print(data["regime"].isel(realization=0).to_pandas())
+mesoslip.plot(xr.DataTree(data), view="regime")
 
 # %%
-# The result is an xarray dataset, with xarray's methods for pictures.
+# The mean force falls where the slider sticks and slips.
 
-_ = (
-    data["mean_force"]
-    .isel(realization=0)
-    .plot.line(x="slider.stiffness", hue="contacts.delay", marker="o", xscale="log")
-)
+mesoslip.plot(xr.DataTree(data), view="mean_force")
+
+# %%
+# The result is an xarray dataset, here as a table: 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
+
+data["regime"].isel(realization=0).to_pandas()

@@ -2,8 +2,9 @@
 Velocity steps and holds
 ========================
 
-Contacts that strengthen with the logarithm of their age behave as in rate-and-state friction:
-the force is lower at a higher velocity, and peaks after a hold. The red line is the fitted law.
+Contacts that strengthen with the logarithm of their age: the force is lower at a higher velocity,
+and peaks after a hold, the more the longer the hold. The red line is the rate-and-state law that
+fits best: it describes the steps, but not holds of all durations.
 """
 
 import mesoslip
@@ -24,7 +25,11 @@ config = mesoslip.Config.load("klein.toml").replace(
                 {"velocity": "0.1 um/s", "duration": "2 s"},
                 {"velocity": "1 um/s", "duration": "0.2 s"},
                 {"velocity": "0.1 um/s", "duration": "2 s"},
+                {"hold": True, "duration": "0.2 s"},
+                {"velocity": "0.1 um/s", "duration": "2 s"},
                 {"hold": True, "duration": "2 s"},
+                {"velocity": "0.1 um/s", "duration": "2 s"},
+                {"hold": True, "duration": "20 s"},
                 {"velocity": "0.1 um/s", "duration": "2 s"},
             ]
         },
@@ -34,7 +39,7 @@ tree = mesoslip.run(config)
 mesoslip.plot(tree, view="response")
 
 # %%
-# Steady forces of the stages.
+# Steady forces of the stages that move.
 
 steady = mesoslip.response(tree, fit=False)["steady"].to_dataset()
 columns = ["stage_number", "velocity", "steady_force", "steady_force_error", "is_steady"]

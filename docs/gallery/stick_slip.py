@@ -1,8 +1,8 @@
 """
-Stick-slip
-==========
+Stick-slip in Klein's experiment
+================================
 
-Klein's surface force balance: the spring is loaded until all contacts break, and the slider slips.
+A surface force balance: the spring is loaded until all contacts break, and the slider slips.
 """
 
 import mesoslip
@@ -20,7 +20,7 @@ columns = ["start_time", "force_before", "force_drop", "contacts_broken"]
 slips[columns].to_dataframe().head()
 
 # %%
-# One slip in close-up.
+# The third slip in close-up.
 
-start = float(slips["start_time"][-1])
+start = float(slips["start_time"][2])
 mesoslip.plot(tree, start=start - 0.02, end=start + 0.1)

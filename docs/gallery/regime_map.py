@@ -37,6 +37,7 @@ mesoslip.plot(xr.DataTree(data), view="regime")
 mesoslip.plot(xr.DataTree(data), view="mean_force")
 
 # %%
-# The result is an xarray dataset, here as a table: 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
+# The result is an xarray dataset, here as a table: 0 smooth, 1 stick-slip, 2 irregular,
+# 3 transient.
 
 data["regime"].isel(realization=0).to_pandas()

@@ -7,6 +7,7 @@ parsed, and no more is done.
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
 import shlex
@@ -353,3 +354,22 @@ def test_every_page_has_a_place_in_the_list_on_the_left():
     listed = {str(path.relative_to(DOCS)) for entry in entries for path in DOCS.glob(f"{entry}.md")}
     pages = {str(path.relative_to(DOCS)) for path in PAGES if DOCS in path.parents}
     assert pages - {"index.md"} == {one for one in listed if "generated" not in one}
+
+
+def test_metadata_agree():
+    """Of the package, of a citation and of codemeta: version, licence, keywords, requirements."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    codemeta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
+    assert f"\nversion: {project['version']}\n" in citation
+    assert f"\nlicense: {project['license']}\n" in citation
+    assert codemeta["version"] == project["version"]
+    assert codemeta["license"].endswith(project["license"])
+    assert codemeta["description"] == project["description"]
+    assert codemeta["keywords"] == project["keywords"]
+    assert all(f"\n  - {word}\n" in citation for word in project["keywords"])
+    needed = [re.split(r"[<>=]", one)[0] for one in project["dependencies"]]
+    assert codemeta["softwareRequirements"][: len(needed)] == needed
+    cited = set(re.findall(r"@(\w+)", (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")))
+    entries = set(re.findall(r"@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text()))
+    assert cited == entries

@@ -9,7 +9,8 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT, klein_tables
-from mesoslip.analysis.sampled_slips import estimated_period, find_slips, noise_level
+from mesoslip.analysis.noise import noise_level
+from mesoslip.analysis.sampled_slips import estimated_period, find_slips
 from mesoslip.configuration.columns import cells_of, find_columns, values_of
 from mesoslip.measured.table import COLUMNS
 

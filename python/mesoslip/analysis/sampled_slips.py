@@ -1,51 +1,89 @@
-"""Slips in sampled, noisy traces of the spring force.
+"""Slips in sampled, noisy traces of a force, by a rule that knows no model.
 
-The rule, explained in `docs/fit.md`, for noise of standard deviation sigma:
+The rule, explained in `docs/fit.md`:
 
-- A **fall** is the decrease from a maximum of the force to the minimum before the next maximum.
-  Maxima have a prominence of more than `PROMINENCE` sigma.
-- A fall that begins within half a period of the setup after the end of another, and reaches a lower
-  force, belongs to it.
-- A fall is a **slip** if it is deep and steep: deeper than twice the increase of the force in the
-  three quarters of a period before it, which ringing causes, and with a maximum rate of at least
-  0.02 Omega_S F_s, the rate at the minimum slip velocity of a run. F_s is the maximum force of the
-  trace.
+- Impulses and hum are taken off. A running median, which keeps steps, takes off noise. It is as
+  wide as the noise demands, and at most half as wide as the deep falls of the trace are long.
+- A **fall** leads from a maximum to a minimum of alternating extremes that differ by more than a
+  threshold. The threshold is above the range of the noise that is left. Where the number of slips
+  depends on it there, it is the start of the widest range of thresholds in which it does not.
+- A fall that begins within half a period after the end of another, and reaches a lower force,
+  belongs to it. The period is twice the duration of deep falls.
+- A fall is a **slip** if it is deeper than twice what ringing regained before it. A rise within
+  three quarters of a period is ringing if it is faster than loading. Of loading a quarter counts,
+  so that a slip gives back half of it. Oscillations that only decay are ringing too.
+- A slip is steep: for its depth not much slower than the others.
 - It starts where the force is last near its maximum and ends at its minimum. A fall from the first
   sample on has no start and does not count.
 
-Runs make their catalogues by the same rule, with two more criteria that only a simulation has:
+Runs make their catalogues by a similar rule, with two more criteria that only a simulation has:
 breaks of contacts, and the velocity of the slider.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
+from mesoslip.analysis.noise import Part, TraceNoise, estimate_noise, noise_level, parts_of
+from mesoslip.analysis.noise.levels import correlated_noise
+
 Array = NDArray[np.float64]
 
-# Minimum prominence of a maximum, in standard deviations of the noise: a million samples of noise
-# have no such maximum.
-PROMINENCE = 8.0
 # Minimum depth of a slip over the increase by ringing before it.
 MIN_FALL_RATIO = 2.0
 # Maximum time from a minimum to a maximum in ringing, in half periods of the setup.
 MAX_RISE = 1.5
+# Part of the loading before a slip that counts as ringing.
+LOADING_PART = 0.25
+# Maximum rate of loading over that of spring and drive, and over the median rate of rises where
+# these are unknown.
+MAX_LOADING, MAX_RISING = 1.1, 3.0
 # Contribution of noise to the difference of a maximum and a minimum, in standard deviations.
 EXTREME_NOISE = 4.0
-# Minimum rate of fall, in Omega_S times the maximum force.
-MIN_RATE = 0.02
-# Minimum prominence of a maximum and depth of a slip, over the maximum force.
+# Minimum rate of fall, in 2 pi over the period times the deepest fall.
+MIN_RATE = 0.012
+# Minimum rate of a fall over its depth, over that of the deep falls.
+MIN_STEEPNESS = 0.15
+# Minimum fall over the range of the force.
 MIN_HEIGHT = 0.002
 # Fraction of the depth of a fall at either end that is excluded from its duration.
 MARGIN = 0.1
-# Orders of differences for the estimate of the noise.
-ORDERS = range(1, 8)
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
+# Widths of the running median, in samples.
+WIDTHS = (1, 3, 5, 9, 17, 33, 65, 129, 257)
+# Ratio of thresholds for which slips are counted.
+THRESHOLD_RATIO = 1.25
+# A plateau: maximum change of the count, and minimum ratio of its thresholds.
+MAX_CHANGE, MIN_PLATEAU = 0.1, 2.0
+# Minimum number of slips at the plateau, over that of all that stands out of the noise.
+MIN_KEPT = 0.5
+# Falls of a decaying oscillation: minimum number, and maximum ratio of the last to the first.
+MIN_DECAYING, MAX_DECAY = 3, 0.5
+
+
+@dataclass(frozen=True)
+class SlipCounts:
+    """How the number of slips depends on the minimum fall.
+
+    Attributes
+    ----------
+    threshold
+        Minimum falls, in the unit of the force, shape (thresholds,).
+    count
+        Number of slips, shape (thresholds,).
+    plateau
+        First and last minimum fall of the range in which the number hardly changes and from which
+        the minimum fall is taken; None if there is no such range.
+    """
+
+    threshold: Array = field(default_factory=lambda: np.empty(0))
+    count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
+    plateau: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +100,13 @@ class FoundSlips:
         Maximum rate of fall [N/s].
     first, last
         Samples of the maximum and of the minimum.
+    min_fall
+        Minimum fall of a slip [N].
+    period
+        Period of the setup that was given, or twice the duration of deep falls [s]; infinite
+        without falls.
+    counts
+        Slips by minimum fall; empty if noise or minimum fall were given.
     """
 
     start_time: Array
@@ -69,51 +114,206 @@ class FoundSlips:
     force_before: Array
     force_after: Array
     fall_rate: Array
-    first: NDArray[np.int_]
-    last: NDArray[np.int_]
+    first: Samples
+    last: Samples
+    min_fall: float = 0.0
+    period: float = math.inf
+    counts: SlipCounts = field(default_factory=SlipCounts)
 
     def __len__(self) -> int:
         return len(self.start_time)
 
 
-def noise_level(force: Array) -> float:
-    """Standard deviation of white noise on a trace [N].
-
-    The estimate is the median absolute difference of the trace, on which the few slips have no
-    influence, at the order 1 to 7 for which it is smallest: a smooth, well sampled signal
-    contributes less at higher orders. A digitized trace has at least the noise of its resolution.
-    Noise that is correlated from sample to sample, as behind a filter, is underestimated.
+def find_slips(
+    time: Array,
+    force: Array,
+    *,
+    noise: float | TraceNoise | None = None,
+    period: float | None = None,
+    direction: float = 1.0,
+    min_fall: float | None = None,
+    loading_rate: float | None = None,
+) -> FoundSlips:
+    """Find the slips in a trace.
 
     Parameters
     ----------
+    time
+        Increasing times [s], shape (samples,).
     force
-        Samples at equal intervals, shape (samples,).
+        Force of the spring [N], or a friction coefficient, shape (samples,), finite.
+    noise
+        What `estimate_noise` found; by default it is called. A number is the standard deviation of
+        white noise [N]: then nothing is taken off, and the minimum fall follows from it.
+    period
+        Period of the setup, 2 pi (M/K)^1/2 [s]; by default twice the duration of deep falls.
+    direction
+        Sign of the drive's velocity.
+    min_fall
+        Minimum fall of a slip [N]; by default from the noise and the number of slips.
+    loading_rate
+        Rate at which the force of a slider at rest grows, stiffness times velocity of the drive
+        [N/s]; by default that of rises of the trace.
     """
-    found = []
-    for order in ORDERS:
-        if len(force) <= 2 * order:
-            break
-        # Sum of squares of the binomial coefficients.
-        norm = math.sqrt(math.comb(2 * order, order))
-        sizes = np.abs(np.diff(force, order))
-        found.append(float(np.median(sizes)) / (NORMAL_MEDIAN * norm))
-    steps = np.diff(np.unique(force))
-    resolution = float(steps.min()) if 0 < steps.size < len(force) / 4 else 0.0
-    return max(min(found, default=0.0), resolution / math.sqrt(12))
+    force = direction * np.asarray(force, dtype=float)
+    if len(force) < 4:
+        return _none(math.inf)
+    if noise is None:
+        noise = estimate_noise(time, force)
+        cleaned = noise.clean(time, force)
+    elif isinstance(noise, TraceNoise):
+        cleaned = direction * noise.clean(time, direction * force)
+    else:
+        cleaned = force
+    sigma = noise.total_deviation if isinstance(noise, TraceNoise) else noise
+    trace = _denoise(time, cleaned, sigma, period, isinstance(noise, TraceNoise))
+    if trace is None:
+        return _none(math.inf if period is None else period)
+    search = _Search(trace, loading_rate)
+    counts = SlipCounts()
+    if min_fall is None:
+        min_fall = trace.floor
+        if isinstance(noise, TraceNoise):
+            counts = _count(search)
+            if counts.plateau is not None:
+                min_fall = counts.plateau[0]
+    tops, bottoms, rates = search.slips(min_fall)
+    if tops.size == 0:
+        return _none(trace.period, min_fall, counts)
+    rows = [
+        _ends(time, cleaned, top, bottom, sigma, trace.half_samples(top))
+        for top, bottom in trace.on_samples(cleaned, tops, bottoms)
+    ]
+    start, end, before, after = np.array(rows).T
+    first, last = start.astype(int), end.astype(int)
+    return FoundSlips(
+        time[first],
+        time[last],
+        direction * before,
+        direction * after,
+        rates,
+        first,
+        last,
+        min_fall,
+        trace.period,
+        counts,
+    )
 
 
 def estimated_period(time: Array, force: Array, noise: float) -> float:
     """Period of the setup [s], estimated from the deepest falls of a trace; infinite without falls.
 
     The force of a slider without contacts falls for half a period of a sine; contacts that attach
-    shorten the fall. As noise blurs the ends of a fall, its duration is that between 90 and 10 % of
-    the depth. The estimate is from the median over the falls at least half as deep as the deepest.
+    shorten the fall.
     """
-    tops, bottoms = _falls(force, _height(force, noise))
-    if tops.size == 0:
-        return math.inf
+    trace = _denoise(time, np.asarray(force, dtype=float), noise, None, False)
+    return math.inf if trace is None else trace.period
+
+
+def _none(period: float, min_fall: float = 0.0, counts: SlipCounts | None = None) -> FoundSlips:
+    empty, no_samples = np.empty(0), np.empty(0, dtype=int)
+    counts = SlipCounts() if counts is None else counts
+    return FoundSlips(
+        empty, empty, empty, empty, empty, no_samples, no_samples, min_fall, period, counts
+    )
+
+
+@dataclass(frozen=True)
+class _Trace:
+    """A trace after a running median, along the drive.
+
+    ``width`` is that of the median [s], ``noise`` what it left, and ``floor`` the minimum fall that
+    stands out of it.
+    """
+
+    time: Array
+    force: Array
+    parts: tuple[Part, ...]
+    extremes: Extremes
+    width: float
+    noise: float
+    floor: float
+    period: float
+
+    def on_samples(
+        self, force: Array, tops: Samples, bottoms: Samples
+    ) -> Iterator[tuple[int, int]]:
+        """Maximum and minimum of each fall among the samples that the median joined."""
+        last = 0
+        for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=True):
+            part = next(one for one in self.parts if top < one.after)
+            reach = round(self.width / part.interval) // 2
+            start = max(last, top - reach)
+            top = start + int(np.argmax(force[start : min(top + reach, bottom) + 1]))
+            # The median cuts sharp minima most: the first of ringing may be the lowest.
+            bottom = top + 1 + int(np.argmin(force[top + 1 : bottom + reach + 1]))
+            yield top, bottom
+            last = bottom
+
+    def half_samples(self, at: int) -> int:
+        """Samples in half a period, at a sample."""
+        part = next(one for one in self.parts if at < one.after)
+        return max(1, round(self.period / 2 / part.interval))
+
+
+def _denoise(
+    time: Array, force: Array, sigma: float, period: float | None, measures_rest: bool
+) -> _Trace | None:
+    """The trace after a running median of the width that noise and falls demand.
+
+    None if no fall stands out.
+    """
+    parts = parts_of(time)
+    interval = max(parts, key=len).interval
+    found = None
+    for width in WIDTHS:
+        if found is not None and width * interval > found.period / 4:
+            break
+        filtered = _running_median(force, parts, width * interval)
+        rest = sigma if width == 1 else sigma * math.sqrt(math.pi / 2 / width)
+        if measures_rest and width > 1:
+            main = max(parts, key=len)
+            values = filtered[main.samples]
+            rest = max(rest, correlated_noise(values, noise_level(values)).total)
+        height = MIN_HEIGHT * float(np.ptp(filtered))
+        highest = _noise_range(len(force) / width) * rest
+        floor = max(highest, height)
+        extremes = extremes_of(filtered)
+        tops, bottoms = extremes.falls(floor)
+        tops, bottoms = tops[tops > 0], bottoms[tops > 0]
+        if tops.size:
+            own = period if period is not None else _period(time, filtered, tops, bottoms)
+            if found is None or width * interval <= own / 4:
+                found = _Trace(time, filtered, parts, extremes, width * interval, rest, floor, own)
+        if highest <= height or width >= len(force) // 8:
+            break
+    return found
+
+
+def _noise_range(count: float) -> float:
+    """Range that so many values of normal noise hardly exceed, in standard deviations."""
+    return 2 * math.sqrt(2 * math.log(max(count, 2.0))) + 1
+
+
+def _running_median(force: Array, parts: Sequence[Part], duration: float) -> Array:
+    """Medians over a duration, within each part."""
+    from scipy.ndimage import median_filter
+
+    filtered = force.copy()
+    for part in parts:
+        width = 2 * round((duration / part.interval - 1) / 2) + 1
+        if width > 1:
+            filtered[part.samples] = median_filter(force[part.samples], width, mode="nearest")
+    return filtered
+
+
+def _period(time: Array, force: Array, tops: Samples, bottoms: Samples) -> float:
+    """Twice the duration of deep falls [s].
+
+    As noise blurs the ends of a fall, its duration is that between 90 and 10 % of the depth, and
+    that of a sine. The estimate is the median over the falls at least half as deep as the deepest.
+    """
     depth = force[tops] - force[bottoms]
-    interval = float(np.median(np.diff(time)))
     durations = []
     deep = depth >= depth.max() / 2
     for top, bottom in zip(tops[deep], bottoms[deep], strict=True):
@@ -121,109 +321,154 @@ def estimated_period(time: Array, force: Array, noise: float) -> float:
         high = int(np.flatnonzero(part >= 1 - MARGIN)[-1])
         low = high + int(np.flatnonzero(part[high:] <= MARGIN)[0])
         # Interpolated between the samples around each crossing.
-        above = high + (part[high] - (1 - MARGIN)) / (part[high] - part[high + 1])
-        below = low - (MARGIN - part[low]) / (part[low - 1] - part[low])
-        durations.append((below - above) * interval)
+        above = (part[high] - (1 - MARGIN)) / (part[high] - part[high + 1])
+        below = (MARGIN - part[low]) / (part[low - 1] - part[low])
+        at = time[top : bottom + 1]
+        start = at[high] + above * (at[high + 1] - at[high])
+        durations.append(at[low] - below * (at[low] - at[low - 1]) - start)
     share = 1 - 2 * math.acos(1 - 2 * MARGIN) / math.pi
+    interval = float(np.median(np.diff(time)))
     return 2 * max(float(np.median(durations)) / share, interval)
 
 
-def find_slips(
-    time: Array,
-    force: Array,
-    *,
-    noise: float | None = None,
-    period: float | None = None,
-    direction: float = 1.0,
-) -> FoundSlips:
-    """Find the slips in a trace.
+class _Search:
+    """Slips among the falls of a trace above a threshold."""
 
-    Parameters
-    ----------
-    time
-        Times [s], shape (samples,), at equal intervals.
-    force
-        Force of the spring [N], shape (samples,).
-    noise
-        Standard deviation of the noise [N]; by default that of `noise_level`.
-    period
-        Period of the setup, 2 pi (M/K)^1/2 [s]; by default that of `estimated_period`.
-    direction
-        Sign of the drive's velocity.
-    """
+    def __init__(self, trace: _Trace, loading_rate: float | None) -> None:
+        self._trace = trace
+        self._rate = _rates(trace)
+        deepest = float(trace.extremes.fall_sizes[-1])
+        self._min_rate = MIN_RATE * 2 * math.pi / trace.period * deepest
+        tops, bottoms = trace.extremes.falls(trace.floor)
+        self._max_rising = _rising_rate(trace, tops, bottoms) * MAX_RISING
+        if loading_rate is not None and loading_rate > 0:
+            self._max_rising = MAX_LOADING * loading_rate
+
+    def slips(self, threshold: float) -> tuple[Samples, Samples, Array]:
+        """Samples of maximum and minimum, and the maximum rate of fall, of each slip."""
+        trace, force, time = self._trace, self._trace.force, self._trace.time
+        tops, bottoms = trace.extremes.falls(threshold)
+        tops, bottoms = self._joined(tops[tops > 0], bottoms[tops > 0])
+        if tops.size == 0:
+            return tops, bottoms, np.empty(0)
+        drop = force[tops] - force[bottoms]
+        rates = np.array(
+            [
+                float(-self._rate[one : two + 1].min())
+                for one, two in zip(tops, bottoms, strict=True)
+            ]
+        )
+        since = np.searchsorted(time, time[tops] - MAX_RISE * trace.period / 2)
+        lowest = np.array(
+            [
+                one + int(np.argmin(force[one : two + 1]))
+                for one, two in zip(since, tops, strict=True)
+            ]
+        )
+        regained = force[tops] - force[lowest]
+        duration = time[tops] - time[lowest]
+        is_loading = (regained <= self._max_rising * duration) & (duration >= trace.period / 4)
+        is_loading &= ~_decaying(time[tops], time[bottoms], drop, trace.period)
+        regained = np.where(is_loading, LOADING_PART * regained, regained)
+        # Noise increases both, as they are differences of extremes.
+        excess = np.minimum(drop, EXTREME_NOISE * trace.noise)
+        found = drop - excess > MIN_FALL_RATIO * np.maximum(regained - excess, 0.0)
+        found &= rates > self._min_rate
+        if found.any():
+            steepness = rates / drop
+            deep = drop >= drop[found].max() / 2
+            found &= steepness >= MIN_STEEPNESS * float(np.median(steepness[deep]))
+        return tops[found], bottoms[found], rates[found]
+
+    def _joined(self, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples]:
+        """Falls with those that belong to them."""
+        force, time, half = self._trace.force, self._trace.time, self._trace.period / 2
+        joined: list[tuple[int, int]] = []
+        for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=True):
+            if joined:
+                start, end = joined[-1]
+                if (
+                    time[top] - time[end] <= half
+                    and force[bottom] < force[end]
+                    and force[top] < 0.5 * (force[start] + force[end])
+                ):
+                    joined[-1] = (start, bottom)
+                    continue
+            joined.append((top, bottom))
+        first, last = np.array(joined, dtype=int).reshape(-1, 2).T
+        return first, last
+
+
+def _rates(trace: _Trace) -> Array:
+    """Rate of the force, by lines over an eighth of a period [N/s]."""
     from scipy.signal import savgol_filter
 
-    force = direction * force
-    noise = noise_level(force) if noise is None else noise
-    period = estimated_period(time, force, noise) if period is None else period
-    interval = float(np.median(np.diff(time)))
-    height = _height(force, noise)
-    tops, bottoms = _falls(force, height)
-    if tops.size == 0 or not math.isfinite(period):
-        empty, no_samples = np.empty(0), np.empty(0, dtype=int)
-        return FoundSlips(empty, empty, empty, empty, empty, no_samples, no_samples)
-    half = max(1, round(period / 2 / interval))
-    # Wide enough to average over noise, narrow enough for ringing faster than that of the setup.
-    width = 2 * max(1, half // 8) + 1
-    rate = savgol_filter(force, max(width, 3), 1, deriv=1, delta=interval, mode="nearest")
-    regain = max(1, round(MAX_RISE * half))
-    min_rate = MIN_RATE * 2 * math.pi / period * float(np.max(np.abs(force)))
-    rows = []
-    number = 0
-    while number < len(tops):
-        top, bottom, after = int(tops[number]), int(bottoms[number]), number + 1
-        regained = force[top] - force[max(0, top - regain) : top + 1].min()
-        while (
-            after < len(tops)
-            and tops[after] - bottom <= half
-            and force[bottoms[after]] < force[bottom]
-            and force[tops[after]] < force[top] - 0.5 * (force[top] - force[bottom])
-        ):
-            bottom = int(bottoms[after])
-            after += 1
-        drop = force[top] - force[bottom]
-        steepest = float(-rate[top : bottom + 1].min())
-        # Noise increases both, as they are differences of extremes.
-        excess = min(drop, EXTREME_NOISE * noise)
-        if drop - excess > MIN_FALL_RATIO * max(regained - excess, 0.0) and steepest > min_rate:
-            rows.append((*_ends(time, force, top, bottom, noise, half), steepest))
-        number = after
-    start, end, before, behind, steepest_rate = np.array(rows).reshape(-1, 5).T
-    first, last = start.astype(int), end.astype(int)
-    return FoundSlips(
-        time[first],
-        time[last],
-        direction * before,
-        direction * behind,
-        steepest_rate,
-        first,
-        last,
-    )
+    rates = np.zeros(len(trace.force))
+    for part in trace.parts:
+        if len(part) < 3:
+            continue
+        half = max(1, round(trace.period / 2 / part.interval))
+        # Wide enough to average over noise, narrow enough for ringing faster than the setup's.
+        width = min(2 * max(1, half // 8) + 1, len(part) - 1 + len(part) % 2)
+        rates[part.samples] = savgol_filter(
+            trace.force[part.samples], width, 1, deriv=1, delta=part.interval, mode="nearest"
+        )
+    return rates
 
 
-def _height(force: Array, noise: float) -> float:
-    """Minimum prominence of maxima [N]."""
-    return max(PROMINENCE * noise, MIN_HEIGHT * float(np.max(np.abs(force))))
-
-
-def _falls(force: Array, height: float) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Samples of prominent maxima, and of the minimum before the next of them."""
-    from scipy.signal import find_peaks
-
-    # The ends of the trace may be maxima too.
-    padded = np.concatenate([[-np.inf], force, [-np.inf]])
-    tops = find_peaks(padded, prominence=height)[0] - 1
+def _rising_rate(trace: _Trace, tops: Samples, bottoms: Samples) -> float:
+    """Rate of the rises between deep falls, the median over time [N/s]."""
+    force = trace.force
     if tops.size == 0:
-        return tops, tops
-    bottoms = np.array(
-        [
-            top + int(np.argmin(force[top:after]))
-            for top, after in zip(tops, [*tops[1:], len(force)], strict=True)
-        ]
-    )
-    # The start of a fall at the first sample is not recorded.
-    deep = (force[tops] - force[bottoms] > height) & (tops > 0)
-    return tops[deep], bottoms[deep]
+        return math.inf
+    depth = np.sort(force[tops] - force[bottoms])
+    # Half of all falling is in falls of at least this depth.
+    typical = float(depth[np.searchsorted(np.cumsum(depth), 0.5 * depth.sum())])
+    tops, bottoms = trace.extremes.falls(typical / 2)
+    if tops.size < 2:
+        return math.inf
+    duration = trace.time[tops[1:]] - trace.time[bottoms[:-1]]
+    rate = (force[tops[1:]] - force[bottoms[:-1]]) / duration
+    order = np.argsort(rate)
+    middle = np.searchsorted(np.cumsum(duration[order]), 0.5 * duration.sum())
+    return float(rate[order][middle])
+
+
+def _decaying(start: Array, end: Array, drop: Array, period: float) -> NDArray[np.bool_]:
+    """Falls of oscillations that only decay: those that follow each other within a period."""
+    found = np.zeros(len(drop), dtype=bool)
+    first = 0
+    for after in range(1, len(drop) + 1):
+        if (
+            after < len(drop)
+            and start[after] - end[after - 1] <= MAX_RISE * period / 2
+            and drop[after] < drop[after - 1]
+        ):
+            continue
+        if after - first >= MIN_DECAYING and drop[after - 1] < MAX_DECAY * drop[first]:
+            found[first:after] = True
+        first = after
+    return found
+
+
+def _count(search: _Search) -> SlipCounts:
+    """Slips by threshold, from the noise to the deepest fall, and the plateau of their number."""
+    trace = search._trace
+    deepest = float(trace.extremes.fall_sizes[-1])
+    steps = max(1, math.ceil(math.log(deepest / trace.floor) / math.log(THRESHOLD_RATIO)))
+    thresholds: Array = trace.floor * THRESHOLD_RATIO ** np.arange(steps, dtype=np.float64)
+    counts = np.array([len(search.slips(float(one))[0]) for one in thresholds])
+    for first, count in enumerate(counts):
+        same = np.abs(counts[first:] - count) <= max(1.0, MAX_CHANGE * count)
+        last = first + (int(np.argmin(same)) if not same.all() else len(same)) - 1
+        # A few deep falls, as at the start of a run, are no plateau.
+        if count < MIN_KEPT * counts[0]:
+            break
+        if thresholds[last] >= MIN_PLATEAU * thresholds[first]:
+            return SlipCounts(
+                thresholds, counts, (float(thresholds[first]), float(thresholds[last]))
+            )
+    return SlipCounts(thresholds, counts)
 
 
 def _ends(

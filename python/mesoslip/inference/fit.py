@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.even_traces import even_trace, first_velocity
-from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, noise_level
+from mesoslip.analysis.noise import noise_level
+from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.even_traces import evenly_sampled, first_velocity
-from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, find_slips, noise_level
+from mesoslip.analysis.noise import noise_level
+from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, find_slips
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem

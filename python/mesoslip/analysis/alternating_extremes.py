@@ -1,0 +1,98 @@
+"""Extremes of a trace that alternate and differ by a threshold, for all thresholds at once.
+
+A pair of neighbouring extremes whose difference is not larger than those on both sides is a cycle
+within a larger one, as in the counting of rainflow cycles (Matsuishi & Endo 1968; the persistence
+of topology is the same). Without all cycles below a threshold the other extremes differ by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Samples = NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """The extremes of a trace.
+
+    Attributes
+    ----------
+    values
+        The trace, shape (samples,).
+    first, second
+        Samples of the extremes of each closed cycle, shape (cycles,).
+    rest
+        Samples of the extremes that close no cycle, in their order; the first and the last sample
+        of the trace are among them.
+    """
+
+    values: Array
+    first: Samples
+    second: Samples
+    rest: Samples
+
+    @cached_property
+    def _cycle_sizes(self) -> Array:
+        sizes: Array = np.abs(self.values[self.first] - self.values[self.second])
+        return sizes
+
+    @cached_property
+    def fall_sizes(self) -> Array:
+        """Sizes of all falls, in ascending order: those above a threshold are its falls."""
+        steps = np.diff(self.values[self.rest])
+        return np.sort(np.concatenate([self._cycle_sizes, -steps[steps < 0]]))
+
+    def falls(self, threshold: float) -> tuple[Samples, Samples]:
+        """Samples of the maximum and of the minimum of each fall above a threshold.
+
+        Between neighbouring falls the trace rises by more than the threshold as well.
+        """
+        kept = self._cycle_sizes > threshold
+        # Differences of the rest grow, and then shrink.
+        large = np.flatnonzero(np.abs(np.diff(self.values[self.rest])) > threshold)
+        rest = self.rest[large[0] : large[-1] + 2] if large.size else self.rest[:0]
+        extremes = np.sort(np.concatenate([self.first[kept], self.second[kept], rest]))
+        is_fall = np.diff(self.values[extremes]) < 0
+        return extremes[:-1][is_fall], extremes[1:][is_fall]
+
+
+def extremes_of(values: Array) -> Extremes:
+    """The extremes of a trace, in a time proportional to its length.
+
+    Parameters
+    ----------
+    values
+        Samples, shape (samples,).
+    """
+    at = _turning_points(values)
+    levels = values[at].tolist()
+    stack: list[int] = []
+    cycles: list[tuple[int, int]] = []
+    for number, level in enumerate(levels):
+        while len(stack) > 2:
+            last, before = levels[stack[-1]], levels[stack[-2]]
+            size = abs(last - before)
+            if size > abs(level - last) or size > abs(before - levels[stack[-3]]):
+                break
+            cycles.append((stack[-2], stack[-1]))
+            del stack[-2:]
+        stack.append(number)
+    pairs = np.array(cycles, dtype=int).reshape(-1, 2)
+    return Extremes(values, at[pairs[:, 0]], at[pairs[:, 1]], at[stack])
+
+
+def _turning_points(values: Array) -> Samples:
+    """The first and the last sample, and the first of each maximum and minimum between."""
+    steps = np.diff(values)
+    moving = np.flatnonzero(steps)
+    if moving.size == 0:
+        return np.array([0] if len(values) else [], dtype=int)
+    rising = steps[moving] > 0
+    turns = np.flatnonzero(rising[1:] != rising[:-1])
+    return np.concatenate([[0], moving[turns] + 1, [len(values) - 1]])

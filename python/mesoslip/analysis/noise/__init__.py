@@ -1,0 +1,16 @@
+"""The noise of a measured trace: what it consists of, what can be taken off, and its errors."""
+
+from mesoslip.analysis.noise.estimate import TraceNoise, estimate_noise
+from mesoslip.analysis.noise.hum import HumLine
+from mesoslip.analysis.noise.levels import digital_step_of, noise_level
+from mesoslip.analysis.noise.parts import Part, parts_of
+
+__all__ = [
+    "HumLine",
+    "Part",
+    "TraceNoise",
+    "digital_step_of",
+    "estimate_noise",
+    "noise_level",
+    "parts_of",
+]

@@ -1,0 +1,282 @@
+"""The noise of a measured trace."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.noise.hum import HumLine, find_hum
+from mesoslip.analysis.noise.impulses import find_impulses
+from mesoslip.analysis.noise.levels import (
+    NORMAL_MEDIAN,
+    correlated_noise,
+    digital_step_of,
+    noise_level,
+)
+from mesoslip.analysis.noise.parts import parts_of
+from mesoslip.quantities import number, with_unit
+
+Array = NDArray[np.float64]
+
+# Blocks of the trace for the drift, and its minimum size in standard errors.
+DRIFT_BLOCKS = 20
+MIN_DRIFT = 4.0
+# Points from which the error of a sum over correlated noise is computed.
+MAX_POINTS = 400
+# Share of the samples from which on impulses are reported to be many.
+MANY_IMPULSES = 0.05
+
+
+@dataclass(frozen=True)
+class TraceNoise:
+    """The noise of a trace.
+
+    White noise and correlated noise add up; deviations are standard deviations in the unit of the
+    force, without impulses and hum.
+
+    Attributes
+    ----------
+    deviation
+        Of the white noise, with that of digital steps; that of the part with most samples.
+    correlated_deviation
+        Of the noise that is correlated from sample to sample; 0 for none.
+    correlation_time
+        Time in which the autocorrelation of the latter decays [s].
+    digital_step
+        Step of a digitized trace; 0 for none.
+    impulse_time
+        Times of the samples in impulses [s], shape (impulses,).
+    impulse_share
+        Their share of the samples.
+    impulse_size
+        Median size of impulses; 0 for none.
+    hum
+        Narrow lines of the spectrum that are not the trace's own.
+    drift
+        Slow drift, in the unit of the force over s; 0 if it is not significant.
+    duration
+        Duration of the trace [s].
+    intervals
+        Sampling interval of each part of the trace [s].
+    deviations
+        Standard deviation of the white noise in each part.
+    """
+
+    deviation: float
+    correlated_deviation: float
+    correlation_time: float
+    digital_step: float
+    impulse_time: Array
+    impulse_share: float
+    impulse_size: float
+    hum: tuple[HumLine, ...]
+    drift: float
+    duration: float
+    intervals: tuple[float, ...]
+    deviations: tuple[float, ...]
+
+    @property
+    def total_deviation(self) -> float:
+        """Standard deviation of white and correlated noise."""
+        return math.hypot(self.deviation, self.correlated_deviation)
+
+    def is_impulse(self, time: Array) -> NDArray[np.bool_]:
+        """Which samples are in impulses, shape (samples,).
+
+        Parameters
+        ----------
+        time
+            Times of the trace, or of a part of it [s].
+        """
+        if self.impulse_time.size == 0:
+            return np.zeros(len(time), dtype=bool)
+        return np.isin(time, self.impulse_time)
+
+    def clean(self, time: Array, force: Array) -> Array:
+        """The force without hum, and with lines through the neighbours instead of impulses.
+
+        Parameters
+        ----------
+        time, force
+            The trace, or a part of it, shape (samples,).
+        """
+        cleaned = force.astype(float)
+        for line in self.hum:
+            cleaned -= line(time)
+        wrong = self.is_impulse(time)
+        if wrong.any() and not wrong.all():
+            cleaned[wrong] = np.interp(time[wrong], time[~wrong], cleaned[~wrong])
+        return cleaned
+
+    def linear_error(self, time: Array, weights: Array) -> float:
+        """Standard error of a weighted sum of samples, sum_i w_i F_i, by the noise of the trace.
+
+        Parameters
+        ----------
+        time
+            Times of the samples [s], shape (samples,).
+        weights
+            w, shape (samples,), smooth over the correlation time.
+        """
+        variance = self.deviation**2 * float(weights @ weights)
+        if self.correlated_deviation > 0 and self.correlation_time > 0:
+            # Sums of neighbours, so that there are some hundred points.
+            edges = np.unique(np.linspace(0, len(time), MAX_POINTS + 1).astype(int))[:-1]
+            sums = np.add.reduceat(weights, edges)
+            at = np.add.reduceat(time, edges) / np.diff([*edges, len(time)])
+            decay = np.exp(-np.abs(at[:, None] - at) / self.correlation_time)
+            variance += self.correlated_deviation**2 * float(sums @ decay @ sums)
+        return math.sqrt(variance)
+
+    def mean_error(self, time: Array) -> float:
+        """Standard error of the mean over samples at times [s], shape (samples,)."""
+        return self.linear_error(time, np.full(len(time), 1 / max(len(time), 1)))
+
+    def slope_error(self, time: Array) -> float:
+        """Standard error of the slope of a line fitted to samples, in the unit of the force over s.
+
+        Parameters
+        ----------
+        time
+            At least two times [s], shape (samples,).
+        """
+        since = time - time.mean()
+        return self.linear_error(time, since / (since @ since))
+
+    def scalars(self) -> dict[str, float]:
+        """The numbers that an output keeps."""
+        return {
+            "deviation": self.deviation,
+            "correlated_deviation": self.correlated_deviation,
+            "correlation_time": self.correlation_time,
+            "digital_step": self.digital_step,
+            "impulse_share": self.impulse_share,
+            "impulse_size": self.impulse_size,
+            "drift": self.drift,
+        }
+
+    def sentences(self, unit: str = "N") -> list[str]:
+        """What the noise is, a sentence each.
+
+        Parameters
+        ----------
+        unit
+            Unit of the force, "N" or "1".
+        """
+
+        def size(value: float) -> str:
+            return with_unit(value, unit)
+
+        found = [f"white noise of {size(self.deviation)} (standard deviation)"]
+        if len(self.deviations) > 1:
+            found[0] += ", by part: " + ", ".join(
+                f"{size(one)} at {with_unit(1 / interval, 'Hz')}"
+                for one, interval in zip(self.deviations, self.intervals, strict=True)
+            )
+        if self.digital_step > 0:
+            found.append(f"digital steps of {size(self.digital_step)}")
+        if self.correlated_deviation > 0:
+            found.append(
+                f"correlated noise of {size(self.correlated_deviation)}, correlation time "
+                f"{with_unit(self.correlation_time, 's')}"
+            )
+        if self.impulse_time.size:
+            found.append(
+                f"impulses in {number(100 * self.impulse_share, 2)} % of the samples, "
+                f"{size(self.impulse_size)} in the median: taken off for slips and fits"
+            )
+        if self.hum:
+            lines = ", ".join(
+                f"{size(one.amplitude)} at {number(one.frequency, 4)} Hz" for one in self.hum
+            )
+            found.append(f"hum of {lines}: taken off for slips and fits")
+        if self.drift:
+            found.append(
+                f"drift of {size(self.drift * self.duration)} over {with_unit(self.duration, 's')}"
+            )
+        return found
+
+
+def estimate_noise(time: Array, force: Array, *, hum: float | None = None) -> TraceNoise:
+    """Estimate the noise of a measured trace.
+
+    Parameters
+    ----------
+    time
+        Increasing times [s], shape (samples,); the sampling rate may change.
+    force
+        Force, or friction coefficient, shape (samples,), finite.
+    hum
+        Frequency of the mains [Hz], if known: then it and its harmonics are the hum. By default
+        any narrow line of the spectrum that is not the trace's own.
+
+    Returns
+    -------
+    TraceNoise
+        Each kind of noise; medians, on which slips have no influence.
+    """
+    force = np.asarray(force, dtype=float)
+    parts = parts_of(time)
+    main = max(parts, key=len)
+    wrong = np.zeros(len(force), dtype=bool)
+    sizes = []
+    for part in parts:
+        values = force[part.samples]
+        found = find_impulses(values, noise_level(values))
+        wrong[part.samples] = found
+        if found.any():
+            good = np.interp(np.flatnonzero(found), np.flatnonzero(~found), values[~found])
+            sizes.append(np.abs(values[found] - good))
+    repaired = force.copy()
+    if wrong.any():
+        repaired[wrong] = np.interp(time[wrong], time[~wrong], force[~wrong])
+    lines = find_hum(
+        time[main.samples],
+        repaired[main.samples],
+        noise_level(repaired[main.samples]),
+        frequency=hum,
+    )
+    for line in lines:
+        repaired -= line(time)
+    deviations = tuple(
+        max(noise_level(repaired[one.samples]), digital_step_of(force[one.samples]) / math.sqrt(12))
+        for one in parts
+    )
+    deviation = deviations[parts.index(main)]
+    correlated = correlated_noise(repaired[main.samples], deviation)
+    return TraceNoise(
+        deviation=deviation,
+        correlated_deviation=correlated.correlated,
+        correlation_time=correlated.time * main.interval,
+        digital_step=digital_step_of(force),
+        impulse_time=time[wrong],
+        impulse_share=float(np.mean(wrong)) if wrong.size else 0.0,
+        impulse_size=float(np.median(np.concatenate(sizes))) if sizes else 0.0,
+        hum=lines,
+        drift=_drift(time, repaired),
+        duration=float(time[-1] - time[0]) if len(time) else 0.0,
+        intervals=tuple(one.interval for one in parts),
+        deviations=deviations,
+    )
+
+
+def _drift(time: Array, force: Array) -> float:
+    """Slope through medians of blocks, by the median of slopes, if it is significant."""
+    if len(time) < 4 * DRIFT_BLOCKS:
+        return 0.0
+    edges = np.searchsorted(time, np.linspace(time[0], time[-1], DRIFT_BLOCKS + 1)[1:-1])
+    blocks = [
+        (float(np.mean(at)), float(np.median(values)))
+        for at, values in zip(np.split(time, edges), np.split(force, edges), strict=True)
+        if values.size
+    ]
+    at, level = np.array(blocks).T
+    first, second = np.triu_indices(len(at), 1)
+    slope = float(np.median((level[second] - level[first]) / (at[second] - at[first])))
+    rest = level - slope * at
+    scatter = float(np.median(np.abs(rest - np.median(rest)))) / NORMAL_MEDIAN
+    error = scatter / (math.sqrt(len(at)) * float(np.std(at)))
+    return slope if abs(slope) > MIN_DRIFT * error else 0.0

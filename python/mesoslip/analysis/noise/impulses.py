@@ -1,0 +1,73 @@
+"""Impulses: one to three samples far off, between neighbours that agree."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
+
+Array = NDArray[np.float64]
+
+# Width of the median that an impulse leaves, and of that of the deviations around it.
+WIDTH, SCATTER_WIDTH = 7, 15
+# Minimum size in standard deviations of the noise, and of the scatter around.
+MIN_SIZE, MIN_LOCAL_SIZE = 6.0, 5.0
+# Minimum size over the range of the trace between its 1 % and 99 % quantiles.
+MIN_RANGE = 2e-3
+# Maximum samples of an impulse, and samples on each side that must agree.
+MAX_LENGTH, NEIGHBOURS = 3, 4
+# Maximum difference of both sides, over the size.
+MAX_STEP = 0.4
+# Minimum distance from the samples beside it, over the size: tops of oscillations are no impulses.
+MIN_JUMP = 0.7
+
+
+def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
+    """Samples of impulses, shape (samples,).
+
+    Samples around are compared by medians, so a slip, whose sides differ, is none, nor is ringing,
+    of which neighbouring samples scatter as much.
+
+    Parameters
+    ----------
+    force
+        Samples at equal intervals, shape (samples,).
+    noise
+        Standard deviation of the white noise.
+    """
+    from scipy.ndimage import median_filter
+
+    if len(force) < 2 * SCATTER_WIDTH:
+        return np.zeros(len(force), dtype=bool)
+    deviation = force - median_filter(force, WIDTH, mode="nearest")
+    size = np.abs(deviation)
+    scatter = median_filter(size, SCATTER_WIDTH, mode="nearest") / NORMAL_MEDIAN
+    noise = max(noise, float(np.median(size)) / NORMAL_MEDIAN)
+    low, high = np.quantile(force, (0.01, 0.99))
+    found: NDArray[np.bool_] = size > np.maximum(
+        max(MIN_SIZE * noise, MIN_RANGE * float(high - low)), MIN_LOCAL_SIZE * scatter
+    )
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], found, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2]
+    if starts.size == 0:
+        return found
+    near = np.arange(NEIGHBOURS)
+    before = force[np.maximum(starts[:, None] - 1 - near, 0)]
+    behind = force[np.minimum(ends[:, None] + near, len(force) - 1)]
+    step = np.abs(np.median(before, axis=1) - np.median(behind, axis=1))
+    middle = (force[np.maximum(starts - 1, 0)] + force[np.minimum(ends, len(force) - 1)]) / 2
+    height = np.array(
+        [
+            np.abs(force[one:two] - at).max()
+            for one, two, at in zip(starts, ends, middle, strict=True)
+        ]
+    )
+    is_one = (
+        (height >= MIN_JUMP * np.maximum.reduceat(size, starts))
+        & (ends - starts <= MAX_LENGTH)
+        & (step <= MAX_STEP * np.maximum.reduceat(size, starts))
+    )
+    for first, after in zip(starts[~is_one], ends[~is_one], strict=True):
+        found[first:after] = False
+    return found

@@ -29,7 +29,7 @@ from mesoslip.analysis.cycles import (
     variation,
 )
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
-from mesoslip.analysis.sampled_slips import noise_level
+from mesoslip.analysis.noise import noise_level
 from mesoslip.configuration.config import Config
 from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, opened_run

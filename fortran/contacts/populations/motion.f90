@@ -5,10 +5,12 @@ module mesoslip_contacts_populations_motion
    implicit none
    private
 
-   public :: time_to_move, distance_in, excess_of_mean, position_at, max_time
+   public :: time_to_move, distance_in, excess_of_mean, position_at, max_time, patience
 
    !> Times beyond which nothing is expected [s]
    real(wp), parameter :: max_time = 1.0e30_wp
+   !> A step may last so many times as long as expected
+   real(wp), parameter :: patience = 1.5_wp
 
 contains
 

@@ -7,7 +7,8 @@
 !> shaken. The steps are of second order.
 module mesoslip_contacts_populations_offer
    use mesoslip_contacts_populations_breaking, only: tiny_gap
-   use mesoslip_contacts_populations_motion, only: distance_in, max_time, time_to_move
+   use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, &
+      & time_to_move
    use mesoslip_contacts_populations_packets, only: expected_births_type
    use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
@@ -21,8 +22,6 @@ module mesoslip_contacts_populations_offer
    real(wp), parameter :: creeping_part = 0.01_wp
    !> Part of a step's length over which breaks are looked for at least
    real(wp), parameter :: min_part = 1.0e-3_wp
-   !> A step may last so many times as long as expected
-   real(wp), parameter :: patience = 1.5_wp
    !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates, per
    !> radian
    real(wp), parameter :: rate_part = 1.0_wp

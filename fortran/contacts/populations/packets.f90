@@ -6,7 +6,7 @@ module mesoslip_contacts_populations_packets
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_contacts_base, only: contact_parameters_type
-   use mesoslip_contacts_populations_motion, only: position_at
+   use mesoslip_contacts_populations_motion, only: patience, position_at
    use mesoslip_interface_law, only: pose_type
    implicit none
    private
@@ -20,8 +20,6 @@ module mesoslip_contacts_populations_packets
 
    !> Part of the contacts that is too small for a packet of its own
    real(wp), parameter :: negligible_part = 1.0e-10_wp
-   !> A step may last so many times as long as expected
-   real(wp), parameter :: patience = 1.5_wp
    !> Packets for which there is room at first
    integer, parameter :: initial_packets = 64
 
@@ -94,7 +92,8 @@ contains
       call self%number%add(number)
       call self%mass%add(mass)
       if (.not. (self%reattach .and. number > 0.0_wp)) return
-      if (.not. self%pending(row_number) > 0.0_wp) self%pending(row_start) = start_time
+      ! Few that waited are taken to have broken with more that come: a delay is not stretched back.
+      if (number >= self%pending(row_number)) self%pending(row_start) = start_time
       self%pending(row_end) = end_time
       self%pending(row_number) = self%pending(row_number) + number
       self%pending(row_mass) = self%pending(row_mass) + mass

@@ -28,8 +28,9 @@ module mesoslip_contacts_lattice
 
    public :: contact_lattice_type, interaction_type, new_contact_lattice, make_contact_lattice
 
-   !> Breaks of each contact in one cascade, on average, beyond which it is taken to have no end.
-   real(wp), parameter :: max_breaks = 1000.0_wp
+   !> Breaks in one cascade beyond which it is taken to have no end: of each contact on average, and
+   !> of all, unless these are fewer for each than the last. A cascade is not cut into segments.
+   real(wp), parameter :: max_breaks = 1000.0_wp, max_all_breaks = 1.0e7_wp, min_breaks = 20.0_wp
 
    !> What the neighbours are to a pinned contact: sum over the pinned ones of how far their origins
    !> are ahead of its own [m], and how many are detached
@@ -173,13 +174,15 @@ contains
       !> Where the slider was, and where it is
       type(pose_type), intent(in) :: before, after
 
-      real(wp) :: breaks
+      real(wp) :: breaks, limit
 
       breaks = self%breaks
+      limit = min(max_breaks * self%parameters%count, &
+         & max(max_all_breaks, min_breaks * self%parameters%count))
       do
          call self%cascade(after)
          if (self%detached%next_due > after%time) exit
-         if (self%breaks - breaks > max_breaks * self%parameters%count) then
+         if (self%breaks - breaks > limit) then
             call raise(self%failure, status_stalled, "a cascade of contacts that break and " // &
                & "attach at once does not end: a delay (contacts.delay) or a weaker " // &
                & "interaction (interaction.strength) would end it")
@@ -414,7 +417,7 @@ contains
       end do
    end subroutine shift_order
 
-   !> Make the order of breaking anew, from the records.
+   !> Recompute the order of breaking from the records.
    subroutine rebuild(self, displacement)
       !> The contacts
       class(contact_lattice_type), intent(inout) :: self

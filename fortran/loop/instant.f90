@@ -65,7 +65,7 @@ contains
       type(pose_type), intent(out) :: before
       type(interface_law_type), intent(out) :: law
 
-      type(window_type) :: window
+      type(window_type) :: window, motion
       real(wp) :: end_time, max_breaks
       integer(i8) :: last
 
@@ -81,6 +81,10 @@ contains
       end if
       do
          window%end_time = min(window%end_time, end_time)
+         motion = window_type()
+         call state%stop%limit_window(motion, slider%origin)
+         slider%stop_upper = motion%upper
+         slider%stop_lower = motion%lower
          call slider%advance(law, window)
          state%advances = state%advances + 1
          if (state%advances >= last .or. state%contacts%breaks > segment%max_breaks) exit

@@ -1,5 +1,6 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_loop_simulation
+   use mesoslip_interface_law, only: interface_law_type
    use mesoslip_loop_endings, only: ending_none
    use mesoslip_loop_events, only: advance_to_event
    use mesoslip_loop_instant, only: advance_in_equilibrium
@@ -38,19 +39,22 @@ contains
       !> Initial state of the contacts, an initial_ code of the ensemble
       integer, intent(in) :: initial
 
+      type(interface_law_type) :: law
+
       self%is_started = .true.
       call self%contacts%initialize(initial)
       call self%slider%drive%begin(self%slider%time)
       call self%slider%adapt_to_drive()
-      call self%slider%start(self%contacts%law())
+      law = self%contacts%law()
+      call self%slider%start(law)
       self%slider%direction = self%slider%drive%direction
-      call self%contacts%respond(self%slider%pose(), self%slider%pose())
       self%start_energy = self%slider%energy() &
          & + self%contacts%elastic_energy(self%slider%displacement)
+      call self%contacts%respond(self%slider%pose(), self%slider%pose())
       call self%stages%begin(self%slider, self%slider%drive%stage())
       call look_for_steady(self)
       call self%recorder%record(self%slider, self%contacts%detached_count, 0.0_wp)
-      call self%avalanches%count_breaks(self%slider, self%contacts, self%contacts%law())
+      call self%avalanches%count_breaks(self%slider, self%contacts, law)
       select type (slider => self%slider)
       class is (instant_slider_type)
          continue
@@ -73,7 +77,7 @@ contains
 
       type(segment_type) :: segment
       integer(i8) :: advances
-      real(wp) :: time, displacement
+      real(wp) :: time, displacement, origin
 
       segment = new_segment(self%advances, self%contacts%breaks, max_advances, max_work)
       do while (self%ending == ending_none)
@@ -83,6 +87,7 @@ contains
          advances = self%advances
          time = self%slider%time
          displacement = self%slider%displacement
+         origin = self%slider%origin
          call self%advance(segment)
          call segment%add(self%advances - advances, self%slider%cost + self%contacts%cost)
          if (allocated(self%slider%failure)) then
@@ -90,7 +95,10 @@ contains
          else if (allocated(self%contacts%failure)) then
             error = self%contacts%failure
          else
-            call self%check_progress(time, displacement, error)
+            ! The origin moves by what has no rounding error: that is no progress.
+            call self%check_progress(self%advances - advances, self%slider%time > time .or. &
+               & abs((self%slider%origin - origin) + (self%slider%displacement - displacement)) &
+               & > 0.0_wp, error)
          end if
          if (allocated(error)) exit
       end do
@@ -120,16 +128,16 @@ contains
    end function is_full
 
    !> Whether advances change anything.
-   subroutine check_progress(self, time, displacement, error)
+   subroutine check_progress(self, advances, has_moved, error)
       class(simulation_type), intent(inout) :: self
-      !> Time and displacement before the last ones [s, m]
-      real(wp), intent(in) :: time, displacement
+      !> Number of the last ones, and whether time or displacement is another after them
+      integer(i8), intent(in) :: advances
+      logical, intent(in) :: has_moved
       !> Set if very many have not
       type(error_type), allocatable, intent(out) :: error
 
-      self%idle = self%idle + 1
-      if (self%slider%time > time &
-         & .or. abs(self%slider%displacement - displacement) > 0.0_wp) self%idle = 0
+      self%idle = self%idle + int(min(max(1_i8, advances), int(max_idle_advances, i8)))
+      if (has_moved) self%idle = 0
       if (self%idle > max_idle_advances) call raise(error, status_stalled, "the motion makes " &
          & // "no progress: contacts break and attach again without end at one displacement")
    end subroutine check_progress

@@ -91,7 +91,7 @@ contains
          & .and. allocated(self%recorder%trace%rows%row) &
          & .and. allocated(self%recorder%slips%catalogue%row) &
          & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row)
-      if (is_whole) is_whole = self%slider%drive%is_open()
+      if (is_whole) is_whole = self%slider%drive%is_open() .and. self%steady%is_open()
    end function is_whole
 
    !> Terms of the energy balance, and how far it is from closing.

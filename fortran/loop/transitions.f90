@@ -47,7 +47,7 @@ contains
       !> Whether none is
       logical :: is_broken
 
-      is_broken = .not. (law%stiffness > 0.0_wp .or. window%end_time < never &
+      is_broken = .not. (abs(law%stiffness) > 0.0_wp .or. window%end_time < never &
          & .or. state%slider%drive%end_of_part() < never .or. state%avalanches%size > 0.0_wp)
    end function is_broken
 
@@ -97,7 +97,7 @@ contains
 
       associate (drive => state%slider%drive)
          if (.not. drive%is_last_part() .or. abs(drive%acceleration) > 0.0_wp) return
-         call state%steady%begin(state%slider%time, drive%rate)
+         call state%steady%begin(state%slider%time, drive%rate, drive%stage_impulse())
       end associate
    end subroutine look_for_steady
 

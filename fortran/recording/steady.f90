@@ -34,6 +34,7 @@ module mesoslip_recording_steady
    contains
       !> Set what to look for
       procedure, non_overridable :: open
+      procedure, non_overridable :: is_open
       !> Begin with the first block
       procedure, non_overridable :: begin
       !> A block is over
@@ -65,16 +66,26 @@ contains
       end if
    end subroutine open
 
+   !> Whether it is set what to look for.
+   pure function is_open(self)
+      !> The recorder
+      class(steady_recorder_type), intent(in) :: self
+      !> Whether it is
+      logical :: is_open
+
+      is_open = allocated(self%mean)
+   end function is_open
+
    !> Begin with the first block.
-   subroutine begin(self, time, velocity)
+   subroutine begin(self, time, velocity, impulse)
       !> The recorder
       class(steady_recorder_type), intent(inout) :: self
-      !> Time now [s], and constant velocity of the drive [m/s]
-      real(wp), intent(in) :: time, velocity
+      !> Time now [s], constant velocity of the drive [m/s], its impulse in the stage so far [N s]
+      real(wp), intent(in) :: time, velocity, impulse
 
       self%block_end = huge(1.0_wp)
       self%number = 0
-      self%impulse = 0.0_wp
+      self%impulse = impulse
       if (.not. (self%distance > 0.0_wp .and. abs(velocity) > 0.0_wp)) return
       self%start_time = time
       self%duration = self%distance / abs(velocity)
@@ -85,7 +96,7 @@ contains
    subroutine end_block(self, impulse, is_steady)
       !> The recorder
       class(steady_recorder_type), intent(inout) :: self
-      !> Impulse of the drive since the first block began [N s]
+      !> Impulse of the drive in the stage so far [N s]
       real(wp), intent(in) :: impulse
       !> Whether it is
       logical, intent(out) :: is_steady

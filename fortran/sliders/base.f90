@@ -13,7 +13,7 @@ module mesoslip_sliders_base
    implicit none
    private
 
-   public :: slider_type, motion_type, exchange_slider, exchange_law, shift_slider
+   public :: slider_type, motion_type, exchange_slider, exchange_law, shift_law, shift_slider
 
    !> The motion at one time.
    type :: motion_type
@@ -286,7 +286,7 @@ contains
 
    end function passage
 
-   !> Move the origin of displacements; ends what can be observed of the last advance.
+   !> Move the origin of displacements; what can be observed of the last advance is its end.
    subroutine shift_slider(self, shift)
       !> The slider
       class(slider_type), intent(inout) :: self
@@ -334,6 +334,16 @@ contains
       call archive%exchange("drag_loss", self%drag_loss)
       call archive%exchange("damping_loss", self%damping_loss)
    end subroutine exchange_slider
+
+   !> Let a law of the contact force count displacements from another origin.
+   pure subroutine shift_law(law, shift)
+      !> The law
+      type(interface_law_type), intent(inout) :: law
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      law%offset = law%offset - law%stiffness * shift
+   end subroutine shift_law
 
    !> Put a law of the contact force into an archive or take it out.
    subroutine exchange_law(law, archive)

@@ -17,6 +17,8 @@ module mesoslip_sliders_instant
       real(wp) :: rest_displacement = 0.0_wp
       !> Whether no equilibrium is left: neither contacts nor a spring hold it
       logical :: is_unbound = .false.
+      !> Displacements at which its motion with the drive ends, though it may jump beyond [m]
+      real(wp) :: stop_upper = huge(1.0_wp), stop_lower = -huge(1.0_wp)
    contains
       !> Breaks of each contact in one avalanche after which it will never settle
       procedure :: max_breaks

@@ -7,7 +7,8 @@ module mesoslip_sliders_prescribed
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_schedule, only: schedule_type
    use mesoslip_step_filter, only: step_filter_type
-   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law
+   use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law, &
+      & shift_law, shift_slider
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
    implicit none
    private
@@ -27,6 +28,7 @@ module mesoslip_sliders_prescribed
       procedure :: run_ahead
       procedure :: observe
       procedure :: energy
+      procedure :: shift_origin
       procedure :: exchange
    end type slider_prescribed_type
 
@@ -212,7 +214,7 @@ contains
          & + law%drag * distance)
       call note(self, self%step_time, start, early)
       call note(self, self%time, self%displacement, late)
-      if (law%stiffness > 0.0_wp) then
+      if (abs(law%stiffness) > 0.0_wp) then
          ! Where contacts pull more by as much as drag pulls less.
          time = -(law%drag + law%rate / self%drive%acceleration) / law%stiffness &
             & - early / self%drive%acceleration
@@ -272,6 +274,17 @@ contains
 
       energy = 0.0_wp
    end function energy
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift)
+      !> The slider
+      class(slider_prescribed_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      call shift_slider(self, shift)
+      call shift_law(self%law, shift)
+   end subroutine shift_origin
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -9,7 +9,7 @@ module mesoslip_sliders_quasistatic
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_sliders_base, only: exchange_law, motion_type, slider_type
+   use mesoslip_sliders_base, only: exchange_law, motion_type, shift_law, shift_slider, slider_type
    use mesoslip_sliders_instant, only: exchange_instant, instant_slider_type
    implicit none
    private
@@ -33,6 +33,7 @@ module mesoslip_sliders_quasistatic
       procedure :: advance
       procedure :: observe => observe_quasistatic
       procedure :: energy
+      procedure :: shift_origin
       procedure :: exchange
       !> Force of the drive on the slider at displacement 0
       procedure, non_overridable :: pull
@@ -131,15 +132,16 @@ contains
       class(slider_quasistatic_type), intent(inout) :: self
       type(window_type), intent(in) :: window
 
-      real(wp) :: stiffness, start, distance, limit, arrival, step
+      real(wp) :: stiffness, start, distance, lower, upper, limit, arrival, step
 
       stiffness = self%stiffness + self%law%stiffness
       start = self%displacement
       self%rest_displacement = start
       self%velocity = self%drive%rate_at(self%time) * self%pull_over_value / stiffness
       self%acceleration = self%drive%acceleration * self%pull_over_value / stiffness
-      limit = window%upper
-      if (self%drive%direction < 0.0_wp) limit = window%lower
+      upper = min(window%upper, max(self%stop_upper, start))
+      lower = max(window%lower, min(self%stop_lower, start))
+      limit = merge(upper, lower, self%drive%direction > 0.0_wp)
       arrival = time_of(limit - start, self%velocity, self%acceleration)
       if (arrival < huge(1.0_wp) .and. arrival <= window%end_time - self%time) then
          self%time = min(self%time + arrival, window%end_time)
@@ -148,7 +150,7 @@ contains
          self%time = window%end_time
          self%displacement = (self%pull(self%time) + self%law%offset) / stiffness
          ! Rounding may take it to the other side of a contact that is about to break.
-         self%displacement = min(max(self%displacement, window%lower), window%upper)
+         self%displacement = min(max(self%displacement, lower), upper)
       end if
       distance = self%displacement - start
       if (abs(distance) > 0.0_wp) self%direction = sign(1.0_wp, distance)
@@ -282,6 +284,18 @@ contains
 
       energy = 0.5_wp * self%stiffness * (self%drive%at(self%time) - self%displacement)**2
    end function energy
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift)
+      !> The slider
+      class(slider_quasistatic_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      call shift_slider(self, shift)
+      self%rest_displacement = self%rest_displacement - shift
+      call shift_law(self%law, shift)
+   end subroutine shift_origin
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

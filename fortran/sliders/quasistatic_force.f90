@@ -5,7 +5,7 @@ module mesoslip_sliders_quasistatic_force
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_sliders_base, only: motion_type, slider_type
+   use mesoslip_sliders_base, only: motion_type, shift_law, slider_type
    use mesoslip_sliders_quasistatic, only: observe_quasistatic, slider_quasistatic_type
    implicit none
    private
@@ -128,6 +128,8 @@ contains
       call self%drive%rebase(self%time, 0.0_wp)
       self%displacement = self%displacement - shift
       self%origin = self%origin + shift
+      self%rest_displacement = self%rest_displacement - shift
+      call shift_law(self%law, shift)
    end subroutine shift_origin
 
 end module mesoslip_sliders_quasistatic_force

@@ -11,7 +11,8 @@ module mesoslip_sliders_rigid
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_schedule, only: schedule_type
-   use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, slider_type
+   use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, shift_law, &
+      & shift_slider, slider_type
    use mesoslip_sliders_motion_series, only: horner, integral
    use mesoslip_sliders_rigid_long_step, only: take_long_step
    use mesoslip_sliders_rigid_short_step, only: try_short_step
@@ -31,6 +32,7 @@ module mesoslip_sliders_rigid
       procedure :: run_ahead
       procedure :: observe
       procedure :: energy
+      procedure :: shift_origin
       procedure :: exchange
    end type slider_rigid_type
 
@@ -196,6 +198,18 @@ contains
       energy = 0.5_wp * self%mass * self%velocity**2 &
          & + 0.5_wp * self%stiffness * (self%drive%at(self%time) - self%displacement)**2
    end function energy
+
+   !> Move the origin of displacements.
+   subroutine shift_origin(self, shift)
+      !> The slider
+      class(slider_rigid_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: shift
+
+      call shift_slider(self, shift)
+      self%start_displacement = self%start_displacement - shift
+      call shift_law(self%law, shift)
+   end subroutine shift_origin
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

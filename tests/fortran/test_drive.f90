@@ -4,6 +4,9 @@ program test_drive
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_recording_steady, only: steady_recorder_type
+   use mesoslip_sliders_base, only: motion_type
+   use mesoslip_sliders_prescribed, only: slider_prescribed_type
    use mesoslip_sliders_quasistatic, only: slider_quasistatic_type
    use mesoslip_sliders_quasistatic_force, only: slider_quasistatic_force_type
    use testing, only: check, check_close, finish
@@ -15,6 +18,9 @@ program test_drive
    call has_a_part()
    call pulls_a_spring()
    call pulls_with_a_force()
+   call finds_a_maximum(-2.0_wp)
+   call finds_a_maximum(2.0_wp)
+   call is_steady_at_once()
    call finish()
 
 contains
@@ -138,6 +144,7 @@ contains
       type(slider_quasistatic_force_type) :: slider
       type(interface_law_type) :: law
       type(window_type) :: window
+      type(motion_type) :: motion
       real(wp) :: force
 
       slider%pull_over_value = 1.0_wp
@@ -147,6 +154,12 @@ contains
       window%end_time = times(1)
       call slider%advance(law, window)
       call slider%shift_origin(shift)
+      motion = slider%observe(slider%time)
+      force = rate * times(1) + 0.5_wp * acceleration * times(1)**2
+      call check_close(motion%displacement, force / contacts, 1.0e-15_wp, &
+         & "displacement that is observed from another origin")
+      call check_close(motion%contact_force, force, 1.0e-15_wp, &
+         & "force that is observed from another origin")
       law%offset = -contacts * shift
       window%end_time = times(2)
       call slider%advance(law, window)
@@ -160,5 +173,46 @@ contains
          & "impulse of a force")
       call check(slider%max_breaks() < huge(1.0_wp), "contacts can break without end")
    end subroutine pulls_with_a_force
+
+   !> A prescribed slider that accelerates from rest: the contact force K x + C v has an extreme at
+   !> t = -C/K, for K < 0 and C > 0 as for K > 0 and C < 0.
+   subroutine finds_a_maximum(stiffness)
+      real(wp), intent(in) :: stiffness
+
+      real(wp), parameter :: drag = 1.0_wp, acceleration = 0.7_wp
+      type(slider_prescribed_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      real(wp) :: extreme
+
+      law%stiffness = stiffness
+      law%drag = sign(drag, -stiffness)
+      call slider%start(law)
+      call slider%drive%change(0.0_wp, 0.0_wp, acceleration)
+      window%end_time = 2.0_wp * drag / abs(stiffness)
+      call slider%advance(law, window)
+      extreme = merge(slider%drive%extremes%max_force, slider%drive%extremes%min_force, &
+         & stiffness < 0.0_wp)
+      call check_close(extreme, -0.5_wp * drag**2 * acceleration / stiffness, 1.0e-15_wp, &
+         & "extreme of the force within a step")
+      call check_close(merge(slider%drive%extremes%max_time, slider%drive%extremes%min_time, &
+         & stiffness < 0.0_wp), drag / abs(stiffness), 1.0e-15_wp, "time of the extreme")
+   end subroutine finds_a_maximum
+
+   !> A constant force is steady after twice the blocks, also within a stage that has begun before.
+   subroutine is_steady_at_once()
+      real(wp), parameter :: velocity = 2.0_wp, force = 3.0_wp, duration = 0.5_wp
+      integer, parameter :: blocks = 2
+      type(steady_recorder_type) :: recorder
+      logical :: is_steady
+      integer :: block
+
+      call recorder%open(velocity * duration, blocks, 1.0e-9_wp)
+      call recorder%begin(10.0_wp, velocity, 7.0_wp)
+      do block = 1, 2 * blocks
+         call recorder%end_block(7.0_wp + block * force * duration, is_steady)
+         call check(is_steady .eqv. block == 2 * blocks, "a constant force is steady")
+      end do
+   end subroutine is_steady_at_once
 
 end program test_drive

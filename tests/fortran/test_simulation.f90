@@ -12,6 +12,7 @@ program test_simulation
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_parameters_type
+   use mesoslip_recording_steady, only: steady_recorder_type
    use mesoslip_recording_trace, only: trace_columns
    use mesoslip_schedule, only: max_events
    use mesoslip_loop_endings, only: ending_drive
@@ -297,7 +298,7 @@ contains
 
    !> A state of another kind, of another length, or for a run under way, is refused.
    subroutine refuses()
-      type(simulation_type) :: rigid, other, shorter
+      type(simulation_type) :: rigid, other, shorter, unset
       type(error_type), allocatable :: error
       integer(i8), allocatable :: words(:)
       integer(i8) :: length
@@ -321,6 +322,10 @@ contains
       call check(allocated(error), "a state that is not whole is refused")
       call rigid%restore(words, error)
       call check(allocated(error), "a run under way is not set to another state")
+      call build(unset, "ensemble", "rigid", "gaussian", 0.1_wp, coupling_scaled, "series")
+      call check(unset%is_whole(), "a simulation that has all its parts is whole")
+      unset%steady = steady_recorder_type()
+      call check(.not. unset%is_whole(), "one that is not told when to stop is not")
    end subroutine refuses
 
    !> Handles: what was closed is an error.

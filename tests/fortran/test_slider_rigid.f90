@@ -2,6 +2,7 @@
 program test_slider_rigid
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_base, only: motion_type
    use mesoslip_sliders_rigid, only: slider_rigid_type
    use testing, only: check, check_close, finish
    implicit none
@@ -18,6 +19,7 @@ program test_slider_rigid
    call damps(1.0_wp)
    call turns_short_of_crossing()
    call stays_at_rest()
+   call is_observed()
    call finish()
 
 contains
@@ -190,5 +192,39 @@ contains
       call check(abs(slider%velocity) <= 1.0e-16_wp, "a balanced slider stays at rest")
       call check(slider%time >= 1.0_wp, "and time passes")
    end subroutine stays_at_rest
+
+   !> The end of a step is observed from another origin, and so is a step without length.
+   subroutine is_observed()
+      type(slider_rigid_type) :: slider
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      type(motion_type) :: motion
+      real(wp) :: force
+
+      law = interface_law_type(stiffness=5.0_wp, offset=-1.0_wp, drag=0.1_wp)
+      slider = slider_rigid_type(mass=2.0_wp, stiffness=2.0_wp * frequency**2)
+      call slider%start(law)
+      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+      window%end_time = 0.1_wp
+      do while (slider%time < window%end_time)
+         call slider%advance(law, window)
+      end do
+      force = law%stiffness * slider%displacement - law%offset + law%drag * slider%velocity
+      call slider%shift_origin(0.25_wp)
+      motion = slider%observe(slider%time)
+      call check_close(motion%displacement, slider%origin + slider%displacement, 1.0e-14_wp, &
+         & "displacement that is observed from another origin")
+      call check_close(motion%contact_force, force, 1.0e-14_wp, &
+         & "force that is observed from another origin")
+      law%offset = law%offset - 0.25_wp * law%stiffness
+      window%upper = slider%displacement
+      window%end_time = 1.0_wp
+      call slider%advance(law, window)
+      motion = slider%observe(slider%time)
+      call check_close(motion%velocity, slider%velocity, 1.0e-14_wp, &
+         & "velocity in a step without length")
+      call check_close(slider%start_acceleration, slider%acceleration, 1.0e-14_wp, &
+         & "acceleration in a step without length")
+   end subroutine is_observed
 
 end program test_slider_rigid

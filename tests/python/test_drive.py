@@ -463,6 +463,17 @@ def test_without_inertia_a_run_ends_where_it_comes_to_rest():
     assert 1e-7 <= tree["end_displacement"].values[0] < 1.3e-7
 
 
+@pytest.mark.parametrize("distance", [3.0000001e-9, -3e-9])
+def test_without_inertia_a_run_ends_at_a_displacement_between_breaks(distance):
+    """To the bit, while nothing breaks: no contact bears less than 0.6 of 9 nm."""
+    stage = {"duration": 0.1, "velocity": math.copysign(1e-5, distance)}
+    changes = {"drive": {"stage": [stage]}, "run__stop": {"displacement": distance}}
+    tree = mesoslip.run(configuration("quasistatic", **changes))
+    assert tree.attrs["ending"] == "displacement of the slider reached"
+    assert tree["end_displacement"].values[0] == distance
+    assert tree["breaks"].values[0] == 0
+
+
 SLOW = {
     "drive": {"velocity": 1e-6},
     "run": {"duration": 4.0, "stop": {"slips": 3}},

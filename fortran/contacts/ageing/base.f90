@@ -25,6 +25,9 @@ module mesoslip_contacts_ageing_base
    !> Number of contacts whose thresholds fall that are all near.
    integer, parameter :: few = 32
 
+   !> Visits of contacts that take as long as an advance of a rigid slider
+   real(wp), parameter :: visits_per_cost = 5.0_wp
+
    !> Where a contact is kept: in the queue, among the leaders, among those that fall
    integer, parameter :: in_queue = 0, in_leaders = 1, in_falling = 2
 
@@ -92,7 +95,9 @@ module mesoslip_contacts_ageing_base
       procedure, non_overridable :: behind_at
       !> Whether a contact breaks, and how late it does
       procedure, non_overridable :: is_due
-      procedure, non_overridable :: record_delay
+      procedure, non_overridable :: record_lateness
+      !> Add the work of visiting contacts in an advance
+      procedure, non_overridable :: count_visits
    end type ageing_contacts_type
 
 contains
@@ -144,6 +149,7 @@ contains
       end do
       self%solved = 0
       call self%rebuild(pose%displacement)
+      call self%count_visits(self%parameters%count)
    end subroutine order_all
 
    !> Put a contact into the queue.
@@ -236,7 +242,7 @@ contains
    end function is_due
 
    !> Remember it as an error of the force if a contact breaks later than it should have.
-   pure subroutine record_delay(self, contact, pose)
+   pure subroutine record_lateness(self, contact, pose)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
@@ -248,7 +254,18 @@ contains
       if (late > tiny_gap * self%stretch .and. self%life(life_motion, contact) < any_motion) then
          self%error_estimate = max(self%error_estimate, late * self%parameters%stiffness)
       end if
-   end subroutine record_delay
+   end subroutine record_lateness
+
+   !> Add the work of visiting contacts: a segment of a run must not last long, however many of them
+   !> an advance visits.
+   pure subroutine count_visits(self, visits)
+      !> The contacts
+      class(ageing_contacts_type), intent(inout) :: self
+      !> Number of visits
+      integer, intent(in) :: visits
+
+      self%cost = self%cost + visits / visits_per_cost
+   end subroutine count_visits
 
    !> What each contact is.
    pure subroutine records(self, values)

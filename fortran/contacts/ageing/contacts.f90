@@ -144,8 +144,8 @@ contains
       upper = huge(1.0_wp)
       lower = self%behind
       end_time = self%detached%next_due
-      call follow_motion(self, pose)
       self%cost = 1.0_wp
+      call follow_motion(self, pose)
       if (self%is_steady) then
          upper = self%queue%first_key
       else
@@ -207,7 +207,7 @@ contains
             call self%queue%pop(self%record, contact)
             call self%refresh(contact, pose%time)
             if (self%is_due(contact, pose)) then
-               call self%record_delay(contact, pose)
+               call self%record_lateness(contact, pose)
                call self%detach(contact, pose%displacement, pose%time)
             else
                call append(self%leaders, contact)

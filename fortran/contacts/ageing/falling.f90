@@ -60,6 +60,7 @@ contains
             call append(self%near, contact)
          end if
       end do
+      call self%count_visits(2 * self%falling%count)
    end subroutine scan
 
    !> Scan the contacts whose thresholds fall if that is due; those that are old do so no more.
@@ -99,7 +100,7 @@ contains
 
    !> Find until where and when the slider may go before a contact breaks whose threshold falls.
    subroutine bound_falling(self, pose, upper, lower, end_time)
-      class(ageing_contacts_type), intent(in) :: self
+      class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
       !> Coordinates between which [m], and time until which [s], no contact breaks
       real(wp), intent(inout) :: upper, lower, end_time
@@ -117,6 +118,7 @@ contains
             end if
          end associate
       end do
+      call self%count_visits(self%near%count)
    end subroutine bound_falling
 
    !> Where and when a contact is foreseen to break whose threshold falls: before that, it cannot.

@@ -19,8 +19,6 @@ module mesoslip_contacts_ageing_leaders
    real(wp), parameter :: max_excess = 1.0e-5_wp
    !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
    integer, parameter :: max_steps = 8
-   !> Visits of contacts that take as long as an advance of a rigid slider
-   real(wp), parameter :: visits_per_cost = 5.0_wp
 
 contains
 
@@ -60,8 +58,7 @@ contains
             call remove(self%leaders, position)
          end if
       end do
-      ! A segment of a run must not last long, however many contacts an advance visits.
-      self%cost = 1.0_wp + visited / visits_per_cost
+      call self%count_visits(visited)
    end subroutine bound_leaders
 
    !> Where a leader is foreseen to break.
@@ -142,7 +139,7 @@ contains
          end do
          if (first == 0) return
          contact = self%leaders%contact(first)
-         call self%record_delay(contact, pose)
+         call self%record_lateness(contact, pose)
          call remove(self%leaders, first)
          self%kept(contact) = in_queue
          call self%detach(contact, pose%displacement, pose%time)

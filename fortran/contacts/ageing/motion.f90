@@ -42,7 +42,7 @@ contains
       end if
    end subroutine follow_motion
 
-   !> See to it that the slider is slower than the speed of the queue, but not by far.
+   !> Keep the speed of the queue above that of the slider, but not by far.
    subroutine set_speed(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose

@@ -86,7 +86,7 @@ contains
                call self%put(contact)
                cycle
             end if
-            call self%record_delay(contact, pose)
+            call self%record_lateness(contact, pose)
          end if
          call self%detach(contact, pose%displacement, pose%time)
       end do

@@ -58,7 +58,14 @@ contains
          ends = .false.
       end if
 
-      if (.not. step > 0.0_wp) return
+      if (.not. step > 0.0_wp) then
+         ! What is observed of a step without length is its start.
+         self%series = 0.0_wp
+         self%series(:1) = [early%velocity, early%acceleration]
+         self%start_acceleration = early%acceleration
+         self%acceleration = early%acceleration
+         return
+      end if
       ! The number of terms is a constant in each call: the compiler makes a copy for each.
       if (rate * step <= middling_step) then
          call move(self, system, window, early, step, ends, some_terms)

@@ -155,8 +155,6 @@ def values_of(
     cells: Cells,
     headers: Sequence[str],
     places: Mapping[str, FoundColumn],
-    *,
-    keep_missing: bool = False,
 ) -> dict[str, list[float]]:
     """Values of columns in SI.
 
@@ -168,8 +166,6 @@ def values_of(
         Headers of all its columns.
     places
         The columns to read, see `find_columns`.
-    keep_missing
-        Whether empty cells, and those that are not a number (NaN), are kept as NaN.
 
     Raises
     ------
@@ -186,13 +182,13 @@ def values_of(
             raise FileError(f"{where}: has {len(row)} cells under {len(headers)} headers{POINT}")
         for name, (column, size) in places.items():
             cell = row[column] if column < len(row) else ""
-            if cell == "" and not keep_missing:
+            if cell == "":
                 raise FileError(f"{where}: the {name} is missing")
             try:
-                value = size * (math.nan if cell == "" else number_of(cell, decimal))
+                value = size * number_of(cell, decimal)
             except ValueError as error:
                 raise FileError(f"{where}: the {name}, {error}") from None
-            if not math.isfinite(value) and not (keep_missing and math.isnan(value)):
+            if not math.isfinite(value):
                 raise FileError(f"{where}: the {name}, {shown(cell)}, is not a finite number")
             values[name].append(value)
     return values

@@ -17,6 +17,7 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Table, Text, Whole, problem
 from mesoslip.configuration.units import number_of, to_si
 from mesoslip.errors import ConfigError, Problem, shown
+from mesoslip.measured.record import Record
 
 
 def _checked_quantity(
@@ -36,7 +37,9 @@ def _checked_quantity(
             continue
         if minimum is not None and (number < minimum or (is_open and number == minimum)):
             raise ValueError(f"must be {'greater than' if is_open else 'at least'} {minimum:g}")
-        return value if isinstance(value, str) else f"{number!r} {unit}".removesuffix(" 1")
+        # A plain number of a force or a coefficient has the unit of the record.
+        named = "" if len(units) > 1 else f" {unit}"
+        return value if isinstance(value, str) else f"{number!r}{named}"
     raise errors[0]
 
 
@@ -190,13 +193,13 @@ class TraceDescription(Table):
                 continue
         raise AssertionError(name)
 
-    @property
-    def stiffness_is_relative(self) -> bool:
-        """Whether the stiffness is one of friction coefficients, in 1/m."""
-        if self.stiffness is None:
+    def is_in(self, name: str, unit: str) -> bool:
+        """Whether a quantity is given with a unit of the dimension of an SI unit."""
+        text = getattr(self, name)
+        if text is None or _is_plain(text):
             return False
         try:
-            to_si(self.stiffness, "1/m", "")
+            to_si(text, unit, "")
         except ValueError:
             return False
         return True
@@ -269,6 +272,18 @@ def describe(file: Path, options: Mapping[str, Any]) -> tuple[Experiment, Path, 
         raise ConfigError([Problem(str(file), "trace", message)])
     experiment = _checked({"title": tables.get("title"), "trace": {**table, **changes}}, str(file))
     return experiment, file.parent / experiment.trace.file, model_of(tables, str(file))
+
+
+def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
+    """A description with the columns that were found, so that it repeats the reading."""
+    columns = dict(trace.columns)
+    for one in record.columns:
+        if one.use and columns.get(one.use) is None:
+            unit = one.unit or None
+            columns[one.use] = Column(column=one.reference, unit=unit)
+    return trace.model_copy(
+        update={"columns": {key: one for key, one in columns.items() if one}, "headers": None}
+    )
 
 
 def option_name(key: str) -> str:

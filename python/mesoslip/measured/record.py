@@ -13,11 +13,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RecordedColumn:
-    """A column of the file as it is: its header, its unit as written, its numbers."""
+    """A column of the file as it is: its header, its unit as written, its numbers.
+
+    ``use`` is the quantity that it was taken for, empty if none; ``reference`` its name or number.
+    """
 
     header: str
     unit: str
     values: Array
+    use: str = ""
+    reference: str = ""
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,8 @@ class Record:
         Force of the spring [N] or friction coefficient, shape (samples,).
     is_friction
         Whether it is a friction coefficient.
+    mean_normal_force
+        Mean normal force [N], recorded or given; None if unknown.
     load_point, displacement
         Displacements of the drive and of the slider [m]; None if not recorded. Single samples may
         be NaN, as in the next two.
@@ -46,9 +53,15 @@ class Record:
     time: Array
     force: Array
     is_friction: bool
+    mean_normal_force: float | None = None
     load_point: Array | None = None
     displacement: Array | None = None
     normal_force: Array | None = None
     normal_stress: Array | None = None
     columns: Sequence[RecordedColumn] = ()
     report: Sequence[str] = field(default=())
+
+    @property
+    def force_name(self) -> str:
+        """Name of the force in outputs."""
+        return "friction_coefficient" if self.is_friction else "spring_force"

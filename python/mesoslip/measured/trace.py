@@ -6,26 +6,29 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.even_traces import evenly_sampled, first_velocity
-from mesoslip.analysis.noise import noise_level
-from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period, find_slips
+from mesoslip.analysis.even_traces import first_velocity
+from mesoslip.analysis.noise import TraceNoise, estimate_noise
+from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.measured.assembly import read_record
 from mesoslip.measured.description import (
     Experiment,
+    TraceDescription,
     config_of_file,
     describe,
     option_name,
+    resolve,
 )
 from mesoslip.measured.load_point import drive_stages, stage_table
 from mesoslip.measured.record import Record, RecordedColumn
-from mesoslip.measured.table import read_record
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike
 from mesoslip.output.provenance import program_attributes
@@ -79,18 +82,31 @@ class Understood:
     stiffness: float | None
     name: str
 
+    @cached_property
+    def noise(self) -> TraceNoise | float:
+        """The noise of the force: estimated, or its standard deviation as it is given."""
+        given = self.experiment.trace.si("noise")
+        if given is not None:
+            return given
+        return estimate_noise(
+            self.record.time, self.record.force, hum=self.experiment.trace.si("hum")
+        )
+
     @property
     def report(self) -> list[str]:
         """Lines about what was understood."""
-        return list(self.record.report)
+        lines = list(self.record.report)
+        if isinstance(self.noise, TraceNoise):
+            unit = "1" if self.record.is_friction else "N"
+            lines += [f"noise: {one}" for one in self.noise.sentences(unit)]
+        return lines
 
 
 def understand(
     file: PathLike, *, config: ConfigLike | None = None, **options: str | float | None
 ) -> Understood:
     """Read the file of a measurement, with keys of the table [trace]; see `read_trace`."""
-    path = as_path(file)
-    experiment, path, beside = describe(path, options)
+    experiment, path, beside = describe(as_path(file), options)
     model = beside if config is None else config_of_file(config)
     trace = experiment.trace
     if model is not None:
@@ -99,8 +115,49 @@ def understand(
             message = "is given in the configuration; change it there"
             raise ConfigError([Problem("", option_name(name), message) for name in given])
     record = read_record(path, trace)
-    stiffness = trace.si("stiffness") if model is None else model.spring_stiffness
-    return Understood(record, experiment, model, stiffness, path.name)
+    stiffness = _stiffness(record, trace) if model is None else model.spring_stiffness
+    _check_units(record, trace, model)
+    resolved = experiment.model_copy(update={"trace": resolve(trace, record)})
+    return Understood(record, resolved, model, stiffness, path.name)
+
+
+def _stiffness(record: Record, trace: TraceDescription) -> float | None:
+    """The spring constant in the unit of the force over metre.
+
+    Raises
+    ------
+    ConfigError
+        If it is of the other kind, and no normal force is known.
+    """
+    stiffness, normal = trace.si("stiffness"), record.mean_normal_force
+    if stiffness is None or not trace.is_in("stiffness", "N/m" if record.is_friction else "1/m"):
+        return stiffness
+    if record.is_friction:
+        message = (
+            "is for forces, and the file has friction coefficients: give the normal force too, or "
+            "the stiffness over the normal force, such as '1.6e-3 1/um'"
+        )
+        raise ConfigError([Problem("", "--stiffness", message, trace.stiffness)])
+    if normal is None:
+        message = "is for friction coefficients, and the file has forces: expected '1002 N/m'"
+        raise ConfigError([Problem("", "--stiffness", message, trace.stiffness)])
+    return stiffness * normal
+
+
+def _check_units(record: Record, trace: TraceDescription, model: Config | None) -> None:
+    """Check that noise and model are of the kind of the force.
+
+    Raises
+    ------
+    ConfigError
+        If they are not.
+    """
+    if record.is_friction and trace.is_in("noise", "N"):
+        message = "the file has friction coefficients: expected a number such as 0.001"
+        raise ConfigError([Problem("", "--noise", message, trace.noise)])
+    if record.is_friction and model is not None:
+        message = "is for forces, and the file has friction coefficients: give --normal-force too"
+        raise ConfigError([Problem("", "--config", message)])
 
 
 def read_trace(
@@ -201,42 +258,49 @@ def trace_of(understood: Understood) -> xr.DataTree:
     record, trace = understood.record, understood.experiment.trace
     title = understood.experiment.title or f"Measured: {understood.name}"
     velocity, stiffness = trace.si("velocity"), understood.stiffness
-    noise, period = trace.si("noise"), trace.si("period")
+    period = trace.si("period")
     known: Config | PartialConfig = PartialConfig(title, velocity, stiffness)
     config = understood.config
     if config is not None:
         known = _as_measured(config, record, title)
         if period is None and config.slider.quiet_time > 0:
             period = 2 * config.slider.quiet_time
+    loading_rate = None
+    if velocity is not None and stiffness is not None and record.load_point is None:
+        loading_rate = abs(velocity) * stiffness
     drive, velocity = _drive(record, velocity, config, stiffness)
     displacement = _displacement(record, drive, stiffness)
-    time, force = evenly_sampled(record.time, record.force)
-    noise = noise_level(force) if noise is None else noise
-    estimated = period is None
+    noise = understood.noise
     direction = -1.0 if velocity is not None and velocity < 0 else 1.0
-    period = estimated_period(time, direction * force, noise) if period is None else period
-    found = find_slips(time, force, noise=noise, period=period, direction=direction)
+    found = find_slips(
+        record.time,
+        record.force,
+        noise=noise,
+        period=period,
+        direction=direction,
+        loading_rate=loading_rate,
+    )
+    level = noise.deviation if isinstance(noise, TraceNoise) else noise
     details = {
         "origin": "measured",
         "measured_file": understood.name,
-        "trace": trace.to_toml(),
+        "trace": understood.experiment.trace.to_toml(),
+        "understood": "\n".join(understood.report),
         "complete": "true",
-        "comment": "; ".join(_comments(direction * force, noise, period)),
-        "noise": noise,
-        "setup_period": period,
-        "setup_period_origin": "estimated" if estimated else "given",
+        "comment": "; ".join(_comments(direction * record.force, level, found.period)),
+        "noise": level,
+        "min_fall": found.min_fall,
+        "setup_period": found.period,
+        "setup_period_origin": "estimated" if period is None else "given",
     }
     attributes = program_attributes(known, "trace") | details
     return _tree(
-        record,
+        understood,
         drive,
         displacement,
-        found,
-        velocity,
-        stiffness,
-        period,
+        _slip_columns(found, velocity, stiffness),
+        found.period,
         attributes,
-        has_config=config is not None,
     )
 
 
@@ -288,7 +352,8 @@ def _drive(
         drive = None
     if record.load_point is not None:
         if velocity is None:
-            velocity = float(np.polyfit(time, record.load_point, 1)[0])
+            known = np.isfinite(record.load_point)
+            velocity = float(np.polyfit(time[known], record.load_point[known], 1)[0])
         drive = record.load_point
     return drive, velocity
 
@@ -316,26 +381,41 @@ def _displacement(record: Record, drive: Array | None, stiffness: float | None) 
     return drive - record.force / stiffness
 
 
+def _slip_columns(
+    found: FoundSlips, velocity: float | None, stiffness: float | None
+) -> dict[str, Array]:
+    """The catalogue of slips."""
+    speed = np.full(len(found), np.nan)
+    if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
+        speed = found.fall_rate / stiffness + abs(velocity)
+    return {
+        "realization_index": np.zeros(len(found), dtype=np.int64),
+        "start_time": found.start_time,
+        "end_time": found.end_time,
+        "force_before": found.force_before,
+        "force_after": found.force_after,
+        "force_drop": found.force_before - found.force_after,
+        "peak_velocity": speed,
+        "contacts_broken": np.full(len(found), np.nan),
+    }
+
+
 def _tree(
-    record: Record,
+    understood: Understood,
     drive: Array | None,
     displacement: Array | None,
-    found: FoundSlips,
-    velocity: float | None,
-    stiffness: float | None,
+    slips: dict[str, Array],
     period: float,
     attributes: dict[str, Any],
-    *,
-    has_config: bool,
 ) -> xr.DataTree:
     import xarray as xr
 
-    velocities = None if displacement is None else _velocity(record.time, displacement, period)
+    record = understood.record
     traces = {
         "drive_displacement": drive,
         "displacement": displacement,
-        "velocity": velocities,
-        "friction_coefficient" if record.is_friction else "spring_force": record.force,
+        "velocity": None if displacement is None else _velocity(record.time, displacement, period),
+        record.force_name: record.force,
         "normal_force": record.normal_force,
         "normal_stress": record.normal_stress,
     }
@@ -348,30 +428,25 @@ def _tree(
         "realization": variables.ROOT.variable("realization", ("realization",), [0]),
         "time": variables.ROOT.variable("time", ("time",), record.time),
     }
-    speed = np.full(len(found), np.nan)
-    if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
-        speed = found.fall_rate / stiffness + abs(velocity)
-    columns = {
-        "realization_index": np.zeros(len(found), dtype=np.int64),
-        "start_time": found.start_time,
-        "end_time": found.end_time,
-        "force_before": found.force_before,
-        "force_after": found.force_after,
-        "force_drop": found.force_before - found.force_after,
-        "peak_velocity": speed,
-        "contacts_broken": np.full(len(found), np.nan),
+    catalogue = {
+        name: variables.SLIPS.variable(name, ("slip",), values) for name, values in slips.items()
     }
-    slips = {
-        name: variables.SLIPS.variable(name, ("slip",), values) for name, values in columns.items()
-    }
-    groups = {"/": xr.Dataset(root, coordinates, attributes), "/slips": xr.Dataset(slips)}
     recorded = {
         name: xr.Variable(("row",), one.values, {"long_name": one.header, "units": one.unit})
         for name, one in _names(record).items()
     }
-    groups["/recorded"] = xr.Dataset(recorded)
-    if record.load_point is not None and not has_config:
-        groups["/stages"] = stage_table(drive_stages(record.time, record.load_point))
+    groups = {
+        "/": xr.Dataset(root, coordinates, attributes),
+        "/slips": xr.Dataset(catalogue),
+        "/recorded": xr.Dataset(recorded),
+    }
+    if isinstance(understood.noise, TraceNoise):
+        groups["/noise"] = xr.Dataset(
+            {name: xr.Variable((), value) for name, value in understood.noise.scalars().items()}
+        )
+    if record.load_point is not None and understood.config is None:
+        known = np.isfinite(record.load_point)
+        groups["/stages"] = stage_table(drive_stages(record.time[known], record.load_point[known]))
     return xr.DataTree.from_dict(groups)
 
 
@@ -391,6 +466,9 @@ def _velocity(time: Array, displacement: Array, period: float) -> Array:
     interval = float(np.median(np.diff(time)))
     samples = period / 32 / interval if math.isfinite(period) else 1
     half = max(1, min(round(samples), len(time) // 2))
+    known = np.isfinite(displacement)
+    if not known.all():
+        displacement = np.interp(time, time[known], displacement[known])
     index = np.arange(len(time))
     # At the ends there are fewer samples on one side.
     below, above = np.maximum(index - half, 0), np.minimum(index + half + 1, len(time))
@@ -398,4 +476,5 @@ def _velocity(time: Array, displacement: Array, period: float) -> Array:
     after = [(one[above] - one[index]) / (above - index) for one in sums]
     before = [(one[index + 1] - one[below]) / (index + 1 - below) for one in sums]
     rate: Array = (after[1] - before[1]) / (after[0] - before[0])
+    rate[~known] = np.nan
     return rate

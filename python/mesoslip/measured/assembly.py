@@ -1,0 +1,281 @@
+"""A measured record out of a file: columns to quantities, rows to samples in time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from mesoslip.errors import FileError, shown
+from mesoslip.measured.columns import Assignment, Used, assign, sentinels, values_of
+from mesoslip.measured.description import TraceDescription
+from mesoslip.measured.headers import QUANTITIES, name_of
+from mesoslip.measured.reading.file import read_file
+from mesoslip.measured.reading.table import Array, Table, listed
+from mesoslip.measured.record import Record, RecordedColumn
+from mesoslip.measured.sampling import in_order, sampling_report
+from mesoslip.quantities import number, with_unit
+
+MIN_SAMPLES = 4
+# Quantities that may be forces, in order of preference.
+FORCES = ("force", "shear_stress", "friction")
+WORDS = {
+    "load_point": "load point",
+    "displacement": "slider displacement",
+    "shear_stress": "shear stress",
+    "normal_force": "normal force",
+    "normal_stress": "normal stress",
+}
+
+
+def read_record(path: Path, trace: TraceDescription) -> Record:
+    """Read the file of a measurement.
+
+    Parameters
+    ----------
+    path
+        The file.
+    trace
+        What the file does not say.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or understood; the message names line and column.
+    ConfigError
+        If the description does not fit the file.
+    """
+    table = read_file(
+        path,
+        decimal=trace.decimal,
+        has_headers=trace.headers is not None or bool(trace.columns.model_fields_set),
+    )
+    columns = assign(table, trace.columns, trace.headers)
+    _check_needed(table, columns, trace)
+    values, notes = {}, []
+    for name, used in columns.used.items():
+        values[name] = values_of(table, name, used)
+        missing, note = sentinels(table, used)
+        values[name][missing] = np.nan
+        notes += [note] if note else []
+    try:
+        made = _force(values, trace)
+    except ValueError as error:
+        raise FileError(f"{path}: {error}") from None
+    force = made.values
+    rate = trace.si("rate")
+    time = values["time"] if rate is None else np.arange(len(table.lines)) / rate
+    _check_span(time, trace)
+    inside = _inside(time, trace)
+    whole = np.isfinite(time) & np.isfinite(force)
+    left_out = inside & ~whole
+    if left_out.any():
+        lines = table.lines[left_out].tolist()
+        notes.append(f"{len(lines)} {table.row}s without time or force, left out: {listed(lines)}")
+    rows = np.flatnonzero(whole & inside)
+    if len(rows) < MIN_SAMPLES:
+        raise FileError(
+            f"{path}: has {len(rows)} samples"
+            f"{' between start and end' if not inside.all() else ''}; a trace needs at least "
+            f"{MIN_SAMPLES}"
+        )
+    others = [one[rows] for name, one in values.items() if name != "time"]
+    order = in_order(path, time[rows], np.array(others), table.lines[rows], trace.part, table.row)
+    if len(order.rows) < MIN_SAMPLES:
+        raise FileError(f"{path}: has {len(order.rows)} samples whose times increase")
+    picked = rows[order.rows]
+    notes += order.notes
+    for name in ("load_point", "displacement", "normal_force", "normal_stress"):
+        if name in values and (count := int(np.isnan(values[name][picked]).sum())):
+            notes.append(f"{WORDS[name]}: missing in {count} samples")
+    if inside.sum() < len(inside):
+        notes.append(f"{int((~inside).sum())} {table.row}s before start or after end, left out")
+    return Record(
+        order.time,
+        force[picked],
+        made.is_friction,
+        made.normal,
+        **{
+            name: values[name][picked]
+            for name in ("load_point", "displacement", "normal_force", "normal_stress")
+            if name in values
+        },
+        columns=[
+            _recorded(table, columns, index)
+            for index in range(len(table.headers))
+            if np.isfinite(table.values[index]).any()
+        ],
+        report=[
+            *_column_report(table, columns, values),
+            made.line,
+            *sampling_report(order.time),
+            *notes,
+            *(f"guess: {one}" for one in columns.guesses),
+        ],
+    )
+
+
+def _recorded(table: Table, columns: Assignment, index: int) -> RecordedColumn:
+    """A column as it is in the file."""
+    header, number_ = table.headers[index], str(index + 1)
+    use = next((name for name, one in columns.used.items() if one.index == index), "")
+    unit = columns.used[use].unit if use else table.units[index]
+    is_unique = (
+        bool(header.strip()) and [name_of(one) for one in table.headers].count(name_of(header)) == 1
+    )
+    return RecordedColumn(
+        header or f"column {number_}",
+        unit,
+        table.values[index],
+        use,
+        header if is_unique else number_,
+    )
+
+
+def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) -> None:
+    """Check that there is a force, or what makes one, and the time."""
+    used, names = columns.used, _described(table, columns)
+    rate = trace.si("rate")
+    if not set(FORCES) & used.keys():
+        raise FileError(
+            f"{table.path}: has no column of the force, such as 'force [uN]', 'shear stress "
+            f"(MPa)' or 'friction'; its columns are {names}; say what they are with --columns, "
+            "or in [trace.columns] of an EXPERIMENT.toml"
+        )
+    if "time" not in used and rate is None:
+        raise FileError(
+            f"{table.path}: has no column of the time, such as 'time [s]'; its columns are "
+            f"{names}; say what they are with --columns, or give a sampling rate with --rate"
+        )
+    if "time" in used and rate is not None:
+        raise FileError(
+            f"{table.path}: has a column of the time, and a sampling rate is given; give no rate, "
+            "or '-' instead of the time in --columns"
+        )
+
+
+def _described(table: Table, columns: Assignment) -> str:
+    """The columns of a file, and why they are not used."""
+    texts = []
+    for index, header in enumerate(table.headers):
+        why = columns.unused.get(index, "")
+        texts.append(f"{shown(header)}{f' ({why})' if why and why != 'as asked' else ''}")
+    return ", ".join(texts)
+
+
+class Force(NamedTuple):
+    """A force [N] or friction coefficient, a line about it, and the mean normal force [N]."""
+
+    values: Array
+    is_friction: bool
+    line: str
+    normal: float | None
+
+
+def _force(values: dict[str, Array], trace: TraceDescription) -> Force:
+    """The force or friction coefficient.
+
+    Raises
+    ------
+    ValueError
+        If a shear stress becomes neither.
+    """
+    area, given_force, given_stress = (
+        trace.si(name) for name in ("area", "normal_force", "normal_stress")
+    )
+    stress: Array | float | None = values.get("normal_stress", given_stress)
+    normal: Array | float | None = values.get("normal_force", given_force)
+    from_what = "normal force"
+    if normal is None and stress is not None and area is not None:
+        normal, from_what = stress * area, "normal stress x area"
+    mean = None if normal is None else float(np.nanmean(normal))
+    if "force" in values:
+        return Force(values["force"], False, "force: as recorded", mean)
+    if "shear_stress" in values:
+        shear = values["shear_stress"]
+        if area is not None:
+            line = f"force: shear stress x area ({number(area, 6)} m^2)"
+            return Force(shear * area, False, line, mean)
+        if stress is None and normal is not None:
+            raise ValueError("a shear stress and a normal force need an area: give --area")
+        if stress is not None:
+            line = "friction coefficient: shear stress / normal stress"
+            return Force(shear / stress, True, line, None)
+        if "friction" not in values:
+            raise ValueError(
+                "the force is a shear stress: give --area to make it a force, or --normal-stress "
+                "to make it a friction coefficient"
+            )
+    friction = values["friction"]
+    if normal is None or mean is None:
+        line = "friction coefficient: as recorded (no normal force is known)"
+        return Force(friction, True, line, None)
+    line = f"force: friction coefficient x {from_what} ({with_unit(mean, 'N')})"
+    return Force(friction * normal, False, line, mean)
+
+
+def _check_span(time: Array, trace: TraceDescription) -> None:
+    known = time[np.isfinite(time)]
+    if known.size == 0:
+        return
+    for name, is_wrong in (("start", known.max()), ("end", known.min())):
+        value = trace.si(name)
+        if value is not None and (value > is_wrong if name == "start" else value < is_wrong):
+            raise FileError(
+                f"--{name} {value:g} s is outside of the record, which is from {known.min():g} s "
+                f"to {known.max():g} s"
+            )
+
+
+def _inside(time: Array, trace: TraceDescription) -> np.ndarray[tuple[int], np.dtype[np.bool]]:
+    """Rows between start and end; those without time are where their neighbours are."""
+    start, end = trace.si("start"), trace.si("end")
+    inside = np.ones(len(time), dtype=bool)
+    if start is not None:
+        inside &= ~(time < start)
+    if end is not None:
+        inside &= ~(time > end)
+    return inside
+
+
+def _column_report(table: Table, columns: Assignment, values: dict[str, Array]) -> list[str]:
+    """Lines about the file and its columns."""
+    lines = list(table.notes)
+    used = dict(columns.used)
+    force = next((name for name in FORCES if name in used), None)
+    for name, one in used.items():
+        header = shown(table.headers[one.index]) if table.headers[one.index] else ""
+        place = f"column {one.index + 1}{f' {header}' if header else ''}"
+        lines.append(
+            f"{WORDS.get(name, name)}: {place}{_scale(name, one)}, {_range(values[name], name)}"
+        )
+    for name in FORCES:
+        if name in used and name != force and not (force == "shear_stress" and name == "friction"):
+            lines.append(f"not used: {WORDS.get(name, name)}, as there is a {force}")
+    for index, why in sorted(columns.unused.items()):
+        header = shown(table.headers[index]) if table.headers[index] else "without a name"
+        lines.append(f"not used: column {index + 1} {header}{f' ({why})' if why else ''}")
+    return lines
+
+
+def _scale(name: str, used: Used) -> str:
+    unit = QUANTITIES[name]
+    if unit == "1":
+        text = "" if used.size == 1 else f", each {number(used.size, 6)}"
+    else:
+        text = f", in {used.unit}" if used.unit else ""
+        if used.unit != unit:
+            text += f" ({used.size:.7g} {unit})"
+    return text + (f" after subtracting {used.offset:g}" if used.offset else "")
+
+
+def _range(values: Array, name: str) -> str:
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return "no number"
+    unit = QUANTITIES[name]
+    low, high = float(known.min()), float(known.max())
+    if name == "time":
+        return f"{low:.10g} to {high:.10g} s"
+    return f"{with_unit(low, unit, 5)} to {with_unit(high, unit, 5)}"

@@ -1,0 +1,446 @@
+"""Columns of a file by what they hold: from their headers, or as described."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.configuration.columns import IGNORED
+from mesoslip.configuration.units import NUMBER, number_of, to_si
+from mesoslip.errors import ConfigError, FileError, Problem, shown
+from mesoslip.measured.description import Column, Columns
+from mesoslip.measured.headers import (
+    EITHER,
+    QUANTITIES,
+    Heading,
+    name_of,
+    read_header,
+)
+from mesoslip.measured.reading.table import Array, Table, listed
+from mesoslip.measured.units import plain, size_of, unit_named
+
+# Examples of headers.
+EXAMPLES = {
+    "time": "time [s]",
+    "force": "force [uN]",
+    "shear_stress": "shear_stress [MPa]",
+    "friction": "friction [1]",
+    "normal_force": "normal_force [N]",
+    "normal_stress": "normal_stress [MPa]",
+    "load_point": "load_point [um]",
+    "displacement": "displacement [nm]",
+}
+# Headers in options and tables may be these names too.
+OTHER_NAMES = {
+    "spring_force": "force",
+    "drive": "load_point",
+    "drive_displacement": "load_point",
+    "friction_coefficient": "friction",
+    "mu": "friction",
+}
+# Numbers that stand for missing ones where they lie far from all others; from the last on always.
+SENTINELS = (-9999.0, -99999.0, -999.0, -999.25, -9999.25, 9999.0, 99999.0, 999999.0, -99.99)
+MIN_ALWAYS = 1e30
+# Maximum correlation of steps of force and displacement of a load point.
+MAX_LOAD_POINT = -0.3
+
+
+@dataclass
+class Used:
+    """A column that is used.
+
+    Attributes
+    ----------
+    index
+        Its number, from 0.
+    unit
+        Its unit as written; empty if it has none.
+    size, offset
+        A number of the file minus the offset, times the size, is the quantity in SI.
+    guess
+        What could be wrong.
+    """
+
+    index: int
+    unit: str
+    size: float
+    offset: float = 0.0
+    guess: str = ""
+
+
+@dataclass
+class Assignment:
+    """Which columns are used, and notes about the others."""
+
+    used: dict[str, Used] = field(default_factory=dict)
+    unused: dict[int, str] = field(default_factory=dict)
+    guesses: list[str] = field(default_factory=list)
+
+
+def assign(table: Table, columns: Columns, headers: str | None) -> Assignment:
+    """Find out what each column of a file holds.
+
+    Parameters
+    ----------
+    table
+        The file.
+    columns
+        Columns as described.
+    headers
+        Headers instead of those of the file.
+
+    Raises
+    ------
+    FileError
+        If a column that is needed has no unit or a wrong one, or two hold the same.
+    ConfigError
+        If a described column is not in the file, or its factor is not of the right dimension.
+    """
+    given = None if headers is None else _given(table, headers)
+    found = Assignment()
+    problems = []
+    for name in columns.model_fields_set:
+        column = getattr(columns, name)
+        if column is None:
+            continue
+        try:
+            found.used[name] = _described(table, name, column)
+        except ValueError as error:
+            problems.append(Problem(str(table.path), f"trace.columns.{name}", str(error)))
+    if problems:
+        raise ConfigError(problems)
+    taken = {one.index for one in found.used.values()}
+    headings = {
+        index: (_explicit(table, header) if given is not None else read_header(header, unit))
+        for index, (header, unit) in enumerate(
+            zip(given if given is not None else table.headers, table.units, strict=True)
+        )
+        if index not in taken and header != IGNORED
+    }
+    _from_headings(table, headings, found)
+    for index in range(len(table.headers)):
+        if index not in {one.index for one in found.used.values()}:
+            found.unused.setdefault(index, "" if given is None else "as asked")
+    return found
+
+
+def _given(table: Table, headers: str) -> list[str]:
+    """Headers of an option, one for each column."""
+    cells = [one.strip() for one in re.split(r",(?![^\[({]*[\])}])", headers)]
+    if len(cells) != len(table.headers):
+        raise FileError(
+            f"{table.path}: --columns names {len(cells)} columns, the file has "
+            f"{len(table.headers)}; '{IGNORED}' stands for a column to ignore"
+        )
+    return cells
+
+
+def _explicit(table: Table, header: str) -> Heading:
+    """What a header of an option says, in which a displacement is the slider's."""
+    heading = read_header(header)
+    name = re.sub(r"\s*[\[({].*", "", header).strip().lower().replace(" ", "_")
+    quantity = name if name in QUANTITIES else OTHER_NAMES.get(name, heading.quantity)
+    if quantity in {None, EITHER}:
+        known = ", ".join(QUANTITIES)
+        raise FileError(
+            f"{table.path}: --columns: {header!r} is none of {known}; '{IGNORED}' stands for a "
+            "column to ignore"
+        )
+    return heading._replace(quantity=quantity)
+
+
+def _described(table: Table, name: str, column: Column) -> Used:
+    """A column as a table describes it.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or its units do not agree.
+    """
+    index = _index_of(table, column.column)
+    heading = read_header(table.headers[index], table.units[index])
+    unit = plain(column.unit if column.unit is not None else heading.unit or "")
+    si = QUANTITIES[name]
+    if column.factor is None:
+        size, guess = _size(unit, name, table.headers[index])
+        return Used(index, unit, size, _offset(column.offset, unit), guess)
+    factor, unit = _factor(column.factor, unit, si)
+    return Used(index, unit, factor, _offset(column.offset, unit))
+
+
+def _index_of(table: Table, column: str) -> int:
+    """Index of a column by its header, its name without the unit, or its number from 1."""
+    for named in (
+        lambda text: text.strip().casefold(),
+        lambda text: re.sub(r"\s*[\[({<].*", "", text).strip().casefold(),
+        name_of,
+    ):
+        target = named(column)
+        matches = [n for n, one in enumerate(table.headers) if target and named(one) == target]
+        if len(matches) == 1:
+            return matches[0]
+        if len(matches) > 1:
+            raise ValueError(
+                f"columns {listed([one + 1 for one in matches])} have the name {shown(column)}; "
+                "give the number of one"
+            )
+    if column.isascii() and column.isdigit() and 1 <= int(column) <= len(table.headers):
+        return int(column) - 1
+    raise ValueError(f"no column {shown(column)}; the file has {_names(table.headers)}")
+
+
+def _names(headers: Sequence[str]) -> str:
+    if not any(headers):
+        return f"{len(headers)} columns without names: give their numbers from 1"
+    return ", ".join(shown(one) for one in headers)
+
+
+def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
+    """Size of a unit, and what could be wrong.
+
+    Raises
+    ------
+    ValueError
+        If it is missing or of another dimension.
+    """
+    si, right = QUANTITIES[quantity], f"write it as {EXAMPLES[quantity]!r}"
+    if not unit and si == "1":
+        return 1.0, ""
+    if not unit:
+        raise ValueError(f"column {shown(header)} has no unit; {right}")
+    try:
+        found = size_of(unit, si)
+    except ValueError:
+        found = None
+    if found is None:
+        hint = ""
+        if size_of_voltage(unit):
+            hint = f", or give its factor, such as {_factor_example(si)!r} in [trace.columns]"
+        raise ValueError(
+            f"column {shown(header)} has the unit {shown(unit)}, which is not a unit of "
+            f"{quantity.replace('_', ' ')}; {right}{hint}"
+        )
+    return found.size, f"{shown(header)}: {found.note}" if found.note else ""
+
+
+def size_of_voltage(unit: str) -> float | None:
+    """Size of a unit of voltage [V]; None if it is not one."""
+    try:
+        found = size_of(unit, "V")
+    except ValueError:
+        return None
+    return None if found is None else found.size
+
+
+def _factor_example(si: str) -> str:
+    return {"N": "12.4 mN/V", "m": "0.5 mm/V", "Pa": "2 MPa/V", "s": "1 s/V"}.get(si, "0.1 1/V")
+
+
+def _factor(text: str, unit: str, si: str) -> tuple[float, str]:
+    """A factor in SI for one unit of a column, and that unit.
+
+    Raises
+    ------
+    ValueError
+        If it is not of the right dimension.
+    """
+    text = plain(text)
+    try:
+        # A quantity for each number of the column, whatever its unit.
+        return to_si(float(text) if _is_number(text) and si == "1" else text, si, ""), unit
+    except ValueError:
+        pass
+    above, slash, below = text.rpartition("/")
+    wanted = (
+        f"factor = {shown(text)}: expected a quantity for one unit of the column, such as "
+        f"{_factor_example(si)!r} or '2 {si}'"
+    )
+    name = unit_named(below) if slash else None
+    if name in {None, "1"}:
+        raise ValueError(wanted)
+    quantity = above.strip()
+    # "0.1 1/V" is a coefficient for a volt.
+    match = NUMBER.match(quantity)
+    if si == "1" and match and quantity[match.end() :].strip() in {"", "1"}:
+        size = float(match[0])
+    else:
+        try:
+            size = to_si(quantity, si, "")
+        except ValueError:
+            raise ValueError(wanted) from None
+    if not unit or unit_named(unit) == name:
+        return size, unit or str(name)
+    volts, of_column = size_of_voltage(str(name)), size_of_voltage(unit)
+    if volts is None or of_column is None:
+        raise ValueError(f"{wanted}; the column is in {shown(unit)}, not in {shown(below)}")
+    return size * of_column / volts, unit
+
+
+def _is_number(text: str) -> bool:
+    try:
+        number_of(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _offset(text: str | None, unit: str) -> float:
+    """The number to subtract, in the unit of a column.
+
+    Raises
+    ------
+    ValueError
+        If it is not in that unit.
+    """
+    if text is None:
+        return 0.0
+    text = plain(text)
+    match = NUMBER.match(text)
+    wanted = f"offset = {shown(text)}: expected a number in the unit of the column"
+    named = f", such as '0.3 {unit}'" if unit else ", such as '0.3'"
+    if match is None:
+        raise ValueError(wanted + named)
+    number, given = float(match[0]), text[match.end() :].strip()
+    if not given or unit_named(given) == unit_named(unit):
+        return number
+    volts, of_column = size_of_voltage(given), size_of_voltage(unit)
+    if volts is not None and of_column is not None:
+        return number * volts / of_column
+    if not unit:
+        return number
+    raise ValueError(wanted + named)
+
+
+def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignment) -> None:
+    """Assign columns by their headers."""
+    by_quantity: dict[str, list[int]] = {}
+    for index, heading in headings.items():
+        if heading.quantity is not None:
+            by_quantity.setdefault(heading.quantity, []).append(index)
+    either = by_quantity.pop(EITHER, [])
+    forces = {"force", "shear_stress", "friction"}
+    has_force = bool(forces & found.used.keys())
+    for quantity, indices in by_quantity.items():
+        if quantity in found.used or (
+            has_force and quantity in {"force", "shear_stress", "friction"}
+        ):
+            continue
+        if len(indices) > 1:
+            _two(table, quantity, indices, found)
+            continue
+        _use(table, quantity, indices[0], headings[indices[0]], found)
+    for index in either:
+        found.unused[index] = "a displacement of the load point or of the slider?"
+    if len(either) == 1 and not ({"load_point", "displacement"} <= found.used.keys()):
+        _use_either(table, either[0], headings[either[0]], found)
+
+
+def _two(table: Table, quantity: str, indices: Sequence[int], found: Assignment) -> None:
+    """Two columns of one quantity: an error, if it is needed."""
+    headers = " and ".join(shown(table.headers[one]) for one in indices)
+    if quantity in {"time", "force", "shear_stress", "friction"}:
+        raise FileError(
+            f"{table.path}: has two columns of {quantity.replace('_', ' ')}: {headers}; name one "
+            f"in [trace.columns], or ignore one in --columns with '{IGNORED}'"
+        )
+    for index in indices:
+        found.unused[index] = f"two columns of {quantity.replace('_', ' ')}"
+
+
+def _use(table: Table, quantity: str, index: int, heading: Heading, found: Assignment) -> None:
+    """Use a column for a quantity, if its unit is known."""
+    header, unit = table.headers[index], heading.unit or ""
+    if quantity == "time" and not unit:
+        found.used[quantity] = Used(index, "s", 1.0)
+        found.guesses.append(f"{shown(header)} has no unit: taken as seconds")
+        return
+    try:
+        size, guess = _size(unit, quantity, header)
+    except ValueError as error:
+        found.unused[index] = str(error)
+        return
+    found.used[quantity] = Used(index, unit, size)
+    found.guesses += [one for one in (guess, heading.guess) if one]
+
+
+def _use_either(table: Table, index: int, heading: Heading, found: Assignment) -> None:
+    """Use a displacement as that of the load point or of the slider, by how it moves."""
+    if "load_point" in found.used:
+        quantity, why = "displacement", "as the load point has a column of its own"
+    elif "displacement" in found.used:
+        quantity, why = "load_point", "as the slider has a column of its own"
+    elif _moves_in_slips(table, index, found):
+        quantity, why = "displacement", "as it moves ahead where the force falls"
+    else:
+        quantity, why = "load_point", "as it does not move ahead where the force falls"
+    _use(table, quantity, index, heading, found)
+    if quantity in found.used:
+        found.unused.pop(index, None)
+        what = {"displacement": "the slider", "load_point": "the load point (drive)"}[quantity]
+        found.guesses.append(
+            f"{shown(table.headers[index])} taken as the displacement of {what}, {why}"
+        )
+
+
+def _moves_in_slips(table: Table, index: int, found: Assignment) -> bool:
+    """Whether a displacement moves ahead where the force falls, as that of a slider does."""
+    force = next(
+        (found.used[one] for one in ("force", "shear_stress", "friction") if one in found.used),
+        None,
+    )
+    if force is None:
+        return False
+    x, f = table.values[index], force.size * table.values[force.index]
+    known = np.isfinite(x) & np.isfinite(f)
+    steps, falls = np.diff(x[known]), np.diff(f[known])
+    if len(steps) < 3 or np.std(steps) == 0 or np.std(falls) == 0:
+        return False
+    direction = 1.0 if x[known][-1] >= x[known][0] else -1.0
+    return bool(direction * np.corrcoef(steps, falls)[0, 1] < MAX_LOAD_POINT)
+
+
+def values_of(table: Table, name: str, used: Used) -> Array:
+    """Values of a column in SI; NaN where there are none.
+
+    Raises
+    ------
+    FileError
+        If a cell is not a number.
+    """
+    bad = table.bad.get(used.index)
+    if bad:
+        first, *others = bad
+        header = table.headers[used.index]
+        column = f"column {shown(header)}" if header else f"column {used.index + 1}"
+        more = f" (and {len(others)} more of the column)" if others else ""
+        raise FileError(
+            f"{table.path}: line {first.line}: {column}: the {name.replace('_', ' ')}, "
+            f"{shown(first.text)}, is not a number{first.hint}{more}"
+        )
+    values: Array = (table.values[used.index] - used.offset) * used.size
+    return values
+
+
+def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
+    """Numbers that stand for missing ones in a column, and a note about them."""
+    values = table.values[used.index]
+    finite = np.isfinite(values)
+    found = finite & (np.abs(values) >= MIN_ALWAYS)
+    rest = values[finite & ~np.isin(values, SENTINELS) & ~found]
+    if rest.size:
+        low, high = float(rest.min()), float(rest.max())
+        span = max(high - low, abs(high), abs(low))
+        far = (values < low - span) | (values > high + span)
+        found |= np.isin(values, SENTINELS) & far
+    if not found.any():
+        return found, ""
+    shown_values = ", ".join(f"{one:g}" for one in np.unique(values[found])[:3])
+    lines = listed(table.lines[found].tolist())
+    return found, (
+        f"column {shown(table.headers[used.index])}: {shown_values} taken as missing in "
+        f"{int(found.sum())} {table.row}s: {lines}"
+    )

@@ -1,0 +1,148 @@
+"""Headers of columns: which quantity, in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from mesoslip.measured.units import is_unit, plain, size_of, unit_named
+
+# SI units of the quantities that are used.
+QUANTITIES = {
+    "time": "s",
+    "force": "N",
+    "shear_stress": "Pa",
+    "friction": "1",
+    "normal_force": "N",
+    "normal_stress": "Pa",
+    "load_point": "m",
+    "displacement": "m",
+}
+# A displacement of the load point or of the slider: the header does not say of which.
+EITHER = "either"
+
+# Names of the field, in lower case, without punctuation.
+NAMES = {
+    "time": "time|t|elapsed time|time elapsed|test time|run time|relative time|time stamp"
+    "|timestamp|zeit|temps|tiempo|tempo|time axis",
+    "force": "force|spring force|shear force|shear load|friction force|frictional force"
+    "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
+    "|driving force|kraft|reibkraft|ft|f t|fx|f x|f|fs|force x|force t|force tangential"
+    "|horizontal load|force de frottement|force tangentielle",
+    "shear_stress": "shear stress|shearstress|tau|τ|shear strs|stress shear",
+    "friction": "friction|friction coefficient|coefficient of friction|friction coeff"
+    "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
+    "|f over fn|f w|ft fn|f t f n|apparent friction|tau sigma|tau over sigma|tau sigma n|tau sn"
+    "|friction factor|reibwert|reibungskoeffizient|mu app|shear stress normal stress|ff fn",
+    "normal_force": "normal force|normal load|normalforce|normalload|fn|vertical force"
+    "|vertical load|normalkraft|force normal|force n|fz|f z|nload",
+    "normal_stress": "normal stress|normalstress|sigma n|sigman|sigma|σ|σn|sn"
+    "|effective normal stress|eff normal stress|norm stress|stress normal|sigma eff",
+    "load_point": "load point|loadpoint|load point displacement|load point disp|load point displ"
+    "|load point position|lp|lp disp|lp displacement|lp displ|lpdisp|loading point|drive"
+    "|drive displacement|drive position|stage|stage position|stage displacement|actuator"
+    "|actuator displacement|actuator position|motor position|motor displacement"
+    "|ram displacement|piston displacement|crosshead|crosshead displacement|carriage position"
+    "|translation stage|puller position|driver position|drive disp|shear actuator displacement",
+    "displacement": "slider displacement|slider position|block displacement|block position"
+    "|sample displacement|slider|fault slip|slip displacement|slip|slider disp",
+    EITHER: "displacement|displ|disp|position|pos|x|distance|travel|horizontal displacement"
+    "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position",
+}  # fmt: skip
+MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
+
+BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
+
+
+class Heading(NamedTuple):
+    """What a header says.
+
+    Attributes
+    ----------
+    quantity
+        One of `QUANTITIES` or `EITHER`; None if the name is not known.
+    unit
+        The unit as it is written; None without one.
+    guess
+        What could be wrong about that; otherwise empty.
+    """
+
+    quantity: str | None
+    unit: str | None
+    guess: str = ""
+
+
+def name_of(text: str) -> str:
+    """A name in lower case, without punctuation."""
+    # A Greek letter alone is the friction coefficient, beside others a prefix.
+    text = re.sub(r"[µμ](?![A-Za-z])", "mu", text.replace("Âµ", "µ").replace("Î¼", "μ"))
+    return re.sub(r"[^a-z0-9τσ]+", " ", text.lower()).strip()
+
+
+def meaning_of(name: str) -> str | None:
+    """The quantity of a name; None if it is not known."""
+    bare = name_of(name)
+    return MEANINGS.get(bare) or MEANINGS.get(re.sub(r" ?\d$", "", bare) if bare[:-1] else "")
+
+
+def read_header(header: str, unit: str = "") -> Heading:
+    """What a header says, with the unit of a line of units below it.
+
+    >>> read_header("Normal_stress(MPa)"), read_header("lp_disp_um")
+    (Heading(quantity='normal_stress', unit='MPa', guess=''), \
+Heading(quantity='load_point', unit='um', guess=''))
+    """
+    text = header.strip(" \"'")
+    unit = unit.strip("[](){}<> ")
+    if unit:
+        return Heading(meaning_of(_without_brackets(text)) or meaning_of(text), unit)
+    whole = meaning_of(text)
+    if whole == "friction":
+        guess = ""
+        if name_of(text) == "f n" or re.fullmatch(r"(?i)f\s*/\s*n", text):
+            guess = f"{text!r} taken as a coefficient, force over normal force, not as newton"
+        return Heading(whole, None, guess)
+    if re.fullmatch(r"(?i)f\s*/\s*n", text):
+        return Heading(
+            "friction", None, f"{text!r} taken as force over normal force, not as newtons"
+        )
+    for name, named in _divided(text):
+        quantity = meaning_of(name)
+        if quantity is not None and (named == "" or _fits(named, quantity)):
+            return Heading(quantity, named or None)
+    for name, named in _divided(text):
+        if named and is_unit(named):
+            return Heading(meaning_of(name), named)
+    return Heading(whole, None)
+
+
+def _without_brackets(text: str) -> str:
+    return BRACKETS.sub(" ", text)
+
+
+def _fits(unit: str, quantity: str) -> bool:
+    """Whether a unit is one of a quantity, or of a voltage that a factor is for."""
+    si = QUANTITIES.get(quantity, "m")
+    try:
+        return size_of(unit, si) is not None
+    except ValueError:
+        return False
+
+
+def _divided(text: str) -> Iterator[tuple[str, str]]:
+    """Ways to divide a header into a name and a unit, the most explicit first."""
+    for match in BRACKETS.finditer(text):
+        inside = next(one for one in match.groups() if one is not None)
+        outside = text[: match.start()] + " " + text[match.end() :]
+        if unit_named(inside) is not None or not meaning_of(text):
+            yield _without_brackets(outside), plain(inside)
+    for pattern in (
+        r"(?P<name>.+?)\s*/\s*(?P<unit>[^/]+(?:/[^/]+)?)",
+        r"(?P<name>.+?)\s*,\s*(?P<unit>.+)",
+        r"(?P<name>.+?)\s+in\s+(?P<unit>.+)",
+        r"(?P<name>.+)[_\s.]+(?P<unit>[^_\s.]+)",
+    ):
+        found = re.fullmatch(pattern, text)
+        if found:
+            yield found["name"], plain(found["unit"])

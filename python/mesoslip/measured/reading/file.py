@@ -1,0 +1,37 @@
+"""Files of any kind as tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mesoslip.errors import FileError
+from mesoslip.measured.reading.binary import READERS
+from mesoslip.measured.reading.source import bytes_of, text_of
+from mesoslip.measured.reading.table import Table
+from mesoslip.measured.reading.text import read_text
+
+
+def read_file(path: Path, *, decimal: str | None = None, has_headers: bool = False) -> Table:
+    """Read a file of a measurement.
+
+    Parameters
+    ----------
+    path
+        Text, MATLAB, HDF5, netCDF or .npz; text may be compressed.
+    decimal
+        Decimal sign of a text; by default found from its numbers.
+    has_headers
+        Whether columns are described otherwise than by headers of the file.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or has no table.
+    """
+    data = bytes_of(path)
+    for start, read in READERS:
+        if data.startswith(start):
+            return read(path, data)
+    if path.suffix == ".toml":
+        raise FileError(f"{path}: is a configuration, not a measurement")
+    return read_text(path, text_of(path, data), decimal=decimal, has_headers=has_headers)

@@ -1,0 +1,133 @@
+"""Bytes and text of a file: compression and encodings."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import lzma
+import zipfile
+import zlib
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Any
+
+from mesoslip.configuration.reading import is_directory, is_file
+from mesoslip.errors import FileError, shown
+
+# Maximum size of a file, and of what a compressed one becomes [bytes].
+MAX_BYTES = 2**31
+# Bytes that are looked at to tell encodings apart.
+HEAD = 4096
+
+# Compressions: their first bytes, and what opens them.
+COMPRESSIONS: dict[str, tuple[bytes, Callable[[IO[bytes]], Any]]] = {
+    "gzip": (b"\x1f\x8b", lambda file: gzip.GzipFile(fileobj=file)),
+    "bzip2": (b"BZh", bz2.BZ2File),
+    "xz": (b"\xfd7zXZ\x00", lzma.LZMAFile),
+}
+
+
+def bytes_of(path: Path) -> bytes:
+    """The bytes of a file, decompressed.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is too large.
+    """
+    try:
+        if is_directory(path):
+            raise FileError(f"{path}: is a directory, not a file of a measurement")
+        if not path.exists():
+            raise FileError(f"{path}: no such file")
+        if not is_file(path):
+            raise FileError(f"{path}: is not a regular file")
+        if path.stat().st_size > MAX_BYTES:
+            raise FileError(f"{path}: is too large; the maximum is {MAX_BYTES / 2**30:.0f} GiB")
+        data = path.read_bytes()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
+    return _decompressed(path, data)
+
+
+def _decompressed(path: Path, data: bytes) -> bytes:
+    is_zip = data.startswith(b"PK\x03\x04")
+    name = "zip" if is_zip else _compression(data)
+    try:
+        if is_zip:
+            with zipfile.ZipFile(BytesIO(data)) as archive:
+                files = [one for one in archive.infolist() if not one.is_dir()]
+                if any(one.filename.endswith(".npy") for one in files):
+                    return data
+                if len(files) != 1:
+                    raise FileError(
+                        f"{path}: the archive has {len(files)} files; unpack the one to read"
+                    )
+                with archive.open(files[0]) as member:
+                    return _limited(path, member)
+        if name:
+            with COMPRESSIONS[name][1](BytesIO(data)) as member:
+                return _limited(path, member)
+    except EOFError:
+        raise FileError(f"{path}: the compressed file ({name}) is cut short") from None
+    except (
+        OSError,
+        zlib.error,
+        lzma.LZMAError,
+        zipfile.BadZipFile,
+        NotImplementedError,
+        RuntimeError,
+        ValueError,
+    ) as error:
+        raise FileError(f"{path}: the compressed file ({name}) is damaged: {error}") from None
+    return data
+
+
+def _compression(data: bytes) -> str:
+    """The compression of a file; empty if it has none."""
+    return next((name for name, (start, _) in COMPRESSIONS.items() if data.startswith(start)), "")
+
+
+def _limited(path: Path, file: IO[bytes]) -> bytes:
+    data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise FileError(f"{path}: is too large unpacked; the maximum is {MAX_BYTES >> 30} GiB")
+    return data
+
+
+def text_of(path: Path, data: bytes) -> str:
+    """The text of a file: UTF-8, UTF-16 or an encoding of Western Europe; line breaks are `\\n`.
+
+    Raises
+    ------
+    FileError
+        If it is not text.
+    """
+    text = _decoded(data)
+    if text is None or "\0" in text:
+        raise FileError(
+            f"{path}: is neither text nor MATLAB, HDF5, netCDF or .npz: it begins with "
+            f"{shown(data[:12])}"
+        )
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _decoded(data: bytes) -> str | None:
+    head = data[:HEAD]
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encodings = ["utf-16"]
+    elif b"\0" in head:
+        # UTF-16 without a mark has a null beside each Latin character.
+        little = head[1::2].count(0) > head[0::2].count(0)
+        encodings = ["utf-16-le" if little else "utf-16-be"]
+    else:
+        encodings = ["utf-8", "cp1252", "latin-1"]
+    for encoding in encodings:
+        try:
+            return data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    return None

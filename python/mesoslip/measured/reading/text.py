@@ -1,0 +1,316 @@
+"""Tables of text. Regular rows are read by pandas, all others cell by cell; no number is guessed.
+
+A row is regular if it has the usual number of cells and no characters but those of numbers.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import FileError, shown
+from mesoslip.measured.reading.cells import (
+    COMMENT,
+    hint_for,
+    is_missing,
+    is_number,
+    split,
+)
+from mesoslip.measured.reading.layout import (
+    Layout,
+    check_decimal_comma,
+    find_layout,
+    header_cells,
+)
+from mesoslip.measured.reading.table import Array, BadCell, Table, listed
+
+# Maximum share of rows with fewer cells than others.
+MAX_SHORT = 0.05
+# Rows before the last one with which its digits are compared.
+COMPARED = 20
+# Maximum share of rows with fewer decimal points than others that are worth a note.
+MAX_ODD = 1e-3
+POINT = "; numbers have a decimal point, and a comma would begin another cell"
+
+Numbers = NDArray[np.int_]
+
+
+def read_text(
+    path: Path, text: str, *, decimal: str | None = None, has_headers: bool = False
+) -> Table:
+    """Read a text.
+
+    Parameters
+    ----------
+    path
+        The file, for messages.
+    text
+        Its text.
+    decimal
+        Decimal sign; by default found from the numbers.
+    has_headers
+        Whether there are other headers than those of the file.
+
+    Raises
+    ------
+    FileError
+        If it has no table, or a row has more cells than others.
+    """
+    lines = text.split("\n")
+    layout = find_layout(path, lines, decimal, has_headers=has_headers)
+    if layout.delimiter != "," and layout.decimal == "," and decimal is None:
+        check_decimal_comma(path, lines, layout)
+    body = _Body(path, lines, layout, is_ended=text.endswith("\n"))
+    values, numbers = body.read()
+    units = layout.units or ()
+    return Table(
+        path,
+        layout.headers or ("",) * layout.count,
+        tuple(units) or ("",) * layout.count,
+        values,
+        numbers,
+        body.bad,
+        layout.headers is not None,
+        True,
+        [*_layout_notes(layout), *body.notes()],
+    )
+
+
+def _layout_notes(layout: Layout) -> list[str]:
+    name = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
+    sign = {".": "point", ",": "comma"}[layout.decimal]
+    between = f" between {name[layout.delimiter]}" if layout.count > 1 else ""
+    columns = f"{layout.count} columns" if layout.count > 1 else "1 column"
+    header = "" if layout.headers else ", no header"
+    return [f"text: {columns}{between}, decimal {sign}{header}"]
+
+
+@dataclass
+class _Body:
+    """The rows of a text, and what is found in them."""
+
+    path: Path
+    lines: Sequence[str]
+    layout: Layout
+    is_ended: bool
+    bad: dict[int, list[BadCell]] = field(default_factory=dict)
+    comments: list[int] = field(default_factory=list)
+    restarts: list[int] = field(default_factory=list)
+    texts: list[int] = field(default_factory=list)
+    short: list[int] = field(default_factory=list)
+    empty: list[int] = field(default_factory=list)
+    odd: list[int] = field(default_factory=list)
+    cut: int | None = None
+
+    def read(self) -> tuple[Array, Numbers]:
+        """Numbers, shape (columns, rows), and the line of each row."""
+        layout = self.layout
+        data = np.frombuffer("\n".join(self.lines[layout.first :]).encode() + b"\n", np.uint8)
+        ends = np.flatnonzero(data == ord("\n"))
+        starts = np.concatenate([[0], ends[:-1] + 1])
+        is_regular = self._regular(data, starts, ends)
+        values = np.full((layout.count, len(starts)), np.nan)
+        if is_regular.any():
+            values[:, is_regular] = self._fast(data, starts, ends, is_regular)
+        is_row = is_regular.copy()
+        for at in np.flatnonzero(~is_regular):
+            row = self._cells(int(at) + layout.first)
+            if row is not None:
+                values[:, at], is_row[at] = row, True
+        self._check_short(int(is_row.sum()))
+        self._cut_off(is_row)
+        kept = np.flatnonzero(is_row)
+        return values[:, kept], kept + layout.first + 1
+
+    def _regular(self, data: NDArray[np.uint8], starts: Numbers, ends: Numbers) -> NDArray[np.bool]:
+        """Whether lines have the usual number of cells and only characters of numbers."""
+        layout = self.layout
+        allowed = np.zeros(256, dtype=bool)
+        comma = layout.decimal if layout.delimiter != "," or layout.decimal != "," else "."
+        allowed[list(b"0123456789+-eE \n" + (comma + layout.delimiter).encode())] = True
+        if layout.delimiter == " ":
+            allowed[ord("\t")] = True
+        strange = np.flatnonzero(~allowed[data])
+        has_strange = np.zeros(len(starts), dtype=bool)
+        has_strange[np.searchsorted(ends, strange)] = True
+        if layout.delimiter == " ":
+            is_blank = (data == ord(" ")) | (data == ord("\t")) | (data == ord("\n"))
+            begins = ~is_blank
+            begins[1:] &= is_blank[:-1]
+            count = np.add.reduceat(begins, starts, dtype=np.int64)
+        else:
+            count = 1 + np.add.reduceat(data == ord(layout.delimiter), starts, dtype=np.int64)
+        if layout.count == 1:
+            count[ends == starts] = 0
+        regular: NDArray[np.bool] = (count == layout.count) & ~has_strange
+        self._find_odd(data, starts, regular)
+        return regular
+
+    def _find_odd(
+        self, data: NDArray[np.uint8], starts: Numbers, regular: NDArray[np.bool]
+    ) -> None:
+        """Find rare rows with fewer decimal signs than all others."""
+        if not regular.any():
+            return
+        points = np.add.reduceat(data == ord(self.layout.decimal), starts, dtype=np.int64)[regular]
+        usual = int(points.max())
+        odd = np.flatnonzero(regular)[points < usual]
+        if 0 < len(odd) <= max(1, MAX_ODD * len(points)):
+            self.odd = [int(one) + self.layout.first + 1 for one in odd]
+
+    def _fast(
+        self,
+        data: NDArray[np.uint8],
+        starts: Numbers,
+        ends: Numbers,
+        is_regular: NDArray[np.bool],
+    ) -> Array:
+        """Numbers of regular lines, shape (columns, lines)."""
+        import pandas as pd
+
+        layout = self.layout
+        kept = data if is_regular.all() else data[np.repeat(is_regular, ends - starts + 1)]
+        text = kept.tobytes()
+        if layout.decimal == ",":
+            text = text.replace(b",", b".")
+        try:
+            frame = pd.read_csv(
+                BytesIO(text),
+                sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+                header=None,
+                names=list(range(layout.count)),
+                index_col=False,
+                dtype="float64",
+                keep_default_na=False,
+                na_values=[""],
+                quoting=csv.QUOTE_NONE,
+                engine="c",
+                skip_blank_lines=False,
+            )
+            values: Array = frame.to_numpy().T
+        except ValueError:
+            values = np.full((layout.count, 0), np.nan)
+        if values.shape[1] != is_regular.sum() or np.isinf(values).any():
+            return self._slow(np.flatnonzero(is_regular))
+        return values
+
+    def _slow(self, indices: Numbers) -> Array:
+        """Numbers of lines that are regular but for a cell, such as "1-5"."""
+        rows = [self._cells(int(one) + self.layout.first) for one in indices]
+        none = [math.nan] * self.layout.count
+        return np.array([none if row is None else row for row in rows]).T
+
+    def _cells(self, index: int) -> list[float] | None:
+        """Numbers of one line; None if it is not a row. What is wrong is recorded."""
+        line, number, layout = self.lines[index], index + 1, self.layout
+        if not line.strip():
+            return None
+        if COMMENT.match(line) or (line.lstrip()[0] == ";" and layout.delimiter != ";"):
+            self.comments.append(number)
+            return None
+        try:
+            cells = split(line, layout.delimiter)
+        except ValueError as error:
+            raise FileError(f"{self.path}: line {number}: cannot be read: {error}") from None
+        if self._is_header(line):
+            self.restarts.append(number)
+            return None
+        numbers = [is_number(cell, layout.decimal) for cell in cells]
+        if not any(numbers):
+            is_empty = all(is_missing(cell) for cell in cells)
+            (self.empty if is_empty else self.texts).append(number)
+            return None
+        if len(cells) > layout.count and any(cells[layout.count :]):
+            self._refuse_long(number, cells)
+        if len(cells) < layout.count:
+            self.short.append(number)
+            return None
+        return [self._number(number, *one) for one in enumerate(cells[: layout.count])]
+
+    def _number(self, line: int, column: int, cell: str) -> float:
+        """The number of a cell; NaN if there is none."""
+        decimal = self.layout.decimal
+        if is_number(cell, decimal):
+            value = float(cell.replace(",", "."))
+            if math.isfinite(value):
+                return value
+            self.bad.setdefault(column, []).append(BadCell(line, cell, ", is too large"))
+        elif not is_missing(cell):
+            self.bad.setdefault(column, []).append(BadCell(line, cell, hint_for(cell, decimal)))
+        return math.nan
+
+    def _is_header(self, line: str) -> bool:
+        """Whether a line repeats the header or the units, as an instrument does that restarts."""
+        layout = self.layout
+        if layout.headers is None:
+            return False
+        cells = header_cells(line, layout.delimiter, layout.decimal, layout.count)
+        return cells is not None and cells in {layout.headers, layout.units}
+
+    def _refuse_long(self, number: int, cells: Sequence[str]) -> None:
+        usual = self.layout.count
+        under = f"{usual} headers" if self.layout.headers else f"{usual} cells of other lines"
+        hint = POINT if self.layout.delimiter == "," else ""
+        raise FileError(
+            f"{self.path}: line {number}: has {len(cells)} cells under {under}: column "
+            f"{usual + 1} is {shown(cells[usual])}{hint}"
+        )
+
+    def _check_short(self, rows: int) -> None:
+        if len(self.short) <= max(3, MAX_SHORT * rows):
+            return
+        number = self.short[0]
+        count = len(split(self.lines[number - 1], self.layout.delimiter))
+        raise FileError(
+            f"{self.path}: line {number}: has {count} cells, where other lines have "
+            f"{self.layout.count}, and so have {len(self.short)} lines: which column is missing "
+            "is unknown; write a missing cell as nan"
+        )
+
+    def _cut_off(self, is_row: NDArray[np.bool]) -> None:
+        """Leave out the last row if it may be cut within its last number."""
+        layout, rows = self.layout, np.flatnonzero(is_row)
+        if self.is_ended or len(rows) < 3 or rows[-1] + layout.first != len(self.lines) - 1:
+            return
+        last, *others = (
+            _digits(split(self.lines[one + layout.first], layout.delimiter)[-1], layout.decimal)
+            for one in rows[: -COMPARED - 1 : -1]
+        )
+        if last < min(others):
+            is_row[rows[-1]] = False
+            self.cut = int(rows[-1]) + layout.first + 1
+
+    def notes(self) -> list[str]:
+        """Lines about what was found in the rows."""
+        found = [
+            (self.comments, "comments"),
+            (self.restarts, "the header again, as of an instrument that restarts"),
+            (self.empty, "rows without a number, left out"),
+            (self.short, "rows that stop short, left out"),
+            (self.odd, "rows with fewer decimal signs than all others: are they damaged?"),
+        ]
+        notes = [
+            f"line{'s' if len(lines) > 1 else ''} {listed(lines)}: {what}"
+            for lines, what in found
+            if lines
+        ]
+        for number in self.texts[:3]:
+            notes.append(f"line {number}: text, left out: {shown(self.lines[number - 1].strip())}")
+        if len(self.texts) > 3:
+            notes.append(f"lines {listed(self.texts[3:])}: text too, left out")
+        if self.cut is not None:
+            notes.append(f"line {self.cut}: the last row seems to be cut short, left out")
+        return notes
+
+
+def _digits(cell: str, decimal: str) -> tuple[int, int]:
+    """Digits of the exponent and of the decimals of a number."""
+    mantissa, _, exponent = cell.lower().partition("e")
+    return len(exponent.lstrip("+-")), len(mantissa.partition(decimal)[2])

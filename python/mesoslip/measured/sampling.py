@@ -1,0 +1,276 @@
+"""Samples at any times: their order, rates and gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import FileError
+from mesoslip.measured.reading.table import listed
+from mesoslip.quantities import number, with_unit
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int_]
+
+# Minimum interval of a gap, over the usual one around it.
+MIN_GAP = 1.5
+# Samples on each side whose median interval is the usual one.
+AROUND = 15
+# Intervals of one rate differ by less than this factor.
+SAME_RATE = 1.3
+# Minimum number of samples at one rate.
+MIN_SAMPLES = 20
+# Maximum number of steps back of times.
+MAX_STEPS_BACK = 1000
+# Minimum share of samples with the time of the one before, from which times are rounded.
+MIN_ROUNDED = 0.05
+# Rows and gaps that are named.
+NAMED = 5
+
+
+@dataclass(frozen=True)
+class Order:
+    """Samples in the order of their times.
+
+    Attributes
+    ----------
+    rows
+        Indices of the samples that are used, in their order.
+    time
+        Their times [s].
+    notes
+        What was found.
+    """
+
+    rows: Numbers
+    time: Array
+    notes: list[str]
+
+
+def in_order(
+    path: Path, time: Array, values: Array, lines: Numbers, part: int | None, row: str
+) -> Order:
+    """Put samples into the order of their times.
+
+    Rows that were written twice are used once; blocks that were written late are put where they
+    belong; single rows whose time is out of order are left out. A clock that starts again makes
+    parts, of which one is used.
+
+    Parameters
+    ----------
+    path
+        The file, for messages.
+    time
+        Times in the order of the file [s], shape (samples,).
+    values
+        Everything else that is used, shape (quantities, samples).
+    lines
+        Lines of the samples.
+    part
+        The part that is used, from 1; by default the longest.
+    row
+        Word for a line.
+
+    Raises
+    ------
+    FileError
+        If times go back all the time, or there is no such part.
+    """
+    notes: list[str] = []
+    rows = np.arange(len(time))
+    if not (np.diff(time) <= 0).any():
+        return Order(rows, time, notes)
+    falling = np.diff(time) < 0
+    if falling.sum() > max(MAX_STEPS_BACK, 0.2 * len(time)) or falling.all():
+        at = int(np.flatnonzero(falling)[0]) + 1
+        raise FileError(
+            f"{path}: {row} {lines[at]}: the time {time[at]:g} s does not come after "
+            f"{time[at - 1]:g} s, and so in {int(falling.sum())} of {len(time)} {row}s: is it the "
+            "column of the time?"
+        )
+    rows = _without_odd(time, rows, lines, notes, row)
+    rows = _without_repeated(time, values, rows, lines, notes, row)
+    rows = _one_part(path, time, rows, lines, notes, part, row)
+    return _without_equal(time, rows, lines, notes, row)
+
+
+def _without_odd(time: Array, rows: Numbers, lines: Numbers, notes: list[str], row: str) -> Numbers:
+    """Leave out single rows whose time does not fit between those of its neighbours."""
+    steps = np.diff(time[rows])
+    back = np.flatnonzero(steps < 0) + 1
+    odd = []
+    for at in back:
+        # Without the row before, or without this one, times increase.
+        if 1 < at and time[rows[at]] > time[rows[at - 2]]:
+            odd.append(at - 1)
+        elif at + 1 < len(rows) and time[rows[at + 1]] > time[rows[at - 1]]:
+            odd.append(at)
+    if not odd:
+        return rows
+    # A longer run of them is a block.
+    chosen = np.unique(odd)
+    named = lines[rows[chosen]].tolist()
+    notes.append(f"{row} {listed(named, NAMED)}: the time is out of order, left out")
+    return np.delete(rows, chosen)
+
+
+def _runs(time: Array, rows: Numbers) -> list[Numbers]:
+    """Rows in pieces of times that do not decrease."""
+    return np.split(rows, np.flatnonzero(np.diff(time[rows]) < 0) + 1)
+
+
+def _without_repeated(
+    time: Array, values: Array, rows: Numbers, lines: Numbers, notes: list[str], row: str
+) -> Numbers:
+    """Leave out rows that repeat earlier ones in time and values."""
+    every = np.ascontiguousarray(np.vstack([time, values])[:, rows].T) + 0.0
+    view = every.view([("", every.dtype)] * every.shape[1]).ravel()
+    _, first = np.unique(view, return_index=True)
+    if len(first) == len(rows):
+        return rows
+    kept = np.zeros(len(rows), dtype=bool)
+    kept[first] = True
+    again = lines[rows[~kept]]
+    notes.append(
+        f"{len(again)} {row}{'s' if len(again) > 1 else ''} written twice, used once: {row} "
+        f"{listed(again.tolist(), NAMED)}"
+    )
+    return rows[kept]
+
+
+def _one_part(
+    path: Path,
+    time: Array,
+    rows: Numbers,
+    lines: Numbers,
+    notes: list[str],
+    part: int | None,
+    row: str,
+) -> Numbers:
+    """Put blocks in order; of a clock that starts again use one part."""
+    runs = _runs(time, rows)
+    parts: list[list[Numbers]] = [[runs[0]]]
+    for run in runs[1:]:
+        if _fits(time, parts[-1], run):
+            parts[-1].append(run)
+        else:
+            parts.append([run])
+    late = sum(len(one) - 1 for one in parts)
+    if late:
+        notes.append(f"times step back {late} times to blocks written late, put in order")
+    whole = [np.concatenate(sorted(one, key=lambda run: time[run[0]])) for one in parts]
+    if part is not None and part > len(whole):
+        raise FileError(f"{path}: has {len(whole)} parts; there is no part {part}")
+    chosen = part - 1 if part is not None else int(np.argmax([len(one) for one in whole]))
+    if len(whole) > 1:
+        shown = "; ".join(
+            f"{number_} {row}s {lines[one].min()} to {lines[one].max()}"
+            for number_, one in enumerate(whole[:NAMED], 1)
+        )
+        notes.append(
+            f"the clock starts again: {len(whole)} parts ({shown}); part {chosen + 1} is used, "
+            "another one with --part"
+        )
+    return whole[chosen]
+
+
+def _fits(time: Array, runs: Sequence[Numbers], run: Numbers) -> bool:
+    """Whether a run lies between others, or before or after them."""
+    first, last = time[run[0]], time[run[-1]]
+    for other in runs:
+        low = np.searchsorted(time[other], first, "left")
+        if low != np.searchsorted(time[other], last, "right"):
+            return False
+    # A clock that starts again begins before everything else.
+    return bool(first > min(time[other[0]] for other in runs))
+
+
+def _without_equal(time: Array, rows: Numbers, lines: Numbers, notes: list[str], row: str) -> Order:
+    """Handle samples of one time: rounded times are spread evenly, others used once."""
+    times = time[rows]
+    same = np.concatenate([[False], np.diff(times) == 0])
+    count = int(same.sum())
+    if not count:
+        return Order(rows, times, notes)
+    if count < MIN_ROUNDED * len(rows):
+        named = lines[rows[same]].tolist()
+        notes.append(
+            f"{count} sample{'s' if count > 1 else ''} with the time of the one before and other "
+            f"values, left out: {row} {listed(named, NAMED)}"
+        )
+        return Order(rows[~same], times[~same], notes)
+    starts = np.flatnonzero(~same)
+    lengths = np.diff(np.append(starts, len(rows)))
+    steps = np.diff(times[starts])
+    step = float(np.median(steps)) if steps.size else 0.0
+    if step <= 0:
+        return Order(rows[~same], times[~same], notes)
+    ends = np.append(np.minimum(steps, step), step)
+    within = np.arange(len(rows)) - np.repeat(starts, lengths)
+    spread = np.repeat(times[starts], lengths) + within / np.repeat(lengths, lengths) * np.repeat(
+        ends, lengths
+    )
+    notes.append(
+        f"guess: times are rounded to {with_unit(step, 's', 3)}, with up to {lengths.max()} "
+        "samples to each; they are spread evenly"
+    )
+    return Order(rows, spread, notes)
+
+
+def sampling_report(time: Array) -> list[str]:
+    """Lines about the rates of samples, from when to when, and about gaps.
+
+    Parameters
+    ----------
+    time
+        Times [s], shape (samples,), increasing.
+    """
+    steps = np.diff(time)
+    usual = _usual(steps)
+    is_gap = steps > MIN_GAP * usual
+    lines = []
+    for first, last in _stretches(usual):
+        inside = steps[first:last][~is_gap[first:last]]
+        interval = float(np.median(inside if inside.size else steps[first:last]))
+        spread = float(np.percentile(np.abs(inside / interval - 1), 95)) if inside.size else 0.0
+        about = "about " if spread > 0.05 else ""
+        lines.append(
+            f"samples: {about}{number(1 / interval, 5)} Hz from {time[first]:.10g} s to "
+            f"{time[last]:.10g} s ({last - first + 1})"
+        )
+    gaps = np.flatnonzero(is_gap)
+    if gaps.size:
+        shown = ", ".join(
+            f"{with_unit(steps[at], 's', 3)} after {time[at]:.10g} s" for at in gaps[:NAMED]
+        )
+        more = f" and {gaps.size - NAMED} more" if gaps.size > NAMED else ""
+        lines.append(f"gaps: {shown}{more}; nothing is filled in")
+    return lines
+
+
+def _usual(steps: Array) -> Array:
+    """The usual interval around each one: the smaller of the medians before and after it."""
+    from scipy.ndimage import median_filter
+
+    size = min(2 * AROUND + 1, len(steps) - (1 - len(steps) % 2))
+    usual: Array = median_filter(steps, max(size, 1), mode="nearest")
+    return usual
+
+
+def _stretches(usual: Array) -> list[tuple[int, int]]:
+    """Stretches of one rate as pairs of samples; short ones belong to the one before."""
+    levels = np.round(np.log(usual) / np.log(SAME_RATE))
+    edges = [0, *(np.flatnonzero(np.abs(np.diff(levels)) > 1) + 1).tolist(), len(usual)]
+    found: list[tuple[int, int]] = []
+    for first, last in pairwise(edges):
+        short = last - first < MIN_SAMPLES and len(usual) >= 2 * MIN_SAMPLES
+        if found and short:
+            found[-1] = (found[-1][0], last)
+        else:
+            found.append((first, last))
+    return found

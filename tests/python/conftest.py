@@ -5,17 +5,37 @@ from __future__ import annotations
 import copy
 import signal
 import sys
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from mesoslip import Config
+from mesoslip import Config, MesoslipError, _core
 from mesoslip.command_line.main import main
 
 ROOT = Path(__file__).parents[2]
 
 # A shell that starts tests in the background has them, and what they start, ignore interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def skip_without_sundials(message: str) -> None:
+    """Skip a test that needs SUNDIALS, if this copy was built without: its message says so."""
+    if "built without SUNDIALS" in message and not _core.sundials().strip():
+        pytest.skip("this copy of mesoslip was built without SUNDIALS")
+
+
+def _or_skip() -> Generator[None]:
+    """Around fixtures and tests."""
+    try:
+        return (yield)
+    except MesoslipError as error:
+        skip_without_sundials(str(error))
+        raise
+
+
+pytest_runtest_setup = pytest.hookimpl(wrapper=True)(_or_skip)
+pytest_runtest_call = pytest.hookimpl(wrapper=True)(_or_skip)
 
 
 def long(*values: Any) -> Any:
@@ -78,6 +98,7 @@ def command(monkeypatch, capfd):
             main()
         captured = capfd.readouterr()
         assert "Traceback" not in captured.err
+        skip_without_sundials(captured.err)
         return exit_.value.code or 0, captured.out, captured.err
 
     return call

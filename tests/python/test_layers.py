@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import mesoslip
 import numpy as np
 import pytest
 import sksundae
+from mesoslip import _core
 from mesoslip.output import layout
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.derived import derived
@@ -230,6 +232,19 @@ def test_cvode_converges_to_the_series(klein, method):
     assert errors[2] < 0.1 * errors[1]
     assert errors[1] < 0.1 * errors[0]
     assert steps[0] < steps[1] < steps[2]
+
+
+def test_a_build_without_sundials_serves_layers_by_series(klein, monkeypatch):
+    """`auto` takes the series however long it takes; CVODE's methods are refused in one line."""
+    monkeypatch.setattr(_core, "sundials", lambda: b"")
+    long = {"contacts__count": 100, "run__duration": 1e9}
+    assert klein(slider=layered(4), **long).slider.solver_name(klein(**long)) == "series"
+    finish(klein(slider=layered(4), contacts__count=100, run__duration=0.01))
+    refused = klein(slider=layered(4, solver={"method": "adams"}))
+    with pytest.raises(mesoslip.ConfigError, match=r"^slider\.solver\.method = 'adams': .*without"):
+        mesoslip.run(refused)
+    monkeypatch.setattr(_core, "sundials", lambda: b"7.0.0")
+    assert klein(slider=layered(4), **long).slider.solver_name(klein(**long)) == "bdf"
 
 
 def test_an_independent_cvode(klein):

@@ -59,6 +59,7 @@ def program_attributes(config: Described, command: str) -> dict[str, Any]:
 
     now = datetime.now(UTC).isoformat(timespec="seconds")
     program = f"mesoslip {version('mesoslip')}"
+    sundials = _core.sundials().decode().strip()
     asked = COMMAND_LINE.get() or f"mesoslip.{command} in Python"
     base = config.base
     return {
@@ -76,7 +77,8 @@ def program_attributes(config: Described, command: str) -> dict[str, Any]:
         "commit": _build.COMMIT,
         "compiler": _build.COMPILER,
         "library_versions": ", ".join(
-            [f"python {platform.python_version()}", f"SUNDIALS {_core.sundials().decode()}"]
+            [f"python {platform.python_version()}"]
+            + ([f"SUNDIALS {sundials}"] if sundials else [])
             + [f"{name} {version(name)}" for name in ("numpy", "xarray", "netCDF4", "pydantic")]
         ),
     }

@@ -14,6 +14,7 @@ from pydantic import (
     model_validator,
 )
 
+from mesoslip import _core
 from mesoslip.configuration.sliders.base import Setting
 from mesoslip.configuration.sliders.inertial import InertialSlider
 from mesoslip.configuration.table import (
@@ -30,6 +31,7 @@ from mesoslip.configuration.table import (
     Whole,
     choice,
 )
+from mesoslip.errors import ConfigError, Problem
 
 # Methods of integration.
 SOLVERS = ("series", "adams", "bdf")
@@ -40,6 +42,11 @@ MAX_SERIES_WORK = 1e11
 
 # Absolute tolerance of CVODE, relative to the extension of the spring under F_s.
 TINY_STRETCH = 1e-6
+
+
+def has_cvode() -> bool:
+    """Whether the kernels were built with SUNDIALS."""
+    return bool(_core.sundials().strip())
 
 
 class Base(Table):
@@ -159,6 +166,14 @@ class LayeredSlider(InertialSlider):
         return max(setup, math.pi * math.sqrt((self.base.mass + self.mass) / self.base.stiffness))
 
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+        solver = self.solver_name(config)
+        # Files of such runs can be read without SUNDIALS; only runs need it.
+        if solver != "series" and not has_cvode():
+            message = (
+                "needs CVODE, and this copy of mesoslip was built without SUNDIALS; "
+                'method = "series" needs nothing'
+            )
+            raise ConfigError([Problem("", "slider.solver.method", message, solver)])
         relative = self.solver.relative_tolerance
         base = self.base
         return {
@@ -169,7 +184,7 @@ class LayeredSlider(InertialSlider):
             "base_mass": 0.0 if base is None else base.mass,
             "base_stiffness": 0.0 if base is None else base.stiffness,
             "base_damping": 0.0 if base is None else base.damping,
-            "solver": self.solver_name(config),
+            "solver": solver,
             "relative_tolerance": relative,
             "absolute_tolerance": relative
             * TINY_STRETCH
@@ -192,11 +207,12 @@ class LayeredSlider(InertialSlider):
         """The method, chosen for a run if it is "auto".
 
         Series need a few steps per period of the fastest rate, even if it does not affect the
-        motion. BDF does not, and is chosen where series would take too long.
+        motion. BDF does not, and is chosen where series would take too long, if this copy of
+        mesoslip has it.
         """
         if self.solver.method != AUTOMATIC:
             return self.solver.method
-        if not config.contact_kind.is_discrete:
+        if not config.contact_kind.is_discrete or not has_cvode():
             return "series"
         mass = self.mass / self.layers
         drag = config.contacts.count * config.contacts.contact_drag

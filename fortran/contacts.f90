@@ -1,5 +1,6 @@
 !> The kinds of contacts by name: the only place that knows them all.
 module mesoslip_contacts
+   use mesoslip_contacts_activated, only: make_contact_activated
    use mesoslip_contacts_ageing_contacts, only: make_contact_ageing
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
@@ -33,6 +34,8 @@ contains
       call take_contact_parameters(common, parameters, seed, realization, error)
       if (allocated(error)) return
       select case (kind)
+      case ("activated")
+         call make_contact_activated(contacts, common, parameters, error)
       case ("ageing")
          call make_contact_ageing(contacts, common, parameters, error)
       case ("ageing populations")

@@ -1,10 +1,15 @@
-!> What contacts offer a slider, a linear law of the contact force, and what they learn of it.
+!> What contacts offer a slider, a linear law of the contact force and clocks, and what they learn of
+!> it.
 module mesoslip_interface_law
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
-   public :: interface_law_type, pose_type, window_type
+   public :: hazard_clock_type, interface_law_type, pose_type, window_type
+   public :: clocks
+
+   !> Number of clocks: that of contacts under positive force, and that of those under negative force
+   integer, parameter :: clocks = 2
 
    !> Force of the contacts on the slider, F = stiffness x - offset + drag v + rate (t - t_0), t_0
    !> being the time at which the slider is offered it.
@@ -39,5 +44,24 @@ module mesoslip_interface_law
       !> oscillation [1/s]; 0 for a slider of which the motion is prescribed
       real(wp) :: inverse_mass = 0.0_wp, own_rate = 0.0_wp
    end type pose_type
+
+   !> A clock of thermally activated breaking. The rate of a contact that bears the force f is
+   !> omega_0 exp((abs(f) - f_s)/f_T) (Bell's law). For contacts of one stiffness whose forces have
+   !> one sign it is the same function of the displacement, exp(slope X), but for a factor: a contact
+   !> breaks when the integral of that function has grown by what its life is worth.
+   type :: hazard_clock_type
+      !> Whether a contact goes by it
+      logical :: is_used = .false.
+      !> Change of the exponent with the displacement of the slider [1/m]
+      real(wp) :: slope = 0.0_wp
+      !> Rate of the clock where the slider is [1/s]
+      real(wp) :: rate = 0.0_wp
+      !> What is left until the next contact breaks; huge if none does
+      real(wp) :: left = huge(1.0_wp)
+      !> What was added in the last advance
+      real(wp) :: elapsed = 0.0_wp
+      !> Whether the last advance ended where nothing was left
+      logical :: is_due = .false.
+   end type hazard_clock_type
 
 end module mesoslip_interface_law

@@ -9,7 +9,8 @@ module mesoslip_contacts_base
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length, parameters_type
    use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled
-   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
+      & window_type
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_schedule, only: schedule_type
@@ -75,6 +76,9 @@ module mesoslip_contacts_base
       real(wp) :: error_estimate = 0.0_wp
       !> Cost of a response over that of one contact that breaks
       real(wp) :: cost = 1.0_wp
+      !> Clocks of thermally activated breaking, which the slider lets go on; whether there are any
+      type(hazard_clock_type) :: clock(clocks)
+      logical :: has_clocks = .false.
       !> Set when the contacts cannot go on
       type(error_type), allocatable :: failure
    contains

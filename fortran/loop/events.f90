@@ -8,7 +8,7 @@ module mesoslip_loop_events
    implicit none
    private
 
-   public :: advance_to_event, respond
+   public :: advance_to_event, advance_slider, respond
 
 contains
 
@@ -31,7 +31,7 @@ contains
          & state%steady%block_end, state%slider%time + state%recorder%max_step())
       call state%stop%limit_window(window, state%slider%origin)
 
-      call state%slider%advance(law, window)
+      call advance_slider(state, law, window)
       state%advances = state%advances + 1
       if (allocated(state%slider%failure) .or. allocated(state%contacts%failure)) return
       call state%recorder%record(state%slider, state%contacts%detached_count, &
@@ -47,6 +47,22 @@ contains
       call end_if_steady(state)
       call change_drive(state)
    end subroutine advance_to_event
+
+   !> The slider advances, and the clocks of the contacts go on.
+   subroutine advance_slider(state, law, window)
+      !> The state
+      class(state_type), intent(inout) :: state
+      !> Contact force, and where it holds
+      type(interface_law_type), intent(in) :: law
+      type(window_type), intent(in) :: window
+
+      if (state%contacts%has_clocks) then
+         state%slider%clock = state%contacts%clock
+         state%slider%has_clocks = .true.
+      end if
+      call state%slider%advance(law, window)
+      if (state%contacts%has_clocks) state%contacts%clock = state%slider%clock
+   end subroutine advance_slider
 
    !> Contacts respond to a motion: what breaks at one displacement is an avalanche.
    subroutine respond(state, before, law)

@@ -2,6 +2,7 @@
 module mesoslip_loop_instant
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_loop_endings, only: ending_broken, ending_none, ending_slides
+   use mesoslip_loop_events, only: advance_slider
    use mesoslip_loop_segment, only: segment_type
    use mesoslip_loop_state, only: state_type
    use mesoslip_loop_transitions, only: change_drive, end_at_avalanches, end_at_displacement, &
@@ -85,7 +86,7 @@ contains
          call state%stop%limit_window(motion, slider%origin)
          slider%stop_upper = motion%upper
          slider%stop_lower = motion%lower
-         call slider%advance(law, window)
+         call advance_slider(state, law, window)
          state%advances = state%advances + 1
          if (state%advances >= last .or. state%contacts%breaks > segment%max_breaks) exit
          if (slider%is_settled .or. slider%is_unbound) exit

@@ -4,7 +4,8 @@
 !> that moves along with the slider, so that they keep their digits however far it goes.
 module mesoslip_sliders_base
    use mesoslip_drive, only: drive_type
-   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
+      & window_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
@@ -66,6 +67,9 @@ module mesoslip_sliders_base
       real(wp) :: cost = 1.0_wp
       !> Steps, evaluations and failed steps of its integrator, if it has one
       integer(i8) :: integrator_counts(3) = 0_i8
+      !> Clocks of the contacts, which end an advance as its window does; whether there are any
+      type(hazard_clock_type) :: clock(clocks)
+      logical :: has_clocks = .false.
       !> Set when the slider cannot go on
       type(error_type), allocatable :: failure
    contains

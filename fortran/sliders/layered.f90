@@ -16,6 +16,7 @@ module mesoslip_sliders_layered
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, shift_slider, &
       & slider_type
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_layered_expansion, only: expand, sum_series
    use mesoslip_sliders_layered_integrator, only: integrator_type
    use mesoslip_sliders_layered_system, only: fastest_rate, layered_parameters_type, new_system, &
@@ -202,7 +203,7 @@ contains
       type(window_type), intent(in) :: window
 
       real(wp) :: step, longest, direction
-      logical :: ends, crosses, turns
+      logical :: ends, crosses, turns, is_due
 
       call self%take_law(law)
       self%step_time = self%time
@@ -221,6 +222,11 @@ contains
       end if
       longest = step
       call self%find_end(window, step, crosses, turns, direction)
+      if (self%has_clocks) then
+         call advance_clocks(self%clock, self%sliding, self%terms, step, is_due)
+         crosses = crosses .and. .not. is_due
+         turns = turns .and. .not. is_due
+      end if
       call self%move_to(step, crosses, turns, merge(window%upper, window%lower, direction > 0.0_wp))
       if (step < longest) self%integrator%is_stale = .true.
       if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then

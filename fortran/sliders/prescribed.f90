@@ -9,6 +9,7 @@ module mesoslip_sliders_prescribed
    use mesoslip_step_filter, only: step_filter_type
    use mesoslip_sliders_base, only: motion_type, slider_type, exchange_slider, exchange_law, &
       & shift_law, shift_slider
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
    implicit none
    private
@@ -149,6 +150,7 @@ contains
          self%displacement = self%drive%value &
             & + self%velocity * (self%time - self%drive%time)
       end if
+      if (self%has_clocks) call end_at_clock(self)
       if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
 
       step = self%displacement - start
@@ -200,6 +202,11 @@ contains
          self%time = window%end_time
          late = self%drive%rate_at(self%time)
       end if
+      if (self%has_clocks) then
+         self%velocity = early
+         call end_at_clock(self)
+         late = self%drive%rate_at(self%time)
+      end if
       self%velocity = late
       if (abs(late) > 0.0_wp) self%direction = sign(1.0_wp, late)
 
@@ -231,6 +238,22 @@ contains
       end function square
 
    end subroutine speed_up
+
+   !> Let a step end where a clock comes to its reading.
+   pure subroutine end_at_clock(self)
+      !> The slider at the end of the step, its velocity being that at the start
+      type(slider_prescribed_type), intent(inout) :: self
+
+      real(wp) :: step
+      logical :: is_due
+
+      step = self%time - self%step_time
+      call advance_clocks(self%clock, [self%velocity, self%drive%acceleration], &
+         & merge(2, 1, abs(self%drive%acceleration) > 0.0_wp), step, is_due)
+      if (.not. is_due) return
+      self%time = self%step_time + step
+      self%displacement = self%drive%at(self%time)
+   end subroutine end_at_clock
 
    !> Note the contact force at a place in the last step.
    pure subroutine note(self, time, displacement, velocity)

@@ -10,6 +10,7 @@ module mesoslip_sliders_quasistatic
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_sliders_base, only: exchange_law, motion_type, shift_law, shift_slider, slider_type
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_instant, only: exchange_instant, instant_slider_type
    implicit none
    private
@@ -87,7 +88,7 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      real(wp) :: pull
+      real(wp) :: pull, start
 
       self%law = law
       self%step_time = self%time
@@ -99,9 +100,14 @@ contains
          return
       end if
       pull = self%pull(self%time)
+      start = self%displacement
       call self%jump(window, pull)
       call note(self, pull)
       if (.not. self%is_settled) return
+      ! Clocks stand still in a jump, and go on at another rate.
+      if (self%has_clocks) then
+         self%clock%rate = self%clock%rate * exp(self%clock%slope * (self%displacement - start))
+      end if
       call self%go_with_drive(window)
       call note(self, self%pull(self%time))
    end subroutine advance
@@ -133,6 +139,7 @@ contains
       type(window_type), intent(in) :: window
 
       real(wp) :: stiffness, start, distance, lower, upper, limit, arrival, step
+      logical :: is_due
 
       stiffness = self%stiffness + self%law%stiffness
       start = self%displacement
@@ -152,9 +159,19 @@ contains
          ! Rounding may take it to the other side of a contact that is about to break.
          self%displacement = min(max(self%displacement, lower), upper)
       end if
+      step = self%time - self%step_time
+      if (self%has_clocks) then
+         call advance_clocks(self%clock, [self%velocity, self%acceleration], &
+            & merge(2, 1, abs(self%acceleration) > 0.0_wp), step, is_due)
+         if (is_due) then
+            self%time = self%step_time + step
+            self%displacement = (self%pull(self%time) + self%law%offset) / stiffness
+            self%displacement = min(max(self%displacement, lower), upper)
+            step = self%time - self%step_time
+         end if
+      end if
       distance = self%displacement - start
       if (abs(distance) > 0.0_wp) self%direction = sign(1.0_wp, distance)
-      step = self%time - self%step_time
       call self%add_motion(step, distance)
       if (abs(self%acceleration) > 0.0_wp) then
          self%velocity = self%velocity + self%acceleration * step

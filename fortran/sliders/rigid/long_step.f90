@@ -2,6 +2,7 @@
 module mesoslip_sliders_rigid_long_step
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, lever, &
       & second_integral
    use mesoslip_sliders_rigid_state, only: arrive, long_terms, many_terms, motion_rates_type, &
@@ -93,7 +94,7 @@ contains
       real(wp) :: step, change, reach, target, direction
       real(wp) :: series(0:long_terms - 1), damper(0:long_terms - 1)
       type(motion_rates_type) :: late
-      logical :: crosses, turns
+      logical :: crosses, turns, is_due
       integer :: term
 
       call expand(system, self%damping, early, terms, series, damper)
@@ -114,6 +115,11 @@ contains
          call first_end(series, terms, window%upper - self%displacement, &
             & window%lower - self%displacement, change, step, crosses, turns, direction)
          target = merge(window%upper, window%lower, direction > 0.0_wp)
+      end if
+      if (self%has_clocks) then
+         call advance_clocks(self%clock, series, terms, step, is_due)
+         crosses = crosses .and. .not. is_due
+         turns = turns .and. .not. is_due
       end if
 
       if (crosses) then

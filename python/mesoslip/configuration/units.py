@@ -56,6 +56,7 @@ SI = {
     "J": Unit(Decimal(1), (2, 1, -2)),
     "W": Unit(Decimal(1), (2, 1, -3)),
     "Hz": Unit(Decimal(1), (0, 0, -1)),
+    "K": Unit(Decimal(1), (0, 0, 0, 1)),
 }
 NONE = Unit(Decimal(1), (0, 0, 0))
 

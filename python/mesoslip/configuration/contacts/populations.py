@@ -44,6 +44,11 @@ class PopulationContacts(ContactKind):
                 'needs engine "eq": the master equation has no neighbours; on average, '
                 "interaction acts like a smaller contacts.threshold.relative_width",
             )
+        if config.contacts.thermal is not None:
+            yield Complaint(
+                "contacts.thermal",
+                'needs engine "eq": the master equation has no thermally activated breaking',
+            )
         if run.realizations > self.max_realizations:
             yield Complaint(
                 "run.realizations",

@@ -20,6 +20,7 @@ from mesoslip.configuration.table import (
     Rate,
     Stiffness,
     Table,
+    Temperature,
     Time,
     Whole,
     choice,
@@ -47,6 +48,13 @@ MIN_ACCEPTED = 0.5
 AGEING_KEYS = {"relax": ("young_force_ratio", "young_relative_width"), "log": ("growth",)}
 # Age of contacts that are fully aged [s].
 INFINITE_AGE = 1e300
+
+# Boltzmann's constant [J/K], exact in the SI.
+BOLTZMANN = 1.380649e-23
+# Maximum number of times that a contact breaks in a run without bearing more than the back force.
+MAX_IDLE_BREAKS = 1e9
+# Maximum delay relative to the mean life of such a contact.
+MAX_IDLE_DELAY = 1e6
 
 # Maximum stiffness of all bonds of a contact, relative to its own: beyond it the breaking force, a
 # difference of its own force and its neighbours', has fewer than ten digits.
@@ -151,6 +159,53 @@ class Ageing(Table):
         return float((threshold - at_zero) / (at_one - at_zero))
 
 
+class Thermal(Table):
+    """Thermally activated breaking (model section 13).
+
+    A contact that bears the force f below its threshold f_s breaks at the rate
+    ω_0 exp((|f| − f_s)/f_T), and at once at the threshold. The force f_T is given relative to the
+    mean threshold, or as k_B T over an activation length.
+    """
+
+    rate: Annotated[Rate, Field(gt=0)]
+    """Rate of breaking at the threshold, ω_0."""
+    force_ratio: Annotated[Number, Field(gt=0)] | None = None
+    """Force scale of activation relative to the mean threshold, f_T/f_s."""
+    temperature: Annotated[Temperature, Field(gt=0)] | None = None
+    """Temperature T, in place of `force_ratio`; f_T = k_B T/x_a."""
+    activation_length: Annotated[Length, Field(gt=0)] | None = None
+    """Activation length x_a, with `temperature`."""
+
+    @model_validator(mode="after")
+    def _one_force(self) -> Self:
+        if self.force_ratio is not None:
+            for key in ("temperature", "activation_length"):
+                if getattr(self, key) is not None:
+                    raise problem(
+                        key,
+                        "give either force_ratio, or temperature and activation_length: both "
+                        "determine the force f_T = k_B T/x_a",
+                    )
+        elif self.temperature is None and self.activation_length is None:
+            raise problem("force_ratio", "needed, or temperature and activation_length")
+        else:
+            for key in ("temperature", "activation_length"):
+                if getattr(self, key) is None:
+                    raise problem(key, "needed without force_ratio: f_T = k_B T/x_a")
+        return self
+
+    def ratio(self, contact_static_force: float) -> float:
+        """f_T/f_s, from the mean threshold of a contact [N]."""
+        if self.force_ratio is not None:
+            return self.force_ratio
+        assert self.temperature is not None and self.activation_length is not None
+        return BOLTZMANN * self.temperature / self.activation_length / contact_static_force
+
+    def rate_under(self, force_ratio: float, contact_static_force: float) -> float:
+        """Rate at which a contact of mean threshold breaks under a force relative to it [1/s]."""
+        return self.rate * math.exp((force_ratio - 1) / self.ratio(contact_static_force))
+
+
 class Contacts(Table):
     """The contacts of the interface; forces, stiffness and area are totals of all contacts."""
 
@@ -188,6 +243,8 @@ class Contacts(Table):
     """Law of the thresholds."""
     ageing: Ageing | None = None
     """Change of the thresholds with age; none by default."""
+    thermal: Thermal | None = None
+    """Thermally activated breaking; none by default."""
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:

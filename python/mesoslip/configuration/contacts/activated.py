@@ -1,0 +1,91 @@
+"""Contacts that break by thermal activation."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
+from mesoslip.configuration.contacts.tables import (
+    MAX_IDLE_BREAKS,
+    MAX_IDLE_DELAY,
+    Contacts,
+    Interaction,
+    Thermal,
+)
+from mesoslip.configuration.table import Complaint, Complaints
+from mesoslip.configuration.tables import Run
+
+
+def thermal_of(config: Setting) -> Thermal:
+    """The table of contacts that break by thermal activation."""
+    assert config.contacts.thermal is not None
+    return config.contacts.thermal
+
+
+def thermal_parameters(config: Setting) -> dict[str, float | str]:
+    """Parameters of activation in the kernel."""
+    thermal, force = thermal_of(config), config.contacts.contact_static_force
+    return {"activation_rate": thermal.rate, "activation_force": thermal.ratio(force) * force}
+
+
+def thermal_problems(config: Setting) -> Complaints:
+    """Combinations that activated contacts refuse, in both engines."""
+    contacts, thermal = config.contacts, thermal_of(config)
+    if contacts.coupling != "equal":
+        yield Complaint(
+            "contacts.coupling",
+            'must be "equal" with contacts.thermal: contacts of one stiffness share the clock by '
+            "which they break",
+            contacts.coupling,
+        )
+    if contacts.ageing is not None:
+        yield Complaint(
+            "contacts.ageing",
+            "is not for contacts.thermal: contacts whose thresholds change with age do not share "
+            "the clock by which they break",
+        )
+    if config.interaction is not None and config.interaction.strength > 0:
+        yield Complaint(
+            "interaction.strength",
+            "must be 0 with contacts.thermal: the forces of neighbours change the rate at which a "
+            "contact breaks, so that contacts do not share a clock",
+            config.interaction.strength,
+        )
+    rate = thermal.rate_under(contacts.back_force_ratio, contacts.contact_static_force)
+    breaks = config.expected_duration / (contacts.delay + 1 / rate) if rate > 0 else 0.0
+    if breaks > MAX_IDLE_BREAKS or rate * contacts.delay > MAX_IDLE_DELAY:
+        yield Complaint(
+            "contacts.thermal.rate",
+            f"makes contacts break at once: one that bears no more than the back force has a mean "
+            f"life of {1 / rate:.3g} s; a lower rate or f_T is needed",
+            thermal.rate,
+        )
+
+
+class ActivatedContacts(ContactKind):
+    """Independent contacts that break by thermal activation, simulated one by one."""
+
+    kernel_kind: ClassVar[str] = "activated"
+
+    @classmethod
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
+        return run.engine == "eq" and contacts.thermal is not None
+
+    @property
+    def bytes_per_contact(self) -> int:
+        return 260 if self.on_lattice else 150
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+        columns = rows = 0
+        if self.interaction is not None:
+            columns, rows = self.interaction.columns, self.interaction.rows
+        return (
+            common_parameters(config)
+            | {"columns": columns, "rows": rows}
+            | thermal_parameters(config)
+        )
+
+    def problems(self, config: Setting) -> Complaints:
+        if self.interaction is not None:
+            yield from self.interaction.problems(config.contacts)
+        yield from thermal_problems(config)

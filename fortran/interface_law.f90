@@ -1,5 +1,5 @@
-!> What contacts offer a slider, a linear law of the contact force and clocks, and what they learn of
-!> it.
+!> What contacts offer a slider, a linear law of the contact force and clocks, and what they learn
+!> of it.
 module mesoslip_interface_law
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -8,7 +8,8 @@ module mesoslip_interface_law
    public :: hazard_clock_type, interface_law_type, pose_type, window_type
    public :: clocks
 
-   !> Number of clocks: that of contacts under positive force, and that of those under negative force
+   !> Number of clocks: that of contacts under positive force, and that of those under negative
+   !> force
    integer, parameter :: clocks = 2
 
    !> Force of the contacts on the slider, F = stiffness x - offset + drag v + rate (t - t_0), t_0
@@ -47,8 +48,8 @@ module mesoslip_interface_law
 
    !> A clock of thermally activated breaking. The rate of a contact that bears the force f is
    !> omega_0 exp((abs(f) - f_s)/f_T) (Bell's law). For contacts of one stiffness whose forces have
-   !> one sign it is the same function of the displacement, exp(slope X), but for a factor: a contact
-   !> breaks when the integral of that function has grown by what its life is worth.
+   !> one sign it is the same function of the displacement, exp(slope X), but for a factor: a
+   !> contact breaks when the integral of that function has grown by what its life is worth.
    type :: hazard_clock_type
       !> Whether a contact goes by it
       logical :: is_used = .false.

@@ -1,12 +1,12 @@
 !> N contacts that know nothing of each other, which break by thermal activation.
 !>
 !> A contact under the force f breaks at the rate omega_0 exp((abs(f) - f_s)/f_T), and at once where
-!> abs(f) = f_s (model section 13). Contacts whose forces have one sign share a clock, the integral of
+!> abs(f) = f_s (Bell's law). Contacts whose forces have one sign share a clock, the integral of
 !> omega_0 exp(s k (X - R)/f_T) over the time, s being the sign and R a displacement near the
 !> slider's. Each draws an exponential deviate once in a life; it breaks where its clock has gone on
 !> by the deviate times exp((f_s + s k (Y - R))/f_T), a key known when it attaches. Where its force
-!> changes its sign, what is left of the deviate goes on with the other clock. Nothing is a matter of
-!> a time step.
+!> changes its sign, what is left of the deviate goes on with the other clock. There is no time
+!> step.
 module mesoslip_contacts_activated
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &
@@ -262,7 +262,7 @@ contains
       end do
    end subroutine break_activated
 
-   !> Let contacts respond to a motion up: they break at their thresholds, or forces become positive.
+   !> Let contacts respond to a motion up: they break at their thresholds, or become stretched.
    subroutine pass_up(self, pose)
       class(contact_activated_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose

@@ -1,8 +1,8 @@
 !> Clocks of thermally activated breaking: when they come to a reading during a motion.
 !>
 !> The reading is the integral of exp(slope X) over the motion, which is known as a series of the
-!> velocity. It is a Gauss rule over parts of a step so short that the rule is exact to rounding; the
-!> time of a reading is found by Halley's method.
+!> velocity. It is a Gauss rule over parts of a step so short that the rule is exact to rounding;
+!> the time of a reading is found by Halley's method.
 module mesoslip_sliders_hazard_clock
    use mesoslip_interface_law, only: clocks, hazard_clock_type
    use mesoslip_numerics_kinds, only: wp

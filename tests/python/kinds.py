@@ -39,6 +39,10 @@ RAMPS = {
         ]
     }
 }
+THERMAL = {
+    "contacts__coupling": "equal",
+    "contacts__thermal": {"rate": 1e4, "force_ratio": 0.05},
+}
 AGEING = {"contacts__coupling": "equal", "contacts__ageing": RELAX}
 
 # Jumps and ramps of a force, with slips in between.
@@ -96,6 +100,13 @@ KINDS: dict[str, dict[str, Any]] = {
     },
     "force": FORCE,
     "force, me": FORCE | {"run__engine": "me"},
+    "rigid, thermal": THERMAL,
+    "rigid, thermal, ramps": THERMAL | RAMPS,
+    "prescribed, thermal": THERMAL | {"slider": {"kind": "prescribed"}},
+    "prescribed, thermal, ramps": THERMAL | RAMPS | {"slider": {"kind": "prescribed"}},
+    "layered, thermal": THERMAL | {"slider": LAYERED | {"base": BASE}},
+    "layered, thermal, adams": THERMAL | {"slider": LAYERED | {"solver": {"method": "adams"}}},
+    "quasistatic, thermal": THERMAL | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},

@@ -33,9 +33,12 @@ def frozen_law(law: str, width: float):
     return stats.expon(1 - width, width)
 
 
-def uniforms(seed: int, realization: int, contact: int, renewal: int) -> tuple[float, float]:
-    """The two deviates of a birth, from the documented key."""
-    counter = np.array([[contact], [renewal & 0xFFFFFFFF], [renewal >> 32], [realization]])
+def uniforms(
+    seed: int, realization: int, contact: int, renewal: int, attempt: int = 0
+) -> tuple[float, float]:
+    """The two deviates of a birth, from the documented key; activation has those of attempt 1."""
+    high = renewal >> 32 | attempt << 16
+    counter = np.array([[contact], [renewal & 0xFFFFFFFF], [high], [realization]])
     key = np.array([[seed & 0xFFFFFFFF], [seed >> 32]])
     words = _core.philox(np.asfortranarray(counter), np.asfortranarray(key))[:, 0].tolist()
     return tuple(
@@ -99,6 +102,9 @@ class Contacts:
         ageing = contacts.ageing
         if ageing is not None and ageing.law == "relax" and ageing.initial_age is None:
             self.birth[:] = -np.inf
+        # Hazard so far, and that at which the contact breaks, of thermal activation.
+        self.hazard = np.zeros(count)
+        self.deviate = np.array([self.draw_deviate(contact) for contact in range(count)])
         self.bonds = np.zeros((count, count))
         if self.config.interaction is not None:
             self.bonds = bonds(self.config)
@@ -109,6 +115,24 @@ class Contacts:
         seed = self.config.run.seed
         uniform, _ = uniforms(seed, self.realization, contact, int(self.renewal[contact]))
         return self.law.isf(uniform * self.law.sf(least_configured(self.config)))
+
+    def draw_deviate(self, contact: int) -> float:
+        """The hazard at which a contact breaks by thermal activation: an exponential deviate."""
+        if self.config.contacts.thermal is None:
+            return math.inf
+        renewal = int(self.renewal[contact])
+        return -math.log(uniforms(self.config.run.seed, self.realization, contact, renewal, 1)[0])
+
+    def activate(self, x: float, step: float) -> bool:
+        """Add the hazard of a step; whether a contact is due."""
+        thermal = self.config.contacts.thermal
+        if thermal is None:
+            return False
+        force = np.abs(self.breaking_force(x)) - self.thresholds
+        scale = thermal.ratio(self.config.contacts.contact_static_force)
+        rate = thermal.rate * np.exp(force / (scale * self.config.contacts.contact_static_force))
+        self.hazard += np.where(self.pinned, rate * step, 0.0)
+        return bool(np.any(self.hazard >= self.deviate))
 
     @property
     def thresholds(self) -> np.ndarray:
@@ -163,7 +187,8 @@ class Contacts:
         force = self.breaking_force(x)
         rate = (self.breaking_force(x + step) - force) / step
         over = np.abs(force) - self.thresholds
-        return np.where(self.pinned, over / np.where(self.pinned, rate, 1.0), -np.inf)
+        excess = np.where(self.pinned, over / np.where(self.pinned, rate, 1.0), -np.inf)
+        return np.where(self.hazard >= self.deviate, np.inf, excess)
 
     def closing_rate(self) -> float:
         """Upper limit of the speed at which displacements of breaks come nearer at rest [m/s]."""
@@ -198,6 +223,8 @@ class Contacts:
                 is_backward = self.breaking_force(x)[over] < 0
                 order = over[np.lexsort((-excess[over], is_backward))]
                 self.due[over] = time + contacts.delay
+                self.hazard[over] = 0.0
+                self.deviate[over] = np.inf
                 self.order += [int(contact) for contact in order]
                 broken += self.order[-len(order) :]
                 slack = 0.0
@@ -209,6 +236,7 @@ class Contacts:
                 self.order.remove(contact)
                 self.renewal[contact] += 1
                 self.u[contact] = self.draw(contact)
+                self.deviate[contact] = self.draw_deviate(contact)
                 force = self.direction * contacts.back_force_ratio * contacts.contact_static_force
                 force += self.bonds[contact] @ self.stretch(x)
                 self.origin[contact] = x - force / (
@@ -378,9 +406,10 @@ def fixed_step(config: Config, step: float) -> tuple[np.ndarray, Contacts]:
         room -= abs(moved) + step * closing
         if v != 0:
             direction = math.copysign(1.0, v)
-        if room <= 0 or due <= (time + step) * (1 + 1e-15):
+        at = drive if prescribed else x
+        is_activated = contacts.activate(at - 0.5 * moved, step)
+        if room <= 0 or is_activated or due <= (time + step) * (1 + 1e-15):
             contacts.direction = direction
-            at = drive if prescribed else x
             contacts.act(at, v, time + step)
             stiffness, offset, drag = contacts.sums()
             room, closing = -float(np.max(contacts.excess(at))), contacts.closing_rate()

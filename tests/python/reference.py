@@ -45,17 +45,19 @@ SLIDERS: dict[str, dict[str, Any]] = {
 }
 LATTICE = {"strength": 0.1, "lattice": "triangular", "columns": 12, "rows": 10}
 RELAX = {"law": "relax", "time": 3e-3, "young_force_ratio": 0.8, "young_relative_width": 0.2}
+THERMAL = {"rate": 3e3, "force_ratio": 0.05}
 CONTACTS: dict[str, dict[str, Any]] = {
     "scaled": {"contacts__coupling": "scaled"},
     "equal": {"contacts__coupling": "equal"},
     "lattice": {"interaction": LATTICE, "output__avalanche_size": 4},
     "ageing": {"contacts__coupling": "equal", "contacts__ageing": RELAX},
+    "thermal": {"contacts__coupling": "equal", "contacts__thermal": THERMAL},
 }
 ENGINES: dict[str, dict[str, Any]] = {"eq": {}, "me": {"run__engine": "me"}}
 # Infinitely many contacts have no neighbours; without inertia their force is that of the curve.
-REFUSED = {("me", slider, "lattice") for slider in SLIDERS} | {
-    ("me", "quasistatic", contacts) for contacts in CONTACTS
-}
+REFUSED = {
+    ("me", slider, contacts) for slider in SLIDERS for contacts in ("lattice", "thermal")
+} | {("me", "quasistatic", contacts) for contacts in CONTACTS}
 
 Case = Callable[[], xr.DataTree]
 

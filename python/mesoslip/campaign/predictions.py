@@ -63,7 +63,9 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 @lru_cache(maxsize=16)
 def _critical_stiffness_ratio(config: Config) -> float:
     spring = config.spring_stiffness
-    if not 0 < spring < math.inf or config.contacts.ageing is not None:
+    contacts = config.contacts
+    depends_on_time = contacts.ageing is not None or contacts.thermal is not None
+    if not 0 < spring < math.inf or depends_on_time:
         return math.nan
     length = CURVE_LENGTH * config.contacts.break_stretch
     return ForceCurve(config.replace({"curve.length": length})).K_star[0] / spring

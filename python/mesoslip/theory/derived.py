@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import Ageing
+from mesoslip.configuration.contacts.tables import Ageing, Thermal
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.lives import scales
 from mesoslip.theory.sliders import quantities
@@ -151,7 +151,12 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
             "1",
             "stiffness of all bonds of a contact over its own, G z/k",
         )
-    yield from _lives(config) if contacts.ageing is None else _ageing(config, contacts.ageing)
+    if contacts.thermal is not None:
+        yield from _thermal(config, contacts.thermal)
+    elif contacts.ageing is not None:
+        yield from _ageing(config, contacts.ageing)
+    else:
+        yield from _lives(config)
 
 
 def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
@@ -179,6 +184,43 @@ def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
                 "N",
                 "force of stationary sliding at the drive's velocity, with delay and drag",
             )
+
+
+def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str, str]]:
+    """Thermally activated breaking, and friction at the velocity of the drive."""
+    # scipy takes long to import.
+    from mesoslip.theory.thermal import steady_force, steady_slope
+
+    contacts = config.contacts
+    ratio = thermal.ratio(contacts.contact_static_force)
+    yield "activation_force_ratio", ratio, "1", "force scale of activation over f_s, f_T/f_s"
+    idle = thermal.rate_under(contacts.back_force_ratio, contacts.contact_static_force)
+    yield (
+        "newborn_break_rate",
+        idle,
+        "1/s",
+        "rate at which a contact of mean threshold breaks that bears the back force",
+    )
+    yield (
+        "activation_velocity",
+        thermal.rate * ratio * contacts.break_stretch,
+        "m/s",
+        "omega_0 f_T/k: in much faster sliding contacts come to their thresholds",
+    )
+    speed = config.drive_speed
+    if speed > 0 and contacts.reattach and contacts.ageing is None:
+        yield (
+            "F_steady_drive",
+            steady_force(config, speed),
+            "N",
+            "force of stationary sliding at the drive's velocity, with activation, delay and drag",
+        )
+        yield (
+            "F_steady_slope",
+            steady_slope(config, speed),
+            "N",
+            "dF/d ln v of stationary sliding at the drive's velocity",
+        )
 
 
 def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, str]]:

@@ -175,7 +175,8 @@ class ForceCurve:
     Raises
     ------
     ConfigError
-        If the curve is too long for so narrow a threshold law, or contacts age.
+        If the curve is too long for so narrow a threshold law, or contacts age or break by
+        thermal activation.
     """
 
     def __init__(self, config: Config) -> None:
@@ -191,6 +192,18 @@ class ForceCurve:
                         "contacts with the configured thresholds is the one without this table, "
                         "and `mesoslip info` gives the steady force of young and old contacts and "
                         "at the velocity of the drive",
+                    )
+                ]
+            )
+        if contacts.thermal is not None:
+            raise ConfigError(
+                [
+                    Problem(
+                        "",
+                        "contacts.thermal",
+                        "has no force curve: F(X) depends on how fast the slider moves; that "
+                        "without thermal activation is the one without this table, and `mesoslip "
+                        "info` gives the steady force at the velocity of the drive",
                     )
                 ]
             )

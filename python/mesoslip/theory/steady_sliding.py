@@ -70,6 +70,12 @@ WITHOUT_AGEING = (
     "history of the motion, so that the response has no closed form; only runs show the motion"
 )
 
+WITHOUT_ACTIVATION = (
+    "has no linear stability theory here: contacts that break by thermal activation break at rates "
+    "that depend on the history of the motion; `mesoslip info` gives the steady force at the "
+    "velocity of the drive"
+)
+
 
 class Lives(NamedTuple):
     """Averages over the threshold law; stretches over f_s/k, stiffness over k, mass over m."""
@@ -134,6 +140,8 @@ class SteadySliding:
         problems = []
         if contacts.ageing is not None:
             problems.append(Problem("", "contacts.ageing", WITHOUT_AGEING))
+        if contacts.thermal is not None:
+            problems.append(Problem("", "contacts.thermal", WITHOUT_ACTIVATION))
         if not contacts.reattach:
             problems.append(
                 Problem("", "contacts.reattach", "without it there is no steady sliding", False)

@@ -198,7 +198,8 @@ class Thermal(Table):
         """f_T/f_s, from the mean threshold of a contact [N]."""
         if self.force_ratio is not None:
             return self.force_ratio
-        assert self.temperature is not None and self.activation_length is not None
+        assert self.temperature is not None
+        assert self.activation_length is not None
         return BOLTZMANN * self.temperature / self.activation_length / contact_static_force
 
     def rate_under(self, force_ratio: float, contact_static_force: float) -> float:

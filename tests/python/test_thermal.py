@@ -1,0 +1,341 @@
+"""Thermally activated breaking: closed forms, a fixed step, limits, configuration."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mesoslip
+import numpy as np
+import pytest
+from kinds import configuration
+from mesoslip import Config, ConfigError
+from mesoslip.theory.thermal import hold_force, steady_force, steady_slope
+from oracles import fixed_step, frozen_law, uniforms
+from scipy import integrate, special
+from test_events import breaks
+
+
+def unit_tables(count: int = 1000, **changes: Any) -> dict[str, Any]:
+    """A prescribed slider in units of f_s, k and ω_0; a double underscore separates tables."""
+    tables: dict[str, Any] = {
+        "run": {"engine": "eq", "duration": 1000.0},
+        "drive": {"velocity": 1e-2},
+        "slider": {"kind": "prescribed"},
+        "contacts": {
+            "count": count,
+            "static_force": float(count),
+            "stiffness": float(count),
+            "coupling": "equal",
+            "threshold": {"law": "gaussian", "relative_width": 0.05},
+            "thermal": {"rate": 1.0, "force_ratio": 0.04},
+        },
+        "output": {"interval": 1.0},
+    }
+    for path, value in changes.items():
+        *outer, key = path.split("__")
+        table = tables
+        for name in outer:
+            table = table.setdefault(name, {})
+        if value is None:
+            table.pop(key, None)
+        else:
+            table[key] = value
+    return tables
+
+
+def unit(count: int = 1000, **changes: Any) -> Config:
+    return Config.from_dict(unit_tables(count, **changes))
+
+
+@pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.3721068), (1e-2, 0.4634253)])
+def test_theory_has_the_known_steady_forces(velocity, force):
+    assert steady_force(unit(1), velocity) == pytest.approx(force, abs=5e-8)
+
+
+def test_theory_has_the_known_force_of_a_hold():
+    held = hold_force(unit(1), 1e-2, [0.0, 10.0])
+    np.testing.assert_allclose(held, [0.4634253, 0.4148345], atol=5e-8)
+
+
+@pytest.mark.parametrize("law", ["gaussian", "uniform", "lognormal", "weibull", "exponential"])
+@pytest.mark.parametrize("ratio", [0.02, 0.3])
+def test_steady_force_is_that_of_a_plain_quadrature(law, ratio):
+    width, back, delay, velocity = 0.2, 0.1, 3.0, 1e-3
+    config = unit(
+        1,
+        contacts__threshold={"law": law, "relative_width": width},
+        contacts__back_force_ratio=back,
+        contacts__delay=delay,
+        contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+    )
+    frozen = frozen_law(law, width)
+    point, weight = np.polynomial.legendre.leggauss(60)
+
+    def life(threshold: float, power: int) -> float:
+        """∫ x^power S dx of contacts of a threshold, on panels of which S is smooth."""
+        edges = np.linspace(back, threshold, 41)
+        half = np.diff(edges)[:, None] / 2
+        stretch = edges[:-1, None] + half * (1 + point)
+        grown = np.exp((stretch - threshold) / ratio) - np.exp((back - threshold) / ratio)
+        return float(np.sum(half * weight * stretch**power * np.exp(-ratio / velocity * grown)))
+
+    upper = frozen.isf(1e-14)
+    work, mean = (
+        integrate.quad(
+            lambda one, power=power: life(one, power) * frozen.pdf(one),
+            max(back, frozen.ppf(1e-14)),
+            upper,
+            epsrel=1e-6,
+            limit=200,
+        )[0]
+        / frozen.sf(back)
+        for power in (1, 0)
+    )
+    assert steady_force(config, velocity) == pytest.approx(
+        work / (mean + velocity * delay), rel=1e-5
+    )
+
+
+def test_slope_is_the_derivative_of_the_force():
+    config = unit(1, contacts__delay=3.0, contacts__back_force_ratio=0.05)
+    change = 1e-4
+    for velocity in (1e-8, 1e-3, 1.0):
+        around = [steady_force(config, velocity * math.exp(s * change)) for s in (-1, 1)]
+        slope = (around[1] - around[0]) / (2 * change)
+        assert steady_slope(config, velocity) == pytest.approx(slope, abs=1e-8)
+
+
+def test_slope_is_half_the_force_scale_where_no_contact_comes_to_its_threshold():
+    config = unit(1, contacts__threshold__relative_width=1e-3)
+    config = config.replace({"contacts.thermal.force_ratio": 0.01})
+    assert steady_slope(config, 1e-8) == pytest.approx(0.005, rel=0.02)
+
+
+def breaking_stretch(config: Config, contact: int, renewal: int, velocity: float) -> float:
+    """Stretch at which a contact breaks in sliding from zero, by its two deviates."""
+    law = frozen_law("gaussian", config.contacts.threshold.relative_width)
+    threshold = law.isf(uniforms(1, 0, contact, renewal)[0] * law.sf(0))
+    deviate = -math.log(uniforms(1, 0, contact, renewal, 1)[0])
+    ratio = config.contacts.thermal.force_ratio
+    log_reach = math.log(ratio / velocity) - threshold / ratio
+    return min(threshold, ratio * float(np.logaddexp(0.0, math.log(deviate) - log_reach)))
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 0.04, 1.0])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_breaks_come_where_their_deviates_say(ratio, direction):
+    """Exact to rounding, for many lives, far from the start and in both directions."""
+    velocity = 0.3
+    config = unit(
+        3,
+        run__duration=1000.0,
+        run__seed=1,
+        drive__velocity=direction * velocity,
+        contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+        output__interval=10.0,
+    )
+    expected = []
+    for contact in range(3):
+        place, renewal = 0.0, 0
+        while place < 1000 * velocity:
+            place += breaking_stretch(config, contact, renewal, velocity)
+            renewal += 1
+            expected.append((place / velocity, contact))
+    expected = sorted(one for one in expected if one[0] < 1000)
+    actual = breaks(config)
+    assert len(expected) == len(actual) > 800
+    assert [contact for _, contact in actual] == [contact for _, contact in expected]
+    np.testing.assert_allclose(
+        [time for time, _ in actual], [time for time, _ in expected], rtol=1e-12
+    )
+
+
+def test_mean_force_at_breaking_is_an_exponential_integral():
+    """⟨f⟩ = f_T e^z E_1(z), of thresholds that are never reached: the work of breaking is ½k⟨f²⟩;
+    the mean life is ⟨f⟩/k."""
+    velocity, ratio, count, length = 1e-6, 0.05, 2000, 12.0
+    config = unit(
+        count,
+        run__duration=length / velocity,
+        drive__velocity=velocity,
+        contacts__threshold__relative_width=1e-3,
+        contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+        output__interval=length / velocity / 10,
+    )
+    z = ratio / velocity * math.exp(-1 / ratio)
+    mean = ratio * math.exp(z) * special.exp1(z)
+    number = int(mesoslip.run(config)["breaks"].values[0])
+    expected = count * length / mean
+    # Renewals: their variance goes with that of a life, here some (f_T/f)².
+    assert abs(number - expected) < 4 * math.sqrt(expected) * ratio / mean + count
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"drive__velocity": 1e-4, "run__duration": 4e5, "output__interval": 400.0},
+        {"contacts__delay": 20.0},
+        {"contacts__back_force_ratio": 0.1},
+        {"contacts__threshold": {"law": "exponential", "relative_width": 1.0}},
+        {"contacts__threshold": {"law": "uniform", "relative_width": 0.3}},
+    ],
+    ids=["", "slow", "delay", "back force", "exponential", "uniform"],
+)
+def test_steady_sliding_has_the_force_of_the_theory(changes):
+    """After twelve stretches, within four standard errors of the means of blocks."""
+    common = {
+        "run__duration": 4000.0,
+        "contacts__threshold__relative_width": 0.3,
+        "output__interval": 4.0,
+    }
+    config = unit(2000, **common | changes)
+    force = mesoslip.run(config)["spring_force"].values[0]
+    blocks = force[-700:].reshape(7, 100).mean(axis=1)
+    error = blocks.std(ddof=1) / math.sqrt(7)
+    assert error < 5e-3 * 2000
+    expected = steady_force(config, config.drive_speed)
+    assert abs(blocks.mean() - expected) < 4 * error
+
+
+def test_a_hold_of_a_million_seconds():
+    """A contact breaks every hour or so in the end; the force falls with the logarithm."""
+    count = 4000
+    config = unit(
+        count,
+        run__duration=None,
+        drive={"stage": [{"duration": 1e3, "velocity": 1e-2}, {"duration": 1e6, "velocity": 0.0}]},
+        contacts__threshold__relative_width=0.3,
+        output__interval=100.0,
+    )
+    tree = mesoslip.run(config)
+    time = tree["time"].values - 1e3
+    for wanted in (100.0, 1e4, 1e6 - 1e3):
+        at = int(np.argmin(np.abs(time - wanted)))
+        force = tree["spring_force"].values[0, at] / count
+        expected = float(hold_force(config, 1e-2, time[at])) / count
+        assert abs(force - expected) < 4 * 0.3 / math.sqrt(count)
+    assert abs(float(tree["energy_residual"].values[0])) < 1e-12
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"contacts__thermal__force_ratio": 1e-3, "contacts__thermal__rate": 1e-6},
+        {"contacts__thermal__rate": 1e-17},
+    ],
+    ids=["force", "rate"],
+)
+@pytest.mark.parametrize("kind", ["rigid", "layered", "prescribed", "quasistatic"])
+def test_without_temperature_it_is_the_model_without(kind, changes):
+    """The same contacts break in the same order; only the last digits of times may differ."""
+    cold = configuration(kind, contacts__coupling="equal", run__duration=None)
+    warm = Config.from_dict(
+        cold.to_dict()
+        | {
+            "contacts": cold.to_dict()["contacts"]
+            | {
+                "thermal": {
+                    "rate": changes.get("contacts__thermal__rate", 1.0),
+                    "force_ratio": changes.get("contacts__thermal__force_ratio", 0.05),
+                }
+            }
+        }
+    )
+    expected, actual = breaks(cold), breaks(warm)
+    assert len(expected) == len(actual)
+    first = 300
+    assert [one for _, one in actual[:first]] == [one for _, one in expected[:first]]
+    np.testing.assert_allclose(
+        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"run__duration": 0.02, "drive__velocity": 1e-5},
+        {
+            "run__duration": None,
+            "drive": {
+                "stage": [
+                    {"duration": 0.025, "velocity": 1e-5},
+                    {"duration": 0.005, "velocity": 0.0},
+                    {"duration": 0.04, "velocity": -1e-5},
+                ]
+            },
+            "contacts__back_force_ratio": 0.0,
+        },
+    ],
+    ids=["slips", "reversal"],
+)
+def test_fixed_steps_converge_to_events(klein, changes):
+    """A rigid slider that slips, rings and turns round: forces of both signs."""
+    config = klein(
+        contacts__count=12,
+        contacts__coupling="equal",
+        contacts__threshold__relative_width=0.1,
+        contacts__thermal={"rate": 1e4, "force_ratio": 0.05},
+        output__interval=1e-4,
+        **changes,
+    )
+    expected = first_breaks(breaks(config))
+    errors = []
+    for step in (4e-6, 1e-6):
+        _, contacts = fixed_step(config, step)
+        errors.append(np.median(np.abs(first_breaks(contacts.events) - expected)))
+    assert errors[1] < 2e-6
+    assert errors[1] < 0.5 * errors[0]
+
+
+def first_breaks(events: list[tuple[float, int]]) -> np.ndarray:
+    """Times of the first breaks of each contact, (contacts, 4)."""
+    return np.array([[time for time, one in events if one == i][:4] for i in range(12)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "text"),
+    [
+        ({"contacts__thermal__temperature": "300 K"}, "thermal.temperature", "give either"),
+        ({"contacts__thermal__activation_length": 1e-9}, "thermal.activation_length", "either"),
+        ({"contacts__thermal": {"rate": 1.0}}, "thermal.force_ratio", "needed"),
+        (
+            {"contacts__thermal": {"rate": 1.0, "temperature": 300.0}},
+            "thermal.activation_length",
+            "needed",
+        ),
+        ({"contacts__thermal__force_ratio": 0.0}, "thermal.force_ratio", "greater than 0"),
+        ({"contacts__thermal__force_ratio": -0.1}, "thermal.force_ratio", "greater than 0"),
+        ({"contacts__thermal__rate": 0.0}, "thermal.rate", "greater than 0"),
+        ({"contacts__thermal__rate": 1e20}, "thermal.rate", "break at once"),
+        (
+            {"contacts__thermal__force_ratio": 1e6, "contacts__thermal__rate": 1e9},
+            "rate",
+            "at once",
+        ),
+        ({"contacts__coupling": "scaled"}, "contacts.coupling", '"equal"'),
+    ],
+)
+def test_what_makes_no_sense_is_one_clear_message(changes, key, text):
+    with pytest.raises(ConfigError) as error:
+        unit(10, **changes)
+    (problem,) = error.value.problems
+    assert problem.key.endswith(key)
+    assert text in problem.message
+
+
+def test_interaction_is_refused():
+    tables = unit_tables(16, contacts__area=1e-10)
+    lattice = {"lattice": "square", "columns": 4, "rows": 4}
+    Config.from_dict(tables | {"interaction": lattice | {"strength": 0.0}})
+    with pytest.raises(ConfigError, match="do not share a clock"):
+        Config.from_dict(tables | {"interaction": lattice | {"strength": 0.3}})
+
+
+def test_temperature_and_length_are_a_force():
+    config = unit(
+        10, contacts__thermal={"rate": 1.0, "temperature": "300 K", "activation_length": "0.3 nm"}
+    )
+    thermal = config.contacts.thermal
+    assert thermal.ratio(1e-9) == pytest.approx(1.380649e-23 * 300 / 0.3e-9 / 1e-9, rel=1e-14)

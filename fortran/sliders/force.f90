@@ -11,6 +11,7 @@ module mesoslip_sliders_force
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, slider_type
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, second_integral
    use mesoslip_step_filter, only: step_filter_type
    implicit none
@@ -162,7 +163,8 @@ contains
       !> Duration [s]
       real(wp), intent(out) :: step
 
-      real(wp) :: velocity, gap, target
+      real(wp) :: velocity, gap, target, longest
+      logical :: crosses, is_due
 
       velocity = creep_velocity(self)
       self%velocity = velocity
@@ -171,14 +173,14 @@ contains
       step = window%end_time - self%time
       target = merge(window%upper, window%lower, velocity > 0.0_wp)
       gap = abs(target - self%displacement)
-      if (abs(velocity) * step >= gap .and. abs(velocity) > 0.0_wp) then
-         step = gap / abs(velocity)
-         self%time = self%time + step
-         self%displacement = target
-      else
-         self%time = window%end_time
-         self%displacement = self%displacement + velocity * step
-      end if
+      longest = step
+      crosses = abs(velocity) * step >= gap .and. abs(velocity) > 0.0_wp
+      if (crosses) step = gap / abs(velocity)
+      is_due = .false.
+      if (self%has_clocks) call advance_clocks(self%clock, self%series, 1, step, is_due)
+      crosses = crosses .and. .not. is_due
+      self%displacement = merge(target, self%displacement + velocity * step, crosses)
+      self%time = merge(self%time + step, window%end_time, crosses .or. step < longest)
    end subroutine glide
 
    !> Move as far as a series reaches, or to the first end of the window or turning point before.
@@ -189,7 +191,7 @@ contains
       real(wp), intent(out) :: step
 
       real(wp) :: rate, change, target, direction
-      logical :: ends, crosses, turns
+      logical :: ends, crosses, turns, is_due
       integer :: term
 
       rate = sqrt(abs(self%law%stiffness) * self%inverse_mass) &
@@ -205,7 +207,11 @@ contains
       associate (longest => window%end_time - self%time)
          call first_end(self%series, terms, window%upper - self%displacement, &
             & window%lower - self%displacement, change, step, crosses, turns, direction)
-         ends = ends .and. .not. (crosses .or. turns) .and. step >= longest
+         is_due = .false.
+         if (self%has_clocks) call advance_clocks(self%clock, self%series, terms, step, is_due)
+         crosses = crosses .and. .not. is_due
+         turns = turns .and. .not. is_due
+         ends = ends .and. .not. (crosses .or. turns .or. is_due) .and. step >= longest
       end associate
       target = merge(window%upper, window%lower, direction > 0.0_wp)
       if (crosses) then

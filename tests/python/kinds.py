@@ -100,6 +100,7 @@ KINDS: dict[str, dict[str, Any]] = {
     },
     "force": FORCE,
     "force, me": FORCE | {"run__engine": "me"},
+    "force, thermal": FORCE | THERMAL,
     "rigid, thermal": THERMAL,
     "rigid, thermal, ramps": THERMAL | RAMPS,
     "prescribed, thermal": THERMAL | {"slider": {"kind": "prescribed"}},

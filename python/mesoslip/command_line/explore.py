@@ -41,7 +41,9 @@ def explore(
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser")
     ] = True,
 ) -> None:
-    """Open an interactive page: change parameters and see the motion; Ctrl-C ends it.
+    """Open an interactive page with knobs and the motion.
+
+    Ctrl-C ends the program.
 
     The page is served on the loopback address of this machine only, and loads nothing from
     elsewhere.

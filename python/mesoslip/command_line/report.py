@@ -19,7 +19,7 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Write a self-contained page about an output, or about several of one command."""
+    """Write a self-contained page about outputs of one command."""
     from mesoslip.configuration.reading import is_file
     from mesoslip.output import targets
     from mesoslip.reports import report as reports

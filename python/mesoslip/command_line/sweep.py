@@ -49,7 +49,9 @@ def sweep(
     pool: PoolOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress")] = False,
 ) -> None:
-    """Run a configuration over a range of parameters, and write the measures of all runs.
+    """Run a configuration over ranges of parameters.
+
+    The measures of all runs are written as one dataset.
 
     Each finished point is stored beside the output, in NAME.points. Called again, the command
     computes the missing points. The exit status is 1 if points failed.

@@ -36,7 +36,7 @@ MAX_WORK = 400_000
 
 
 def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
-    """Show derived quantities."""
+    """Print derived quantities, and the predicted stability."""
     from mesoslip.theory.derived import derived, verdict
 
     checked = load(config, changes)
@@ -60,7 +60,10 @@ def curve(
     changes: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Force curve of the master equation, and its elastic instability."""
+    """Compute the force curve F(X), its instability, and K*.
+
+    This is the master equation (N to infinity) under a slider that moves slowly.
+    """
     from mesoslip.output import targets, writing
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
     from mesoslip.theory.steady_sliding import steady_sliding
@@ -100,7 +103,10 @@ def onset(
     changes: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Onset of slip, contacts breaking one after another (S46) or a film melting at once (S47)."""
+    """Compute the start of a slip by equations S46 and S47.
+
+    S46: contacts break one after another. S47: the whole film melts at once.
+    """
     from mesoslip.output import targets, writing
     from mesoslip.theory import slip_onset
 

@@ -218,7 +218,7 @@ class LocalPool(Pool):
                 process = None
                 self._deaths += 1
                 if self._deaths > MAX_ATTEMPTS * self._workers:
-                    raise PoolError(f"no worker computes anything; the last one {ending}") from None
+                    raise PoolError(f"all workers failed; the last one {ending}") from None
                 continue
             self._deaths = 0
             return process, succeeded, result

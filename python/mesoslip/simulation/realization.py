@@ -429,7 +429,9 @@ class Realization:
             If the run is over and the memory of the kernel was given back.
         """
         if self.ending and self._kernel is None:
-            raise RunError(f"realization {self.number}: the run is over, and its contacts are gone")
+            raise RunError(
+                f"realization {self.number}: the run is over; its contacts are no longer in memory"
+            )
         return dict(
             zip(CONTACT_COLUMNS, self._open().contacts(self.config.contacts.count), strict=True)
         )

@@ -131,7 +131,7 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "threshold_acceptance",
         contacts.threshold.probability_above(contacts.min_threshold),
         "1",
-        "probability that a threshold drawn is above the back force"
+        "probability that a drawn threshold exceeds the back force"
         + (", young and old" if contacts.ageing is not None else ""),
     )
     yield (
@@ -240,7 +240,7 @@ def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, s
         "young_relative_width",
         float((strongest - weakest) / (2 * mean)),
         "1",
-        "relative standard deviation of the thresholds at attachment, before any is rejected",
+        "relative standard deviation of the thresholds at attachment, before draws are rejected",
     )
     yield (
         "ageing_velocity",
@@ -254,11 +254,16 @@ def _ageing(config: Config, ageing: Ageing) -> Iterator[tuple[str, float, str, s
             "growth_per_decade",
             ageing.growth * math.log(10),
             "1",
-            "growth of thresholds for each decade of their age, over that at birth",
+            "growth of thresholds per decade of age, relative to the threshold at birth",
         )
     else:
         life = mean_life(config, 0.0)
-        yield "mean_life", life, "m", "mean displacement from attaching to breaking, of the old"
+        yield (
+            "mean_life",
+            life,
+            "m",
+            "mean displacement from attaching to breaking, of old contacts",
+        )
     if not contacts.reattach:
         return
     if ageing.growth is None:

@@ -36,10 +36,15 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "Group slips",
         variables.SLIPS,
-        "Dimension `slip`. A slip is an interval in which contacts break and the slider moves by "
-        "more than it rings.",
+        "Dimension `slip`. A slip is an interval in which contacts break and the slider moves "
+        "farther than it rings.",
     ),
     ("Group stages", variables.STAGES, "Dimension `stage`: forces of each stage of the drive."),
+    (
+        "Group stages of a measured trace",
+        variables.MEASURED_STAGES,
+        "Dimension `stage`: stages that were found in the recorded load point.",
+    ),
     (
         "Group slip_traces",
         variables.SLIP_TRACES,

@@ -285,7 +285,7 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     assert "mesoslip trace" in command("slips", table)[2]
     assert command("run", short, "-o", output)[0] == 0
     _, _, refused = command("trace", output, "-o", tmp_path / "other.nc")
-    assert "is an output, not a table of measurements" in refused
+    assert "is an output of mesoslip, not a file of a measurement" in refused
     # Whose result is lost is printed.
     printed = command("run", short, "-o", output, "--set", "run.seed=7")[2]
     assert "the output of another configuration will be replaced" in printed

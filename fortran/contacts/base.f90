@@ -31,7 +31,7 @@ module mesoslip_contacts_base
    character(len=*), parameter :: snapshot_columns(*) = [character(len=name_length) :: &
       & "stretch", "load", "generation"]
    integer, parameter :: snapshot_length = size(snapshot_columns)
-   !> Numbers that tell what a contact is: origin [m], stiffness [N/m], 0 while it is detached,
+   !> Columns of a contact record: origin [m], stiffness [N/m], 0 while it is detached,
    !> breaking stretch [m], number of renewals
    character(len=*), parameter :: contact_columns(*) = [character(len=name_length) :: &
       & "origin", "stiffness", "break_stretch", "renewals"]
@@ -99,7 +99,7 @@ module mesoslip_contacts_base
       procedure(elastic_energy_interface), deferred :: elastic_energy
       !> Put the state into an archive or take it out
       procedure(exchange_interface), deferred :: exchange
-      !> Make anew what is derived from the state, after it was taken from an archive
+      !> Recompute derived quantities from the state, after it was taken from an archive
       procedure(rebuild_interface), deferred :: rebuild
       !> Extent of the avalanche that is over; it is forgotten
       procedure :: take_extent
@@ -190,7 +190,7 @@ module mesoslip_contacts_base
          type(archive_type), intent(inout) :: archive
       end subroutine exchange_interface
 
-      !> Make anew what is derived from the state.
+      !> Recompute derived quantities from the state.
       subroutine rebuild_interface(self, displacement)
          import :: contacts_type, wp
          implicit none

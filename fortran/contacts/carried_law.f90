@@ -15,12 +15,12 @@ module mesoslip_contacts_carried_law
    public :: carried_law_type, new_carried_law
 
    !> Iterations of Newton's method and bisection, more than enough for one of them alone
-   integer, parameter :: most_iterations = 200
+   integer, parameter :: max_iterations = 200
    !> Relative change of a threshold below which a solution by interpolation is good enough
    real(wp), parameter :: enough = 1.0e-8_wp
-   !> Newton's steps from there, by moments that are exact to rounding, and the longest, relative
+   !> Newton's steps from there, by moments that are exact to rounding, and the maximum relative change in one
    integer, parameter :: exact_steps = 2
-   real(wp), parameter :: farthest = 1.0e-3_wp
+   real(wp), parameter :: max_change = 1.0e-3_wp
 
    !> Thresholds weighted by the distance to breaking.
    type :: carried_law_type
@@ -77,10 +77,10 @@ contains
       wanted = probability * self%mean
       ! Contacts of a low threshold break soon: there are fewer of them than among newborns.
       least = self%law%quantile(probability)
-      upper = self%moments%greatest
+      upper = self%moments%max_threshold
       lower = min(least, upper)
       threshold = lower
-      do iteration = 1, most_iterations
+      do iteration = 1, max_iterations
          call self%moments%interpolate(threshold, moment)
          excess = distance_of(self, moment) - wanted
          if (excess > 0.0_wp) then
@@ -104,9 +104,9 @@ contains
          slope = self%slope(threshold)
          if (.not. slope > 0.0_wp) exit
          step = (distance_of(self, self%moments%above(threshold)) - wanted) / slope
-         threshold = threshold + min(farthest * threshold, max(-farthest * threshold, step))
+         threshold = threshold + min(max_change * threshold, max(-max_change * threshold, step))
       end do
-      threshold = max(min(threshold, self%moments%greatest), least)
+      threshold = max(min(threshold, self%moments%max_threshold), least)
    end function quantile
 
    !> Density of the weighted law times the mean distance.

@@ -4,8 +4,8 @@
 !> x_j = 0 for a detached one. While neighbours stay as they are it grows with the displacement at
 !> the rate k_i + G n_i, n_i of them being detached: breaks are events in the displacement, which
 !> move when a neighbour breaks or attaches. Each contact keeps what its neighbours are to it, a sum
-!> that changes by one of them at a time, made anew when it attaches. The order of breaking is kept
-!> for one direction of motion; what breaks on the way back is bounded, and the order made anew when
+!> that changes by one of them at a time, recomputed when it attaches. The order of breaking is kept
+!> for one direction of motion; what breaks on the way back is bounded, and the order rebuilt when
 !> the slider comes to the bound.
 module mesoslip_contacts_lattice
    use mesoslip_numerics_kinds, only: wp

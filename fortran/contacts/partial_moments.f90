@@ -22,7 +22,7 @@ module mesoslip_contacts_partial_moments
    !> Partial moments of some orders.
    type :: partial_moments_type
       !> Thresholds at or below do not occur, nor do those above
-      real(wp) :: least = 0.0_wp, greatest = 0.0_wp
+      real(wp) :: min_threshold = 0.0_wp, max_threshold = 0.0_wp
       class(threshold_law_type), allocatable, private :: law
       !> In which coordinate the table is uniform
       integer, private :: coordinates = linear
@@ -58,15 +58,15 @@ contains
 
       allocate (self%law, source=law)
       self%exponent = exponent
-      self%least = law%quantile(1.0_wp - epsilon(1.0_wp))
-      self%greatest = law%quantile(outside)
+      self%min_threshold = law%quantile(1.0_wp - epsilon(1.0_wp))
+      self%max_threshold = law%quantile(outside)
       if (law%is_logarithmic) then
          self%coordinates = logarithmic
-      else if (self%least < close) then
+      else if (self%min_threshold < close) then
          self%coordinates = root
       end if
-      self%first = self%coordinate(self%least)
-      self%step = (self%coordinate(self%greatest) - self%first) / cells
+      self%first = self%coordinate(self%min_threshold)
+      self%step = (self%coordinate(self%max_threshold) - self%first) / cells
       call gauss_legendre(self%point, self%weight)
 
       allocate (self%table(size(exponent), 2, cells + 1))
@@ -132,12 +132,12 @@ contains
       real(wp) :: place, knot, length
       integer :: cell, node
 
-      if (threshold >= self%greatest) then
+      if (threshold >= self%max_threshold) then
          moment = 0.0_wp
          return
       end if
       place = 0.0_wp
-      if (threshold > self%least) place = (self%coordinate(threshold) - self%first) / self%step
+      if (threshold > self%min_threshold) place = (self%coordinate(threshold) - self%first) / self%step
       cell = min(int(place), cells - 1) + 1
       moment = self%table(:, 1, cell + 1)
       length = max(0.0_wp, cell - place) * self%step
@@ -160,9 +160,9 @@ contains
       real(wp) :: place
       integer :: cell
 
-      if (threshold <= self%least) then
+      if (threshold <= self%min_threshold) then
          moment = self%table(:, 1, 1)
-      else if (threshold >= self%greatest) then
+      else if (threshold >= self%max_threshold) then
          moment = 0.0_wp
       else
          place = (self%coordinate(threshold) - self%first) / self%step

@@ -15,7 +15,7 @@ contains
       !> Weights, shape of the points
       real(wp), intent(out) :: weight(:)
 
-      integer, parameter :: most_iterations = 20
+      integer, parameter :: max_iterations = 20
       real(wp), parameter :: pi = acos(-1.0_wp)
       real(wp) :: x, last, before, next, slope, change
       integer :: order, root, degree, iteration
@@ -24,7 +24,7 @@ contains
       do root = 1, order
          x = -cos(pi * (root - 0.25_wp) / (order + 0.5_wp))
          slope = 1.0_wp
-         do iteration = 1, most_iterations
+         do iteration = 1, max_iterations
             before = 0.0_wp
             last = 1.0_wp
             do degree = 1, order

@@ -114,12 +114,12 @@ contains
       call gauss_legendre(self%point, self%weight)
 
       self%sharp_shortest = max(0.0_wp, &
-         & breaking_distance(coupling, back_force, self%moments%least))
-      self%sharp_longest = breaking_distance(coupling, back_force, self%moments%greatest)
+         & breaking_distance(coupling, back_force, self%moments%min_threshold))
+      self%sharp_longest = breaking_distance(coupling, back_force, self%moments%max_threshold)
       self%shortest = max(0.0_wp, self%sharp_shortest - reach * newborn_width)
       self%longest = self%sharp_longest + reach * newborn_width
-      self%first_shortest = breaking_distance(coupling, 0.0_wp, self%moments%least)
-      self%first_longest = breaking_distance(coupling, 0.0_wp, self%moments%greatest)
+      self%first_shortest = breaking_distance(coupling, 0.0_wp, self%moments%min_threshold)
+      self%first_longest = breaking_distance(coupling, 0.0_wp, self%moments%max_threshold)
       if (newborn_width > 0.0_wp) then
          state = averaged(self, sharp_state, 0.0_wp)
          self%acceptance = state(1)
@@ -333,7 +333,7 @@ contains
       if (self%initial == initial_steady) back = self%back_force
       threshold = broken_threshold(self%coupling, back, max(0.0_wp, displacement))
       if (self%initial == initial_relaxed) then
-         if (threshold < self%moments%least .or. threshold > self%moments%greatest) return
+         if (threshold < self%moments%min_threshold .or. threshold > self%moments%max_threshold) return
          density = self%law%density(threshold) &
             & * broken_threshold_slope(self%coupling, 0.0_wp, displacement)
          rates = density * [1.0_wp, threshold, stiffness_of(self%coupling, threshold)]

@@ -66,7 +66,7 @@ module mesoslip_contacts_individual_base
       procedure, non_overridable :: detach
       !> Attach all contacts that are due
       procedure, non_overridable :: attach_due
-      !> Order all contacts anew, from the records
+      !> Order all contacts again, from the records
       procedure, non_overridable :: order_anew
       !> The greatest of the coordinates at which contacts break on the way back
       procedure, non_overridable :: max_behind
@@ -355,7 +355,7 @@ contains
       end do
    end subroutine attach_listed
 
-   !> Order all contacts anew, from the records.
+   !> Order all contacts again, from the records.
    subroutine order_anew(self, displacement)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -458,7 +458,7 @@ contains
       end do
    end subroutine snapshot_individual
 
-   !> Sum stiffness and offset anew, from the records.
+   !> Recompute stiffness and offset from the records.
    subroutine sum_totals(self)
       class(individual_contacts_type), intent(inout) :: self
 

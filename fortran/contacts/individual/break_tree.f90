@@ -35,7 +35,7 @@ module mesoslip_contacts_individual_break_tree
       procedure, non_overridable :: clear
       !> Put a contact in, to be followed by arrange
       procedure, non_overridable :: put
-      !> Make the tree anew from its contacts
+      !> Rebuild the tree from its contacts
       procedure, non_overridable :: arrange
       !> Coordinate at which the first contact breaks
       procedure, non_overridable :: first
@@ -178,7 +178,7 @@ contains
       self%minimum(contact) = coordinate
    end subroutine put
 
-   !> Make the tree anew from its contacts.
+   !> Rebuild the tree from its contacts.
    pure subroutine arrange(self)
       !> The tree
       class(break_tree_type), intent(inout) :: self

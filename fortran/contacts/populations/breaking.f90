@@ -150,12 +150,12 @@ contains
       !> See try
       real(wp), intent(out) :: late, onset
 
-      real(wp) :: loss(moments_length), distance, force, most_breaks, edge, breaks, mass, work, drop
+      real(wp) :: loss(moments_length), distance, force, max_breaks, edge, breaks, mass, work, drop
       integer :: row, one
 
       associate (trial => self%trial)
          late = 0.0_wp
-         most_breaks = 0.0_wp
+         max_breaks = 0.0_wp
          onset = trial%end
          edge = trial%direction * before%displacement + tiny_gap * self%step
          breaks = 0.0_wp
@@ -178,8 +178,8 @@ contains
                & - loss(lost))
             if (trial%direction * self%population(row, column) > edge) then
                late = late + loss(number)
-               if (loss(number) > most_breaks) then
-                  most_breaks = loss(number)
+               if (loss(number) > max_breaks) then
+                  max_breaks = loss(number)
                   onset = self%population(row, column)
                end if
             end if

@@ -75,8 +75,8 @@ contains
 
       self%ages = .true.
       self%ageing = ageing
-      self%some_fall = ageing%falls(self%moments(1)%least, 1.0_wp) &
-         & .or. ageing%falls(self%moments(1)%greatest, 1.0_wp)
+      self%some_fall = ageing%falls(self%moments(1)%min_threshold, 1.0_wp) &
+         & .or. ageing%falls(self%moments(1)%max_threshold, 1.0_wp)
    end subroutine set_ageing
 
    !> Prepare the populations for the start of a run.
@@ -95,7 +95,7 @@ contains
          else
             back = 0.0_wp
             if (state == initial_steady) back = parameters%back_force_ratio
-            max_distance = breaking_distance(parameters%coupling, back, moments%greatest)
+            max_distance = breaking_distance(parameters%coupling, back, moments%max_threshold)
             edge = 0.0_wp
             even = 1.0_wp
             if (parameters%law%width > max_spread) even = min_even

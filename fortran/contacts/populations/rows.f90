@@ -83,9 +83,9 @@ module mesoslip_contacts_populations_rows
       procedure, non_overridable :: add
       !> Displacement at which contacts of a population break next in a direction
       procedure, non_overridable :: next_break
-      !> Find anew where populations break next, as their thresholds have changed
+      !> Find again where populations break next, as their thresholds have changed
       procedure, non_overridable :: update_thresholds
-      !> Sum stiffness and offset anew, and find what breaks next
+      !> Recompute stiffness and offset, and find what breaks next
       procedure, non_overridable :: sum_forces
       !> Move the origin of displacements
       procedure, non_overridable :: shift_origin
@@ -179,7 +179,7 @@ contains
          & direction * self%population(row, column_force), threshold)
    end function next_break
 
-   !> Find anew where populations break next, as their thresholds have changed.
+   !> Find again where populations break next, as their thresholds have changed.
    subroutine update_thresholds(self, displacement, time)
       !> The populations
       class(population_rows_type), intent(inout) :: self
@@ -205,7 +205,7 @@ contains
       self%behind = maxval(self%population(:self%count, column_behind))
    end subroutine update_thresholds
 
-   !> Sum stiffness and offset anew, and find what breaks next.
+   !> Recompute stiffness and offset, and find what breaks next.
    subroutine sum_forces(self)
       class(population_rows_type), intent(inout) :: self
 

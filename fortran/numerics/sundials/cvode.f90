@@ -41,7 +41,7 @@ module mesoslip_numerics_sundials_cvode
       procedure, non_overridable :: is_open
       !> Give the Jacobian as a function, for method_bdf
       procedure, non_overridable :: set_jacobian
-      !> Start anew from the state in the caller's array
+      !> Restart from the state in the caller's array
       procedure, non_overridable :: restart
       !> Make one step, not beyond a time
       procedure, non_overridable :: step
@@ -78,7 +78,7 @@ contains
       !> Set if it fails; the integrator is then closed
       type(error_type), allocatable, intent(out) :: error
 
-      integer(c_long), parameter :: most_steps = 1000000_c_long
+      integer(c_long), parameter :: max_steps = 1000000_c_long
       integer(sunindextype) :: length, band
 
       length = size(state, kind=sunindextype)
@@ -99,7 +99,7 @@ contains
       if (allocated(error)) return
       call self%expect(CVodeSStolerances(self%memory, relative, absolute), "tolerances", error)
       if (allocated(error)) return
-      call self%expect(CVodeSetMaxNumSteps(self%memory, most_steps), "steps", error)
+      call self%expect(CVodeSetMaxNumSteps(self%memory, max_steps), "steps", error)
       if (allocated(error)) return
       if (method == method_adams) then
          self%fixed_point = SUNNonlinSol_FixedPoint(self%state, 0_c_int, self%context)
@@ -134,7 +134,7 @@ contains
       call self%expect(CVodeSetJacFn(self%memory, jacobian), "Jacobian", error)
    end subroutine set_jacobian
 
-   !> Start anew from the state in the caller's array.
+   !> Restart from the state in the caller's array.
    subroutine restart(self, time, error)
       !> The integrator
       class(cvode_type), intent(inout) :: self

@@ -250,7 +250,7 @@ module mesoslip_numerics_sundials_library
          integer(c_int) :: status
       end function CVodeInit
 
-      !> Start anew.
+      !> Restart.
       function CVodeReInit(memory, time, state) bind(c, name="CVodeReInit") result(status)
          import :: c_double, c_int, c_ptr
          implicit none

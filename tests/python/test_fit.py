@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from types import SimpleNamespace
 
 import mesoslip
@@ -11,6 +12,7 @@ import pytest
 from conftest import klein_tables
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
+from mesoslip.execution.store import Store
 from mesoslip.inference import checks, likelihood
 from mesoslip.inference.fit import prepare
 from mesoslip.inference.plan import Plan
@@ -332,6 +334,29 @@ def test_the_same_seed_gives_the_same_posterior(small_fit):
     assert len(again) < 0.85 * len(again + done)
     for key in FREE:
         np.testing.assert_array_equal(resumed["posterior"][key], posterior["posterior"][key])
+
+
+@pytest.mark.parametrize("damage", ["brackets", "digits", "number", "none", "cut"])
+def test_damaged_simulations_are_made_again(damage, small_fit, tmp_path):
+    """Once more to the bit; those of the fit that are whole are read."""
+    _, _, folder = small_fit
+    shutil.copytree(folder / "kept", tmp_path / "kept")
+    path = tmp_path / "kept" / "00000007.json"
+    body = json.loads(path.read_bytes())
+    point = np.array([float(one) for one in body["parameters"]])
+    with Store(tmp_path / "kept", "simulations") as store:
+        simulations = Simulations(None, expected=1, store=store, executor=1)
+        assert simulations._read(7, point) is not None
+        body.pop("checksum")
+        if damage == "brackets":
+            path.write_bytes(b"[" * 200_000)
+        elif damage == "cut":
+            path.write_bytes(path.read_bytes()[:100])
+        else:
+            changed = {"digits": [10**400], "number": 7, "none": None}[damage]
+            store.write("00000007", body | {"summaries": changed})
+            assert store.read("00000007") is not None
+        assert simulations._read(7, point) is None
 
 
 def test_simulations_of_another_fit_are_refused(small_fit):

@@ -13,6 +13,7 @@ from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.output.kinds import KINDS as OUTPUTS
+from mesoslip.output.writing import write
 from mesoslip.plots import lines
 from mesoslip.plots.extent import MAX_PARTS, Extent
 from mesoslip.plots.views import VIEWS, names_of_views
@@ -52,6 +53,15 @@ def test_pictures_of_the_theory(klein):
         mesoslip.plot(tree, ax=axes)
         assert axes.lines
         assert isinstance(mesoslip.plot(tree), Figure)
+
+
+def test_a_title_that_no_font_has_is_drawn_without_warnings(old, command, tmp_path):
+    tree = old.copy()
+    tree.attrs["title"] = "\u65e5\u672c \U0001f600"
+    write(tree, tmp_path / "old.nc")
+    path = tmp_path / "old.png"
+    status, _, printed = command("plot", tmp_path / "old.nc", "-o", path)
+    assert (status, printed) == (0, f"{path}\n")
 
 
 def test_an_unknown_view_is_an_error(old):

@@ -427,6 +427,33 @@ def test_damaged_points_count_as_missing(damage, tmp_path):
     assert_same_numbers(first.dataset, again.dataset)
 
 
+@pytest.mark.parametrize(
+    "content",
+    [b"[" * 200_000, b'{"checksum": ' + b"9" * 5000 + b"}", b'{"checksum": 1, "name": []}', b"[]"],
+    ids=["brackets", "digits", "no name", "list"],
+)
+def test_a_point_that_is_none_counts_as_missing(content, tmp_path):
+    plan = Plan.from_dict(tables())
+    name = runner.task_of(plan, runner.groups(plan)[0], 0).name
+    with Store(tmp_path, "points") as store:
+        (tmp_path / f"{name}.json").write_bytes(content)
+        assert store.names() == {name}
+        assert runner.stored_measures(store, plan, name) is None
+
+
+@pytest.mark.parametrize(
+    "measures", [{"breaks": 10**400}, {"breaks": [1]}, {"breaks": None}, [], 7]
+)
+def test_measures_that_are_no_numbers_count_as_missing(measures, tmp_path):
+    """Though the point is whole, with a checksum."""
+    plan = Plan.from_dict(tables())
+    name = runner.task_of(plan, runner.groups(plan)[0], 0).name
+    with Store(tmp_path, "points") as store:
+        store.write(name, {"measures": measures})
+        assert store.read(name) is not None
+        assert runner.stored_measures(store, plan, name) is None
+
+
 def test_numbers_come_back_from_the_store_to_the_bit(tmp_path):
     values = {"tenth": 0.1, "least": 5e-324, "none": float("nan"), "much": float("inf")}
     plan = Plan.from_dict(tables())

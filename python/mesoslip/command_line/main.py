@@ -6,6 +6,7 @@ import io
 import os
 import shlex
 import sys
+import warnings
 from contextlib import suppress
 from typing import Annotated
 
@@ -83,6 +84,8 @@ for _command in COMMANDS:
 def main() -> None:
     """Run the command line and exit."""
     _open_streams()
+    # A character that no font has is drawn as a box, which is enough of a warning.
+    warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
     typed = shlex.join(["mesoslip", *sys.argv[1:]])
     # Outputs contain the command line, and take UTF-8 only.
     token = COMMAND_LINE.set(typed.encode("utf-8", "backslashreplace").decode())

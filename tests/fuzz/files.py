@@ -123,32 +123,41 @@ def neighbours(name: str, folder: Path) -> Report:
     return report
 
 
-# Kinds of run whose checkpoints are damaged, and cases that together change each byte of one.
-BIT_KINDS = ("rigid", "rigid, lattice", "rigid, me", "quasistatic, lattice")
-BIT_CASES = 25
+# Kinds of run whose checkpoints are damaged; parts that together are each byte of one, flips in a
+# case of another, and cases.
+BIT_KINDS = ("rigid", "rigid, lattice", "rigid, me", "quasistatic, lattice", "rigid, ageing, ramps")
+BIT_PARTS = 25
+BIT_FLIPS = 100
+BIT_CASES = BIT_PARTS + 4 * len(BIT_KINDS)
 
 
 def bits(name: str, folder: Path) -> Report:
     """Each byte of a small checkpoint, a part in each case: the run is the same, or refused.
 
-    `BIT_CASES` cases for each kind, first with one state, then with the one before as well.
+    The first cases change each byte for the first kind; then come bytes at random for all kinds,
+    with one state or with the one before as well.
     """
     limit_memory()
     random = Random(name)
-    group, part = divmod(int(name.rpartition(":")[2]), BIT_CASES)
-    kind = BIT_KINDS[group % len(BIT_KINDS)]
+    part, kind, states = int(name.rpartition(":")[2]), BIT_KINDS[0], 1
+    if part >= BIT_PARTS:
+        more = part - BIT_PARTS
+        kind, states = BIT_KINDS[more % len(BIT_KINDS)], 1 + more // len(BIT_KINDS) % 2
     changes = FAST | KINDS[kind] | {"title": kind}
     if "interaction" not in changes:
         changes["contacts__count"] = 3
     config = Config.from_dict(klein_tables(**changes))
     place = checkpoint_folder(folder / "out.nc")
-    for _ in range(1 if group < len(BIT_KINDS) else 2):
+    for _ in range(states):
         advanced(config, place, 60, [])
     expected = _numbers(run_realizations(config, executor=1))
     kept = {path: path.read_bytes() for path in sorted(place.iterdir())}
     all_bytes = [(path, at) for path, data in kept.items() for at in range(len(data))]
     report = Report("finished")
-    for path, at in all_bytes[part::BIT_CASES]:
+    chosen = all_bytes[part::BIT_PARTS]
+    if part >= BIT_PARTS:
+        chosen = random.sample(all_bytes, min(BIT_FLIPS, len(all_bytes)))
+    for path, at in chosen:
         for one in folder.iterdir():
             shutil.rmtree(one)
         place.mkdir()

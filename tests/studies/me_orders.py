@@ -177,6 +177,11 @@ def main() -> None:
         f"{len(orders)} orders: median {np.median(orders):.2f}, least {np.min(orders):.2f}, "
         f"{np.count_nonzero(orders < 1.5)} below 1.5"
     )
+    low = [one for one in outcomes if one.order < 1.5]
+    for name in ("force_error", "slip_time_error"):
+        ratio = ratios(low, name)
+        within = np.count_nonzero((ratio > 0.2) & (ratio < 5))
+        print(f"of order below 1.5: {name}: {within} of {len(ratio)} within a factor of 5")
     for name in ("force_error", "slip_time_error"):
         ratio = ratios(outcomes, name)
         within = np.count_nonzero((ratio > 0.2) & (ratio < 5))

@@ -22,6 +22,7 @@ breaks of contacts, and the velocity of the slider.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -435,19 +436,16 @@ def _rising_rate(trace: _Trace, tops: Samples, bottoms: Samples) -> float:
 
 
 def _decaying(start: Array, end: Array, drop: Array, period: float) -> NDArray[np.bool_]:
-    """Falls of oscillations that only decay: those that follow each other within a period."""
+    """Falls of oscillations that only decay, until the trace is quiet."""
     found = np.zeros(len(drop), dtype=bool)
-    first = 0
-    for after in range(1, len(drop) + 1):
-        if (
-            after < len(drop)
-            and start[after] - end[after - 1] <= MAX_RISE * period / 2
-            and drop[after] < drop[after - 1]
-        ):
-            continue
-        if after - first >= MIN_DECAYING and drop[after - 1] < MAX_DECAY * drop[first]:
-            found[first:after] = True
-        first = after
+    gaps = np.flatnonzero(start[1:] - end[:-1] > MAX_RISE * period / 2) + 1
+    for first, after in itertools.pairwise([0, *gaps.tolist(), len(drop)]):
+        one = drop[first:after]
+        found[first:after] = (
+            len(one) >= MIN_DECAYING
+            and bool(np.all(np.diff(one) < 0))
+            and one[-1] < MAX_DECAY * one[0]
+        )
     return found
 
 

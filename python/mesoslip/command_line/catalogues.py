@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -29,7 +29,15 @@ COLUMNS = {
     "peak_velocity": ("peak velocity", "m/s"),
     "contacts_broken": ("breaks", "1"),
     "waiting_time": ("waiting time", "s"),
+    "stick_duration": ("stick duration", "s"),
+    "loading_rate": ("loading rate", "N/s"),
+    "loading_stiffness": ("loading stiffness", "N/m"),
+    "creep_displacement": ("creep before", "m"),
+    "creep_share": ("creep share", "1"),
+    "peak_fall_rate": ("peak fall rate", "N/s"),
 }
+# Units of forces where the trace is a friction coefficient.
+COEFFICIENT_UNITS = {"N": "1", "N/s": "1/s", "N/m": "1/m"}
 
 
 def slips(
@@ -41,6 +49,7 @@ def slips(
 ) -> None:
     """Print the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogue
+    from mesoslip.analysis.apparatus import apparatus_of
     from mesoslip.output import files, targets
 
     if table is not None:
@@ -49,20 +58,29 @@ def slips(
     if table is not None:
         catalogue.write_csv(tree, table)
     rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
+    counts = catalogue.counts(tree)
     if as_json:
-        print_json({"slips": rows, "statistics": statistics})
+        answer = {"slips": rows, "statistics": statistics}
+        print_json(answer if counts is None else answer | {"slip_counts": counts})
         return
-    columns = {
-        name: column([row[name] for row in rows], unit, 5) for name, (_, unit) in COLUMNS.items()
-    }
-    table_rows = [["realization", *(columns[name].head(COLUMNS[name][0]) for name in COLUMNS)]]
+    # Columns of which nothing is known, as breaks of a measured trace, are left out.
+    shown = [name for name in COLUMNS if not rows or any(row[name] is not None for row in rows)]
+    is_coefficient = apparatus_of(tree).force_unit == "1"
+    heads, columns = {}, {}
+    for name in shown:
+        head, unit = COLUMNS[name]
+        if is_coefficient:
+            head, unit = head.replace("force", "friction"), COEFFICIENT_UNITS.get(unit, unit)
+        heads[name] = head
+        columns[name] = column([row[name] for row in rows], unit, 5)
+    table_rows = [["realization", *(columns[name].head(heads[name]) for name in shown)]]
     table_rows += [
-        [str(row["realization_index"]), *(columns[name].text(row[name]) for name in COLUMNS)]
+        [str(row["realization_index"]), *(columns[name].text(row[name]) for name in shown)]
         for row in rows
     ]
     print_table(table_rows)
     typer.echo(counted(len(rows), "slip"))
-    for name, (header, _) in COLUMNS.items():
+    for name in shown:
         if name in statistics:
             mean, deviation, low, high = (
                 statistics[name][what]
@@ -74,8 +92,33 @@ def slips(
                 f", standard deviation {number(deviation / scale.size, 2)}, "
                 f"range {low_text} to {high_text}"
             )
-            shown = f"mean {number(mean / scale.size, 5)}{spread if low < high else ''}"
-            typer.echo(f"{scale.label(header):20} {shown}")
+            summary = f"mean {number(mean / scale.size, 5)}{spread if low < high else ''}"
+            typer.echo(f"{scale.label(heads[name]):26} {summary}")
+    if counts is not None:
+        _print_counts(counts, "1" if is_coefficient else "N")
+
+
+def _print_counts(counts: dict[str, Any], unit: str) -> None:
+    """How the number of slips depends on the minimum fall, with a warning if it does everywhere."""
+    if not counts["min_fall"]:
+        return
+    falls = column(counts["min_fall"], unit, 3)
+    used = counts["used"]
+    typer.echo("")
+    print_table(
+        [
+            [falls.head("minimum fall"), "slips", ""],
+            *(
+                [falls.text(fall), str(count), "used" if fall == used else ""]
+                for fall, count in zip(counts["min_fall"], counts["slip_count"], strict=True)
+            ),
+        ]
+    )
+    if counts["plateau"] is None and any(counts["slip_count"]):
+        typer.echo(
+            "warning: the number of slips depends on the minimum fall everywhere; falls that stand "
+            "out of the noise are counted"
+        )
 
 
 def avalanches(

@@ -125,6 +125,31 @@ SLIPS = Group(
     ),
 )
 
+# Of a measured trace.
+MEASURED_SLIPS = Group(
+    SLIPS,
+    peak_fall_rate=Meaning("N s-1", "maximum rate at which the spring force fell in the slip"),
+)
+
+# Noise of a measured trace; forces are coefficients where the trace is one.
+NOISE = Group(
+    deviation=Meaning("N", "standard deviation of the white noise"),
+    correlated_deviation=Meaning("N", "standard deviation of correlated noise, 0 for none"),
+    correlation_time=Meaning("s", "time in which the autocorrelation of that noise decays"),
+    digital_step=Meaning("N", "digital step of the force, 0 for none"),
+    impulse_share=Meaning("1", "share of the samples that are in impulses"),
+    impulse_size=Meaning("N", "median size of impulses, 0 for none"),
+    drift=Meaning("N s-1", "slow drift of the force, 0 for none"),
+    impulse_time=Meaning("s", "time of a sample in an impulse"),
+    hum_frequency=Meaning("s-1", "frequency of a line of hum"),
+    hum_amplitude=Meaning("N", "amplitude of a line of hum"),
+)
+
+SLIP_COUNTS = Group(
+    min_fall=Meaning("N", "minimum fall of the force in a slip"),
+    slip_count=Meaning("1", "number of slips with that minimum fall", np.int64),
+)
+
 STAGES = Group(
     realization_index=REALIZATION_INDEX,
     stage_number=Meaning("1", "number of the stage of the drive, from 0", np.int64),

@@ -31,8 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
-from mesoslip.analysis.noise import Part, TraceNoise, estimate_noise, noise_level, parts_of
-from mesoslip.analysis.noise.levels import correlated_noise
+from mesoslip.analysis.noise import Part, TraceNoise, estimate_noise, parts_of
 
 Array = NDArray[np.float64]
 
@@ -167,7 +166,7 @@ def find_slips(
     else:
         cleaned = force
     sigma = noise.total_deviation if isinstance(noise, TraceNoise) else noise
-    trace = _denoise(time, cleaned, sigma, period, isinstance(noise, TraceNoise))
+    trace = _denoise(time, cleaned, noise, period)
     if trace is None:
         return _none(math.inf if period is None else period)
     search = _Search(trace, loading_rate)
@@ -207,7 +206,7 @@ def estimated_period(time: Array, force: Array, noise: float) -> float:
     The force of a slider without contacts falls for half a period of a sine; contacts that attach
     shorten the fall.
     """
-    trace = _denoise(time, np.asarray(force, dtype=float), noise, None, False)
+    trace = _denoise(time, np.asarray(force, dtype=float), noise, None)
     return math.inf if trace is None else trace.period
 
 
@@ -258,7 +257,7 @@ class _Trace:
 
 
 def _denoise(
-    time: Array, force: Array, sigma: float, period: float | None, measures_rest: bool
+    time: Array, force: Array, noise: float | TraceNoise, period: float | None
 ) -> _Trace | None:
     """The trace after a running median of the width that noise and falls demand.
 
@@ -271,11 +270,7 @@ def _denoise(
         if found is not None and width * interval > found.period / 4:
             break
         filtered = _running_median(force, parts, width * interval)
-        rest = sigma if width == 1 else sigma * math.sqrt(math.pi / 2 / width)
-        if measures_rest and width > 1:
-            main = max(parts, key=len)
-            values = filtered[main.samples]
-            rest = max(rest, correlated_noise(values, noise_level(values)).total)
+        rest = _after_median(noise, width, interval)
         height = MIN_HEIGHT * float(np.ptp(filtered))
         highest = _noise_range(len(force) / width) * rest
         floor = max(highest, height)
@@ -289,6 +284,23 @@ def _denoise(
         if highest <= height or width >= len(force) // 8:
             break
     return found
+
+
+def _after_median(noise: float | TraceNoise, width: int, interval: float) -> float:
+    """Standard deviation of noise after a running median over so many samples.
+
+    The variance of a median is pi/2 times that of a mean, in which there are as many independent
+    values of correlated noise as there are twice its correlation time in the width.
+    """
+    if isinstance(noise, TraceNoise):
+        white, correlated = noise.deviation, noise.correlated_deviation
+        count = width * interval / (2 * noise.correlation_time + interval)
+    else:
+        white, correlated, count = noise, 0.0, 1.0
+    if width == 1:
+        return math.hypot(white, correlated)
+    share = min(1.0, math.pi / 2 / count)
+    return math.sqrt(white**2 * math.pi / 2 / width + correlated**2 * share)
 
 
 def _noise_range(count: float) -> float:

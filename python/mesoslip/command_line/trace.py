@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mesoslip.command_line.options import counted
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -126,7 +128,7 @@ def _summary(tree: xr.DataTree) -> list[str]:
         f"{time.size} samples",
         with_unit(time[-1] - time[0], "s", 6),
         f"noise {with_unit(known['noise'], unit, 3)}",
-        f"{tree['slips'].sizes['slip']} slips",
+        counted(tree["slips"].sizes["slip"], "slip"),
     ]
     if math.isfinite(known["setup_period"]):
         period = with_unit(known["setup_period"], "s", 3)

@@ -19,6 +19,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.measured.assembly import read_record
+from mesoslip.measured.catalogue import count_group, noise_group, slip_group
 from mesoslip.measured.description import (
     Experiment,
     TraceDescription,
@@ -298,8 +299,8 @@ def trace_of(understood: Understood) -> xr.DataTree:
         understood,
         drive,
         displacement,
-        _slip_columns(found, velocity, stiffness),
-        found.period,
+        found,
+        velocity,
         attributes,
     )
 
@@ -381,40 +382,25 @@ def _displacement(record: Record, drive: Array | None, stiffness: float | None) 
     return drive - record.force / stiffness
 
 
-def _slip_columns(
-    found: FoundSlips, velocity: float | None, stiffness: float | None
-) -> dict[str, Array]:
-    """The catalogue of slips."""
-    speed = np.full(len(found), np.nan)
-    if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
-        speed = found.fall_rate / stiffness + abs(velocity)
-    return {
-        "realization_index": np.zeros(len(found), dtype=np.int64),
-        "start_time": found.start_time,
-        "end_time": found.end_time,
-        "force_before": found.force_before,
-        "force_after": found.force_after,
-        "force_drop": found.force_before - found.force_after,
-        "peak_velocity": speed,
-        "contacts_broken": np.full(len(found), np.nan),
-    }
-
-
 def _tree(
     understood: Understood,
     drive: Array | None,
     displacement: Array | None,
-    slips: dict[str, Array],
-    period: float,
+    found: FoundSlips,
+    velocity: float | None,
     attributes: dict[str, Any],
 ) -> xr.DataTree:
     import xarray as xr
 
     record = understood.record
+    unit = "1" if record.is_friction else "N"
+    velocities = None
+    if displacement is not None:
+        velocities = _velocity(record.time, displacement, found.period)
     traces = {
         "drive_displacement": drive,
         "displacement": displacement,
-        "velocity": None if displacement is None else _velocity(record.time, displacement, period),
+        "velocity": velocities,
         record.force_name: record.force,
         "normal_force": record.normal_force,
         "normal_stress": record.normal_stress,
@@ -428,22 +414,18 @@ def _tree(
         "realization": variables.ROOT.variable("realization", ("realization",), [0]),
         "time": variables.ROOT.variable("time", ("time",), record.time),
     }
-    catalogue = {
-        name: variables.SLIPS.variable(name, ("slip",), values) for name, values in slips.items()
-    }
     recorded = {
         name: xr.Variable(("row",), one.values, {"long_name": one.header, "units": one.unit})
         for name, one in _names(record).items()
     }
     groups = {
         "/": xr.Dataset(root, coordinates, attributes),
-        "/slips": xr.Dataset(catalogue),
+        "/slips": slip_group(found, velocity, understood.stiffness, unit),
+        "/slip_counts": count_group(found, unit),
         "/recorded": xr.Dataset(recorded),
     }
     if isinstance(understood.noise, TraceNoise):
-        groups["/noise"] = xr.Dataset(
-            {name: xr.Variable((), value) for name, value in understood.noise.scalars().items()}
-        )
+        groups["/noise"] = noise_group(understood.noise, unit)
     if record.load_point is not None and understood.config is None:
         known = np.isfinite(record.load_point)
         groups["/stages"] = stage_table(drive_stages(record.time[known], record.load_point[known]))

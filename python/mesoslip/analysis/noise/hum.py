@@ -180,7 +180,8 @@ def _line(
     # From the middle of each block to time 0.
     turned = (solution[2] - 1j * solution[3]) * np.exp(-1j * first)
     # Slow changes of the frequency turn the phase from block to block.
-    turn = np.angle(np.sum(turned[1:] * np.conj(turned[:-1])))
+    unit = turned / np.maximum(np.abs(turned), 1e-300)
+    turn = float(np.angle(np.sum(unit[1:] * np.conj(unit[:-1]))))
     width = min(MEDIAN_BLOCKS, 2 * (number // 2) - 1)
     straight = turned * np.exp(-1j * turn * np.arange(number))
     smooth = median_filter(straight.real, width, mode="nearest") + 1j * median_filter(

@@ -19,8 +19,9 @@ MIN_RANGE = 2e-3
 MAX_LENGTH, NEIGHBOURS = 3, 4
 # Maximum difference of both sides, over the size.
 MAX_STEP = 0.4
-# Minimum distance from the samples beside it, over the size: tops of oscillations are no impulses.
-MIN_JUMP = 0.7
+# Minimum distance from the lines through the samples beside it, over the size: tops of oscillations
+# are no impulses.
+MIN_JUMP = 0.5
 
 
 def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
@@ -56,13 +57,7 @@ def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
     before = force[np.maximum(starts[:, None] - 1 - near, 0)]
     behind = force[np.minimum(ends[:, None] + near, len(force) - 1)]
     step = np.abs(np.median(before, axis=1) - np.median(behind, axis=1))
-    middle = (force[np.maximum(starts - 1, 0)] + force[np.minimum(ends, len(force) - 1)]) / 2
-    height = np.array(
-        [
-            np.abs(force[one:two] - at).max()
-            for one, two, at in zip(starts, ends, middle, strict=True)
-        ]
-    )
+    height = _height_above(force, starts, ends)
     is_one = (
         (height >= MIN_JUMP * np.maximum.reduceat(size, starts))
         & (ends - starts <= MAX_LENGTH)
@@ -71,3 +66,21 @@ def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
     for first, after in zip(starts[~is_one], ends[~is_one], strict=True):
         found[first:after] = False
     return found
+
+
+def _height_above(force: Array, starts: NDArray[np.int_], ends: NDArray[np.int_]) -> Array:
+    """How far the middle of each group of samples is off the lines through the samples beside it.
+
+    Negative if it is on the other side of one of them.
+    """
+    middle = (starts + ends - 1) // 2
+    last = len(force) - 1
+    sides = []
+    direction = np.zeros(len(starts))
+    for beside, further in ((starts - 1, starts - 2), (ends, ends + 1)):
+        near, far = (np.clip(one, 0, last) for one in (beside, further))
+        slope = (force[near] - force[far]) / np.where(near == far, 1, near - far)
+        sides.append(force[middle] - force[near] - slope * (middle - near))
+        direction += force[middle] - force[near]
+    height: Array = np.minimum(*(np.sign(direction) * one for one in sides))
+    return height

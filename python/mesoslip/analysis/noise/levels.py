@@ -29,8 +29,9 @@ MAX_GROWTH = 2.6
 MAX_VARIANCE = 2.5
 # Minimum correlated noise over the white noise.
 MIN_CORRELATED = 0.35
-# Autocorrelation that counts as none.
-MIN_CORRELATION = 0.05
+# Maximum length of windows from which the correlation is fitted; minimum and number of the times
+# that are tried [samples].
+MAX_FITTED, MIN_TIME, TIMES = 256, 0.5, 25
 
 
 def noise_level(force: Array) -> float:
@@ -103,7 +104,7 @@ def correlated_noise(force: Array, white: float) -> CorrelatedNoise:
     best: tuple[float, Array] | None = None
     length = MIN_WINDOW
     while length <= min(MAX_WINDOW, len(force) // MIN_WINDOWS):
-        residual = _around_polynomials(force, length)
+        residual = _windows(force, length)
         freedom = length - DEGREE - 1
         variances = (residual**2).sum(axis=1) / freedom
         # The median of a chi-square variate is below its mean.
@@ -114,30 +115,60 @@ def correlated_noise(force: Array, white: float) -> CorrelatedNoise:
         length *= 2
     if best is None:
         return CorrelatedNoise(white, 0.0, 0.0)
-    variance, residual = best
-    total = max(math.sqrt(variance), white)
+    residual = best[1]
+    length = min(residual.shape[1], MAX_FITTED)
+    if length < residual.shape[1]:
+        residual = _without_polynomials(residual.reshape(-1, length))
+    variance, time = _fitted(residual)
     correlated = math.sqrt(max(variance - white**2, 0.0))
     if correlated <= MIN_CORRELATED * white or correlated == 0:
-        return CorrelatedNoise(total, 0.0, 0.0)
+        return CorrelatedNoise(max(math.sqrt(variance), white), 0.0, 0.0)
+    return CorrelatedNoise(math.sqrt(variance), correlated, time)
+
+
+def _fitted(residual: Array) -> tuple[float, float]:
+    """Variance of white and correlated noise, and the correlation time [samples], by residuals.
+
+    Polynomials take off part of the noise, the more the longer it is correlated. So the mean
+    products of residuals are compared with those of white and of correlated noise after the same.
+    """
+    from scipy.optimize import nnls
+
     length = residual.shape[1]
     spectrum = np.fft.rfft(residual, 2 * length, axis=1)
-    products = np.fft.irfft((np.abs(spectrum) ** 2).mean(axis=0))[: length // 2]
-    covariance = products / (length - np.arange(length // 2))
-    relative = covariance[1:] / covariance[1]
-    small = np.flatnonzero(relative < MIN_CORRELATION)
-    end = int(small[0]) if small.size else len(relative)
-    # The sum of a geometric series of ratio exp(-1/time), from its first term on.
-    area = float(relative[:end].sum())
-    time = 1 / -math.log1p(-1 / area) if area > 1 else 0.0
-    return CorrelatedNoise(total, correlated, time)
+    wanted = np.fft.irfft((np.abs(spectrum) ** 2).mean(axis=0))[: length // 2]
+    unit = np.eye(length)
+    distance = np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
+    white = _products(unit)
+    best = (math.inf, 0.0, 0.0)
+    for time in np.geomspace(MIN_TIME, length / 2, TIMES):
+        basis = np.stack([white, _products(np.exp(-distance / time))], axis=1)
+        weights, misfit = nnls(basis, wanted)
+        if misfit < best[0]:
+            best = (misfit, float(weights.sum()), float(time))
+    return best[1:]
 
 
-def _around_polynomials(force: Array, length: int) -> Array:
-    """Residuals around polynomials, shape (windows, length)."""
+def _products(covariance: Array) -> Array:
+    """Sums of products of residuals by lag, for noise with a covariance, after polynomials."""
+    length = len(covariance)
+    rest = _without_polynomials(_without_polynomials(covariance).T)
+    products: Array = np.array([np.trace(rest, lag) for lag in range(length // 2)])
+    return products
+
+
+def _windows(force: Array, length: int) -> Array:
+    """Residuals around polynomials in windows, shape (windows, length)."""
     number = len(force) // length
     windows = force[: number * length].reshape(number, length)
     if number > MAX_WINDOWS:
         windows = windows[np.linspace(0, number - 1, MAX_WINDOWS).astype(int)]
-    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, length), DEGREE + 1))[0]
+    return _without_polynomials(windows)
+
+
+def _without_polynomials(windows: Array) -> Array:
+    """Rows without the polynomials that describe them best."""
+    grid = np.linspace(-1, 1, windows.shape[1])
+    basis = np.linalg.qr(np.vander(grid, DEGREE + 1))[0]
     residual: Array = windows - (windows @ basis) @ basis.T
     return residual

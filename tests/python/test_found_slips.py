@@ -1,0 +1,180 @@
+"""Slips found in traces with noise of every kind, and what lies between them."""
+
+from __future__ import annotations
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import klein_tables
+from mesoslip.analysis.alternating_extremes import extremes_of
+from mesoslip.analysis.rate_and_state.motion import Loading, RateAndState, spring_slider
+from mesoslip.analysis.sampled_slips import find_slips
+from mesoslip.analysis.stick_phases import stick_phases
+
+STATIC_FORCE = 18e-6
+
+
+def turns(values, threshold: float) -> list[tuple[float, float]]:
+    """Falls by a walk along the trace that turns when it returns by more than a threshold."""
+    falls, direction, high, low = [], 0, 0, 0
+    start = None
+    for at, value in enumerate(values):
+        high = at if value > values[high] else high
+        low = at if value < values[low] else low
+        if direction >= 0 and values[high] - value > threshold:
+            start, direction, low = high, -1, at
+        elif direction <= 0 and value - values[low] > threshold:
+            if direction < 0:
+                falls.append((values[start], values[low]))
+            direction, high = 1, at
+        if direction == 1:
+            low = at
+        if direction == -1:
+            high = at
+    return falls + ([(values[start], values[low])] if direction < 0 else [])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_falls_of_all_thresholds_are_those_of_a_walk(seed):
+    rng = np.random.default_rng(seed)
+    values = np.cumsum(rng.standard_normal(400))
+    if seed % 2:
+        values = np.round(values)
+    extremes = extremes_of(values)
+    for threshold in (0.0, 0.5, 1.3, 4.0, 9.0, 40.0):
+        tops, bottoms = extremes.falls(threshold)
+        found = list(zip(values[tops], values[bottoms], strict=True))
+        assert found == turns(values, threshold)
+        assert (extremes.fall_sizes > threshold).sum() == len(found)
+
+
+NOISES = {
+    "digital": lambda force, level, rng: (
+        np.round((force + level * rng.standard_normal(force.size)) / (3 * level)) * (3 * level)
+    ),
+    "impulsive": lambda force, level, rng: (
+        force
+        + level * rng.standard_normal(force.size)
+        + 20 * level * (rng.random(force.size) < 0.01) * rng.choice([-1, 1], force.size)
+    ),
+    "hum": lambda force, level, rng: (
+        force
+        + level * rng.standard_normal(force.size)
+        + 5 * level * np.sin(0.1 * np.pi * np.arange(force.size) + 1)
+    ),
+    "drift": lambda force, level, rng: (
+        force
+        + level * rng.standard_normal(force.size)
+        + 0.2 * STATIC_FORCE * np.sin(np.linspace(0, 4, force.size))
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=["Klein", "fast"])
+def run(request):
+    changes = {"run__duration": 8.0}
+    if request.param == "fast":
+        changes = {"drive__velocity": 1e-6, "run__duration": 2.0}
+    return mesoslip.run(klein_tables(**changes))
+
+
+@pytest.mark.parametrize("kind", NOISES)
+@pytest.mark.parametrize("relative", [5e-4, 5e-3])
+def test_slips_under_every_noise_are_those_of_the_exact_catalogue(run, kind, relative):
+    exact, time = mesoslip.slips(run), run["time"].values
+    level = relative * STATIC_FORCE
+    force = NOISES[kind](run["spring_force"].values[0], level, np.random.default_rng(1))
+    found = find_slips(time, force)
+    overlap = (found.start_time[:, None] < exact["end_time"].values) & (
+        found.end_time[:, None] > exact["start_time"].values
+    )
+    visible = exact["force_drop"].values > 12 * level
+    assert overlap.any(axis=0)[visible].all()
+    assert (overlap.sum(axis=1) == 1).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-4, 1e-3])
+def test_rate_and_state_has_its_eight_slips(noise):
+    """Slips of a slider that knows no setup period, with and without noise."""
+    law = RateAndState(0.6, 1e-5, 0.010, 0.015, 1e-6)
+    period = 8.3
+    time = np.linspace(0, 8.2 * period, 30_000)
+    stages = [Loading(1.0, 1e-5, 1.05e-5), Loading(time[-1], 1.05e-5, 1.05e-5)]
+    motion = spring_slider(law, stages, time, 1000.0, damping=0.2)
+    force = motion.force + noise * np.random.default_rng(1).standard_normal(time.size)
+    tops, _ = extremes_of(motion.force).falls(0.01)
+    wanted = time[tops]
+    found = find_slips(time, force)
+    assert len(wanted) >= 8
+    assert len(found) == len(wanted)
+    np.testing.assert_allclose(found.start_time, wanted, atol=0.15)
+
+
+def test_noise_alone_and_its_colours_have_no_slips():
+    rng = np.random.default_rng(1)
+    time = 1e-3 * np.arange(100_000)
+    for force in (
+        rng.standard_normal(time.size),
+        np.convolve(rng.standard_normal(time.size + 9), np.full(10, 0.3), "valid"),
+    ):
+        assert len(find_slips(time, 100 + force)) == 0
+
+
+def test_two_sampling_rates_in_one_record():
+    """The same slips where the recorder was ten times as fast for a part."""
+    tree = mesoslip.run(klein_tables(run__duration=8.0, output__interval=2e-4))
+    time, force = tree["time"].values, tree["spring_force"].values[0]
+    rng = np.random.default_rng(1)
+    kept = (time > 4) | (np.arange(time.size) % 10 == 0)
+    exact = mesoslip.slips(tree)["start_time"].values
+    found = find_slips(time[kept], (force + 3e-8 * rng.standard_normal(force.size))[kept])
+    np.testing.assert_allclose(found.start_time, exact, atol=0.01)
+
+
+def test_long_traces_take_a_time_proportional_to_their_length():
+    import time as clock
+
+    time = 1e-3 * np.arange(200_000)
+    force = np.interp(time % 0.71, [0, 0.7, 0.71], [1.0, 1.7, 1.0])
+    force += 0.003 * np.random.default_rng(1).standard_normal(time.size)
+    start = clock.process_time()
+    found = find_slips(time, force)
+    assert len(found) == 281
+    assert clock.process_time() - start < 3
+
+
+def test_loading_and_creep_of_a_sawtooth():
+    """Loading by K V, and creep over the last fifth of each stick phase."""
+    stiffness, velocity = 100.0, 1e-4
+    time = 1e-3 * np.arange(10_000)
+    phase = time % 1.0
+    # The slider creeps at a quarter of the drive's velocity from 0.8 s on, and slips from 0.98 s.
+    creep = 0.25 * velocity * np.clip(phase - 0.8, 0, 0.18)
+    moved = np.where(phase < 0.98, creep, creep + (phase - 0.98) / 0.02 * 0.95 * velocity)
+    drive = velocity * time
+    period = np.floor(time + 1e-9)
+    force = stiffness * (drive - moved - 0.995 * velocity * period)
+    ends = np.arange(1, 10) - 1e-3
+    starts = np.arange(1, 10) - 0.02
+    before, after = (np.interp(one, time, force) for one in (starts, ends))
+    for given in (stiffness, np.nan):
+        for sign in (1, -1):
+            found = stick_phases(
+                time,
+                sign * force,
+                starts,
+                ends,
+                sign * before,
+                sign * after,
+                drive=sign * drive,
+                stiffness=given,
+            )
+            assert np.isnan(found.loading_rate[0])
+            np.testing.assert_allclose(found.stick_duration[1:], 0.981, rtol=1e-6)
+            np.testing.assert_allclose(found.loading_rate[1:], sign * stiffness * velocity)
+            np.testing.assert_allclose(found.loading_stiffness[1:], stiffness)
+            wanted = found.creep_displacement[1:]
+            # In the millisecond between the ends and the next sample the slip still goes on.
+            expected = 0.25 * velocity * 0.18 + 0.05 * 0.95 * velocity
+            np.testing.assert_allclose(wanted, expected, rtol=1e-6)
+            np.testing.assert_allclose(found.creep_share[1:], wanted / (0.981 * velocity))

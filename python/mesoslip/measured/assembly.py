@@ -62,7 +62,8 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     try:
         made = _force(values, trace)
     except ValueError as error:
-        raise FileError(f"{path}: {error}") from None
+        names = _described(table, columns)
+        raise FileError(f"{path}: {error}; the other columns are {names}") from None
     force = made.values
     rate = trace.si("rate")
     time = values["time"] if rate is None else np.arange(len(table.lines)) / rate
@@ -140,12 +141,12 @@ def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) ->
     if not set(FORCES) & used.keys():
         raise FileError(
             f"{table.path}: has no column of the force, such as 'force [uN]', 'shear stress "
-            f"(MPa)' or 'friction'; its columns are {names}; say what they are with --columns, "
-            "or in [trace.columns] of an EXPERIMENT.toml"
+            f"(MPa)' or 'friction'; its other columns are {names}; say what they are with "
+            "--columns, or in [trace.columns] of an EXPERIMENT.toml"
         )
     if "time" not in used and rate is None:
         raise FileError(
-            f"{table.path}: has no column of the time, such as 'time [s]'; its columns are "
+            f"{table.path}: has no column of the time, such as 'time [s]'; its other columns are "
             f"{names}; say what they are with --columns, or give a sampling rate with --rate"
         )
     if "time" in used and rate is not None:
@@ -159,9 +160,11 @@ def _described(table: Table, columns: Assignment) -> str:
     """The columns of a file, and why they are not used."""
     texts = []
     for index, header in enumerate(table.headers):
+        if any(one.index == index for one in columns.used.values()):
+            continue
         why = columns.unused.get(index, "")
         texts.append(f"{shown(header)}{f' ({why})' if why and why != 'as asked' else ''}")
-    return ", ".join(texts)
+    return ", ".join(texts) or "none"
 
 
 class Force(NamedTuple):

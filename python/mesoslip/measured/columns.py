@@ -45,6 +45,8 @@ OTHER_NAMES = {
 # Numbers that stand for missing ones where they lie far from all others; from the last on always.
 SENTINELS = (-9999.0, -99999.0, -999.0, -999.25, -9999.25, 9999.0, 99999.0, 999999.0, -99.99)
 MIN_ALWAYS = 1e30
+# Minimum distance from the range of 80 % of the others, over that range.
+SENTINEL_DISTANCE = 1.0
 # Maximum correlation of steps of force and displacement of a load point.
 MAX_LOAD_POINT = -0.3
 
@@ -432,10 +434,18 @@ def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
     found = finite & (np.abs(values) >= MIN_ALWAYS)
     rest = values[finite & ~np.isin(values, SENTINELS) & ~found]
     if rest.size:
-        low, high = float(rest.min()), float(rest.max())
-        span = max(high - low, abs(high), abs(low))
+        # Impulses and damaged rows must not count.
+        low, high = (float(one) for one in np.percentile(rest, [10, 90]))
+        span = SENTINEL_DISTANCE * (high - low)
+        known = finite & np.isin(values, SENTINELS)
         far = (values < low - span) | (values > high + span)
-        found |= np.isin(values, SENTINELS) & far
+        near = known & ~far & ((values < low) | (values > high))
+        found |= known & far
+        if near.any() and not found.any():
+            return found, (
+                f"guess: column {shown(table.headers[used.index])}: {values[near][0]:g} on "
+                f"{table.row} {listed(table.lines[near].tolist())} is used as a number"
+            )
     if not found.any():
         return found, ""
     shown_values = ", ".join(f"{one:g}" for one in np.unique(values[found])[:3])

@@ -28,7 +28,8 @@ MIN_SAMPLES = 20
 # Maximum number of steps back of times.
 MAX_STEPS_BACK = 1000
 # Minimum share of samples with the time of the one before, from which times are rounded.
-MIN_ROUNDED = 0.05
+MIN_ROUNDED = 0.1
+MIN_ROUNDED_COUNT = 10
 # Rows and gaps that are named.
 NAMED = 5
 
@@ -163,7 +164,8 @@ def _one_part(
     late = sum(len(one) - 1 for one in parts)
     if late:
         notes.append(f"times step back {late} times to blocks written late, put in order")
-    whole = [np.concatenate(sorted(one, key=lambda run: time[run[0]])) for one in parts]
+    joined = [np.concatenate(one) for one in parts]
+    whole = [one[np.argsort(time[one], kind="stable")] for one in joined]
     if part is not None and part > len(whole):
         raise FileError(f"{path}: has {len(whole)} parts; there is no part {part}")
     chosen = part - 1 if part is not None else int(np.argmax([len(one) for one in whole]))
@@ -197,7 +199,7 @@ def _without_equal(time: Array, rows: Numbers, lines: Numbers, notes: list[str],
     count = int(same.sum())
     if not count:
         return Order(rows, times, notes)
-    if count < MIN_ROUNDED * len(rows):
+    if count < max(MIN_ROUNDED_COUNT, MIN_ROUNDED * len(rows)):
         named = lines[rows[same]].tolist()
         notes.append(
             f"{count} sample{'s' if count > 1 else ''} with the time of the one before and other "

@@ -59,6 +59,7 @@ SIZES = {
 WEIGHTS = {"kg": GRAVITY, "g": 1e-3 * GRAVITY, "mg": 1e-6 * GRAVITY, "t": 1e3 * GRAVITY}
 # Bytes of a Greek letter read in another encoding, or lost.
 MICRO = re.compile(r"Âµ|Î¼|µ|μ|\ufffd(?=m\b|s\b|N\b)|\?(?=m\b|s\b|N\b)|\\mu\s*|&micro;")
+BRACKETED = re.compile(r"\[(.*)\]|\((.*)\)|\{(.*)\}|<(.*)>")
 SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
 
@@ -77,7 +78,9 @@ def plain(text: str) -> str:
 @cache
 def unit_named(text: str) -> str | None:
     """The program's name of a unit; "1" for none, and None if the text is not a unit."""
-    text = plain(text).strip("[](){}<> .")
+    text = plain(text)
+    bracketed = BRACKETED.fullmatch(text)
+    text = (bracketed[bracketed.lastindex or 1] if bracketed else text).strip(" .")
     if text.lower() in NONE:
         return "1"
     return _factor(text) or _quotient(text)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from mesoslip.errors import FileError, shown
+from mesoslip.measured.headers import BRACKETS, read_header
 from mesoslip.measured.reading.cells import (
     COMMENT,
     DELIMITERS,
@@ -24,7 +26,7 @@ from mesoslip.measured.units import is_unit
 # Lines that are looked at to find the layout.
 SAMPLE = 200
 # Score of a header with the same delimiter.
-HEADER_SCORE = 0.4
+HEADER_SCORE = 0.2
 # Lines above the numbers in which a header is looked for.
 MAX_HEADER_LINES = 200
 # Minimum share of the lines, and of the cells, that fit a layout.
@@ -171,11 +173,13 @@ def _best_guess(lines: Sequence[str], decimal: str | None) -> _Guess | None:
 
 def _fits_header(lines: Sequence[str], guess: _Guess) -> bool:
     """Whether a line above the numbers has as many cells with the same delimiter."""
+    if guess.delimiter == " ":
+        return False
     data = _first_row(lines, guess)
     above = [one for one in lines[max(0, data - MAX_HEADER_LINES) : data] if one.strip()][-3:]
     for line in above:
         try:
-            cells = split(line.strip().lstrip(MARKERS), guess.delimiter)
+            cells = split(line.strip(MARKERS.replace("\t", "")), guess.delimiter)
         except ValueError:
             continue
         if 1 < len(cells) == guess.count and not any(is_number(one, ".") for one in cells):
@@ -265,7 +269,7 @@ def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[s
 
     Headers may be comments, and be delimited otherwise than the numbers.
     """
-    bare = line.strip().lstrip(MARKERS) if COMMENT.match(line) else line.strip(" \n")
+    bare = line.lstrip(MARKERS) if COMMENT.match(line) else line.lstrip(" ")
     for cells in _splittings(bare, delimiter):
         if len(cells) == count + 1 and not cells[-1]:
             cells = cells[:-1]
@@ -280,17 +284,25 @@ def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[s
 
 
 def _splittings(line: str, delimiter: str) -> Iterator[list[str]]:
-    """Ways to divide a header into cells, the most likely first."""
-    if delimiter != " ":
-        try:
+    """Ways to divide a header into cells: one only, where something divides it."""
+    if delimiter.strip(" ") and delimiter in line:
+        with suppress(ValueError):
             yield split(line, delimiter)
-        except ValueError:
-            return
+        return
+    line = line.strip()
+    wide = [cell.strip(" ,;") for cell in re.split(r"\s{2,}|\t", line)]
+    words = [cell.strip(" ,;") for cell in WORD.findall(line)]
+    if len(wide) > 1:
+        yield wide
+        # Names of one word each may stand apart by one blank or more.
+        if all(read_header(one).quantity or BRACKETS.search(one) for one in words):
+            yield words
+        return
     for other in DELIMITERS[:-1]:
-        if other != delimiter and other in line:
+        if other in line:
             yield [cell.strip(" \"'") for cell in line.split(other)]
-    yield [cell.strip() for cell in re.split(r"\s{2,}|\t", line.strip())]
-    yield WORD.findall(line)
+            return
+    yield words
     yield line.split()
 
 

@@ -19,6 +19,8 @@ from mesoslip.errors import FileError, shown
 MAX_BYTES = 2**31
 # Bytes that are looked at to tell encodings apart.
 HEAD = 4096
+# Maximum share of null characters in a damaged text.
+MAX_NULLS = 0.01
 
 # Compressions: their first bytes, and what opens them.
 COMPRESSIONS: dict[str, tuple[bytes, Callable[[IO[bytes]], Any]]] = {
@@ -107,6 +109,9 @@ def text_of(path: Path, data: bytes) -> str:
         If it is not text.
     """
     text = _decoded(data)
+    if text is not None and 0 < text.count("\0") < MAX_NULLS * len(text):
+        at = text.index("\0")
+        raise FileError(f"{path}: line {text.count(chr(10), 0, at) + 1}: has a null character")
     if text is None or "\0" in text:
         raise FileError(
             f"{path}: is neither text nor MATLAB, HDF5, netCDF or .npz: it begins with "
@@ -119,7 +124,7 @@ def _decoded(data: bytes) -> str | None:
     head = data[:HEAD]
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         encodings = ["utf-16"]
-    elif b"\0" in head:
+    elif head.count(0) > MAX_NULLS * len(head):
         # UTF-16 without a mark has a null beside each Latin character.
         little = head[1::2].count(0) > head[0::2].count(0)
         encodings = ["utf-16-le" if little else "utf-16-be"]

@@ -108,10 +108,13 @@ class _Body:
     empty: list[int] = field(default_factory=list)
     odd: list[int] = field(default_factory=list)
     cut: int | None = None
+    above: set[str] = field(default_factory=set)
 
     def read(self) -> tuple[Array, Numbers]:
         """Numbers, shape (columns, rows), and the line of each row."""
         layout = self.layout
+        # What stands above the numbers may come again.
+        self.above = {line.strip() for line in self.lines[: layout.first]}
         data = np.frombuffer("\n".join(self.lines[layout.first :]).encode() + b"\n", np.uint8)
         ends = np.flatnonzero(data == ord("\n"))
         starts = np.concatenate([[0], ends[:-1] + 1])
@@ -144,22 +147,20 @@ class _Body:
             is_blank = (data == ord(" ")) | (data == ord("\t")) | (data == ord("\n"))
             begins = ~is_blank
             begins[1:] &= is_blank[:-1]
-            count = np.add.reduceat(begins, starts, dtype=np.int64)
+            count = _counts(begins, ends)
         else:
-            count = 1 + np.add.reduceat(data == ord(layout.delimiter), starts, dtype=np.int64)
+            count = 1 + _counts(data == ord(layout.delimiter), ends)
         if layout.count == 1:
             count[ends == starts] = 0
         regular: NDArray[np.bool] = (count == layout.count) & ~has_strange
-        self._find_odd(data, starts, regular)
+        self._find_odd(data, ends, regular)
         return regular
 
-    def _find_odd(
-        self, data: NDArray[np.uint8], starts: Numbers, regular: NDArray[np.bool]
-    ) -> None:
+    def _find_odd(self, data: NDArray[np.uint8], ends: Numbers, regular: NDArray[np.bool]) -> None:
         """Find rare rows with fewer decimal signs than all others."""
         if not regular.any():
             return
-        points = np.add.reduceat(data == ord(self.layout.decimal), starts, dtype=np.int64)[regular]
+        points = _counts(data == ord(self.layout.decimal), ends)[regular]
         usual = int(points.max())
         odd = np.flatnonzero(regular)[points < usual]
         if 0 < len(odd) <= max(1, MAX_ODD * len(points)):
@@ -213,7 +214,13 @@ class _Body:
         if not line.strip():
             return None
         if COMMENT.match(line) or (line.lstrip()[0] == ";" and layout.delimiter != ";"):
-            self.comments.append(number)
+            cells = line.lstrip("#%/!*; \t").split(
+                None if layout.delimiter == " " else layout.delimiter
+            )
+            is_row = len(cells) == layout.count and all(
+                is_number(cell.strip(), layout.decimal) for cell in cells
+            )
+            (self.texts if is_row else self.comments).append(number)
             return None
         try:
             cells = split(line, layout.delimiter)
@@ -251,6 +258,8 @@ class _Body:
         layout = self.layout
         if layout.headers is None:
             return False
+        if line.strip() in self.above:
+            return True
         cells = header_cells(line, layout.delimiter, layout.decimal, layout.count)
         return cells is not None and cells in {layout.headers, layout.units}
 
@@ -308,6 +317,12 @@ class _Body:
         if self.cut is not None:
             notes.append(f"line {self.cut}: the last row seems to be cut short, left out")
         return notes
+
+
+def _counts(is_there: NDArray[np.bool], ends: Numbers) -> Numbers:
+    """Number of marked bytes in each line."""
+    before = np.searchsorted(np.flatnonzero(is_there), ends)
+    return np.diff(before, prepend=0)
 
 
 def _digits(cell: str, decimal: str) -> tuple[int, int]:

@@ -43,7 +43,8 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
     Returns
     -------
     list of pathlib.Path
-        The files that were written. Files that it is based on are not written over.
+        The files that were written. Files that it is based on, and the data of a measurement, are
+        not written over.
 
     Raises
     ------
@@ -66,21 +67,39 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
     source: Path | None = _folder() / f"{name}{ENDING}"
     while source is not None:
         text = source.read_text(encoding="utf-8")
-        base = tomllib.loads(text).get("base")
+        tables = tomllib.loads(text)
+        base = tables.get("base")
         if base is not None:
             # The base is written beside it, wherever it is installed.
             text = text.replace(f'"{base}"', f'"{Path(base).name}"', 1)
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            # Never over a file of somebody, not even one that has come meanwhile.
-            with target.open("x", encoding="utf-8") as stream:
-                stream.write(text)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise FileError(f"{target}: cannot be written: {reason}") from error
+        _write_new(target, text.encode())
         written.append(target)
+        if "trace" in tables:
+            data = tables["trace"]["file"]
+            beside = target.with_name(data)
+            if not is_file(beside):
+                _write_new(beside, (source.parent / data).read_bytes())
+                written.append(beside)
         source = None if base is None else source.parent / base
         if source is not None:
             target = target.with_name(source.name)
             source = None if is_file(target) else source
     return written
+
+
+def _write_new(path: Path, contents: bytes) -> None:
+    """Write a file that does not exist.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Never over a file of somebody, not even one that has come meanwhile.
+        with path.open("xb") as stream:
+            stream.write(contents)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{path}: cannot be written: {reason}") from error

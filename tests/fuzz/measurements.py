@@ -36,7 +36,17 @@ UNITS = {
     "normal_stress": {"MPa": 1e6, "kPa": 1e3},
     "load_point": {"µm": 1e-6, "um": 1e-6, "microns": 1e-6, "mm": 1e-3, "m": 1, "nm": 1e-9},
 }  # fmt: skip
-STYLES = ("{} [{}]", "{}[{}]", "{} ({})", "{}({})", "{} {{{}}}", "{}_{}", "{} / {}", "{}, {}", "{} in {}")
+STYLES = (
+    "{} [{}]",
+    "{}[{}]",
+    "{} ({})",
+    "{}({})",
+    "{} {{{}}}",
+    "{}_{}",
+    "{} / {}",
+    "{}, {}",
+    "{} in {}",
+)
 UNUSED = ["Temperature (C)", "Sample no", "Vertical LVDT [mm]", "Pump"]
 PROSE = ["Experiment b819", "Rate: 1000 Hz", "Operator: A. Nonymous, room 12", "Comment; none",
          "date 2019-01-01", "gain 2.5", "*** data ***"]  # fmt: skip
@@ -211,7 +221,9 @@ def _text(
         names.insert(at, "")
         sizes.insert(at, 1.0)
     is_blank = not delimiter.strip(" ")
-    if is_blank and (delimiter == "  " or has_unit_line or style not in {"{}_{}", "{}[{}]", "{}({})"}):
+    if is_blank and (
+        delimiter == "  " or has_unit_line or style not in {"{}_{}", "{}[{}]", "{}({})"}
+    ):
         # Names of several words need more than a blank between them.
         delimiter = "  "
     separator = delimiter
@@ -283,7 +295,9 @@ def _add_habits(
     count = len(columns[0])
     if random.random() < 0.2:
         row = random.randrange(count)
-        column = random.choice([n for n, name in enumerate(names) if name not in {"", "load_point"}])
+        column = random.choice(
+            [n for n, name in enumerate(names) if name not in {"", "load_point"}]
+        )
         cells = [one[row] for one in columns]
         cells[column] = random.choice(["nan", "NaN", "INF", "-9999", "9.99e37", "OVER"])
         if not is_blank and random.random() < 0.3:
@@ -344,7 +358,7 @@ def damage(name: str) -> tuple[Case, list[int], str]:
     elif how == "delete":
         line = line[:place] + line[place + 1 :]
     elif how == "insert":
-        line = line[:place] + random.choice(" .,;-+eE\"0123\x00\x1a") + line[place:]
+        line = line[:place] + random.choice(' .,;-+eE"0123\x00\x1a') + line[place:]
     elif how == "cut cell":
         line = line[:place]
     elif how in {"empty cell", "swap", "delimiter", "comma"}:
@@ -380,7 +394,9 @@ def damage(name: str) -> tuple[Case, list[int], str]:
 
 
 # A number, said once more and otherwise than the program does.
-STRICT = re.compile(r"^[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?$|^[+-]?[.,]\d+(?:[eE][+-]?\d+)?$", re.A)
+STRICT = re.compile(
+    r"^[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?$|^[+-]?[.,]\d+(?:[eE][+-]?\d+)?$", re.A
+)
 
 
 def literal_rows(case: Case, changed: list[int]) -> list[list[float]]:
@@ -462,7 +478,9 @@ def check(case: Case, path: Path, changed: list[int], how: str) -> tuple[str, li
     is_gone = how == "cut file" or not case.text.split("\n")[changed[0]].strip()
     is_named = any(re.search(rf"\b{one + 1}\b", report) for one in changed)
     words = ("left out", "used once", "taken as missing", "part ")
-    if len(record.time) < len(case.time) and not (is_gone or is_named or any(one in report for one in words)):
+    if len(record.time) < len(case.time) and not (
+        is_gone or is_named or any(one in report for one in words)
+    ):
         problems.append("samples are missing, and the report does not say so")
     return ("wrong" if problems else "right"), problems
 

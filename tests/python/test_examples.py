@@ -21,7 +21,8 @@ def tracked(folder):
 
 def is_example(path):
     """Whether a file is a run that the program brings: not one of the source's."""
-    return path.endswith(".toml") and not path.startswith("runs/source/")
+    is_data = path.startswith("runs/measured/")
+    return is_data or (path.endswith(".toml") and not path.startswith("runs/source/"))
 
 
 def test_the_wheel_has_all_that_is_needed():
@@ -32,7 +33,8 @@ def test_the_wheel_has_all_that_is_needed():
             assert path.removeprefix("python/") in there, path
     runs = {one.removeprefix("mesoslip/") for one in there if one.startswith("mesoslip/runs/")}
     assert runs == {one for one in tracked("runs") if is_example(one)}
-    assert runs == {f"runs/{name}.toml" for name in examples.examples()}
+    files_of_runs = {one for one in runs if one.endswith(".toml")}
+    assert files_of_runs == {f"runs/{name}.toml" for name in examples.examples()}
     assert any(one.startswith("mesoslip/_core.") and one.endswith(".so") for one in there)
     assert any(one.endswith("licenses/LICENSE") for one in there)
     # Nothing of others.
@@ -81,6 +83,14 @@ def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
     assert status == 2
     assert "did you mean klein?" in errors
     assert command("example", "klein", "-o", "/dev/null/x.toml")[0] == 2
+
+
+def test_a_measurement_comes_with_its_data(tmp_path, command):
+    written = mesoslip.example("measured/basalt-step", tmp_path / "mine.toml")
+    assert [one.name for one in written] == ["mine.toml", "basalt-step.txt.gz"]
+    status, printed, _ = command("trace", written[0], "--dry-run")
+    assert status == 0
+    assert "100 Hz from 11674.2 s" in printed
 
 
 def test_a_base_elsewhere_comes_to_stand_beside_the_example(tmp_path, monkeypatch):

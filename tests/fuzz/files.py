@@ -13,6 +13,7 @@ import subprocess
 from pathlib import Path
 from random import Random
 
+import measurements as measured
 import numpy as np
 import tomli_w
 from apart import Command, call, limit_memory
@@ -456,6 +457,32 @@ def numbers(name: str, folder: Path) -> Report:
     return report
 
 
+# Files of measurements in a case: a process takes longer to start than to read them.
+FILES_OF_A_CASE = 100
+
+
+def measurements(name: str, folder: Path) -> Report:
+    """Files of measurements in many styles: read as they were made."""
+    limit_memory()
+    report = Report("finished")
+    for number in range(FILES_OF_A_CASE):
+        case = measured.make(f"{name} {number}")
+        found = measured.check_whole(case, measured.write(case, folder))
+        report.problems += [f"file {number}: {one}" for one in found]
+    return report
+
+
+def damaged_measurements(name: str, folder: Path) -> Report:
+    """Damaged files of measurements: right, or one message; never wrong numbers in silence."""
+    limit_memory()
+    report = Report("finished")
+    for number in range(FILES_OF_A_CASE):
+        case, changed, how = measured.damage(f"{name} {number}")
+        _, found = measured.check(case, measured.write(case, folder), changed, how)
+        report.problems += [f"file {number}: {how}: {one}" for one in found]
+    return report
+
+
 ATTACKS: dict[str, tuple[Attack, int]] = {
     "neighbours": (neighbours, 100),
     "bits": (bits, BIT_CASES),
@@ -463,4 +490,6 @@ ATTACKS: dict[str, tuple[Attack, int]] = {
     "small_disks": (small_disks, 40),
     "links": (links, 60),
     "numbers": (numbers, 100),
+    "measurements": (measurements, 3),
+    "damaged_measurements": (damaged_measurements, 30),
 }

@@ -30,7 +30,9 @@ HEADERS = {
 # Units as they are written, and their size in SI.
 UNITS = {
     "time": {"s": 1, "sec": 1, "ms": 1e-3, "msec": 1e-3, "min": 60, "seconds": 1},
-    "force": {"N": 1, "mN": 1e-3, "kN": 1e3, "µN": 1e-6, "uN": 1e-6, "kgf": 9.80665, "g": 9.80665e-3},
+    "force": {
+        "N": 1, "mN": 1e-3, "kN": 1e3, "µN": 1e-6, "uN": 1e-6, "kgf": 9.80665, "g": 9.80665e-3,
+    },
     "friction": {"": 1},
     "shear_stress": {"MPa": 1e6, "kPa": 1e3, "Pa": 1},
     "normal_stress": {"MPa": 1e6, "kPa": 1e3},
@@ -114,7 +116,7 @@ def make(name: str) -> Case:
     units = {one: random.choice(list(UNITS[one])) for one in quantities}
     kind = random.choice(["text"] * 8 + ["npz", "mat", "hdf5", "netcdf"])
     if kind != "text":
-        return _binary(random, kind, quantities, units, samples, force)
+        return _binary(kind, quantities, units, samples, force)
     return _text(random, quantities, units, samples, force)
 
 
@@ -125,7 +127,6 @@ def _expected(force: str, numbers: dict[str, Array]) -> tuple[Array, str]:
 
 
 def _binary(
-    random: Random,
     kind: str,
     quantities: list[str],
     units: dict[str, str],
@@ -202,10 +203,7 @@ def _text(
         texts = [write(value / size) for value in samples[one]]
         numbers[one] = np.array([float(text) for text in texts]) * size
         name = random.choice(HEADERS[one]).replace("{}", "")
-        if style == "{}_{}" and unit in {"g", "min"}:
-            unit_style = "{} [{}]"
-        else:
-            unit_style = style
+        unit_style = "{} [{}]" if style == "{}_{}" and unit in {"g", "min"} else style
         if one == "force" and "/" in style:
             unit_style = "{} / {}"
         headers.append(name if has_unit_line or not unit else unit_style.format(name, unit))
@@ -440,6 +438,23 @@ def wrong_samples(case: Case, time: Array, force: Array, changed: list[int]) -> 
         if not (np.abs(allowed[near, 1] - other) <= 1e-6 * abs(other) + 1e-12).any():
             problems.append(f"wrong: {other:g} at {one:g} s")
     return problems[:3]
+
+
+def check_whole(case: Case, path: Path) -> list[str]:
+    """What is wrong with the reading of a file in some style."""
+    from mesoslip import MesoslipError
+    from mesoslip.measured.trace import understand
+
+    try:
+        record = understand(path, **case.options).record
+    except MesoslipError as error:
+        return [f"refused: {error}"]
+    if record.force_name != case.force_name or len(record.time) != len(case.time):
+        return [f"{record.force_name}, {len(record.time)} samples for {len(case.time)}"]
+    is_right = np.allclose(record.time, case.time, rtol=1e-9, atol=1e-9) and np.allclose(
+        record.force, case.force, rtol=1e-6
+    )
+    return [] if is_right else ["other numbers"]
 
 
 def check(case: Case, path: Path, changed: list[int], how: str) -> tuple[str, list[str]]:

@@ -35,7 +35,7 @@ NAMES = {
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
     "|f over fn|f w|ft fn|f t f n|apparent friction|tau sigma|tau over sigma|tau sigma n|tau sn"
     "|friction factor|reibwert|reibungskoeffizient|mu app|shear stress normal stress|ff fn",
-    "normal_force": "normal force|normal load|normalforce|normalload|fn|vertical force"
+    "normal_force": "normal force|normal load|normalforce|normalload|fn|f n|vertical force"
     "|vertical load|normalkraft|force normal|force n|fz|f z|nload",
     "normal_stress": "normal stress|normalstress|sigma n|sigman|sigma|σ|σn|sn"
     "|effective normal stress|eff normal stress|norm stress|stress normal|sigma eff",
@@ -97,6 +97,9 @@ Heading(quantity='load_point', unit='um', guess=''))
     unit = unit.strip("[](){}<> ")
     if unit:
         return Heading(meaning_of(_without_brackets(text)) or meaning_of(text), unit)
+    # A force in newton, or a normal force without a unit?
+    if re.fullmatch(r"(?i)f_?n", text):
+        return Heading(None, None)
     whole = meaning_of(text)
     if whole == "friction":
         guess = ""

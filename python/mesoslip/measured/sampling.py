@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +28,12 @@ SAME_RATE = 1.3
 MIN_SAMPLES = 20
 # Maximum number of steps back of times.
 MAX_STEPS_BACK = 1000
+# Maximum number of blocks between which one was written late.
+MAX_CROSSED = 2
 # Minimum share of samples with the time of the one before, from which times are rounded.
 MIN_ROUNDED = 0.1
 MIN_ROUNDED_COUNT = 10
+SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 # Rows and gaps that are named.
 NAMED = 5
 
@@ -182,14 +186,13 @@ def _one_part(
 
 
 def _fits(time: Array, runs: Sequence[Numbers], run: Numbers) -> bool:
-    """Whether a run lies between others, or before or after them."""
-    first, last = time[run[0]], time[run[-1]]
-    for other in runs:
-        low = np.searchsorted(time[other], first, "left")
-        if low != np.searchsorted(time[other], last, "right"):
-            return False
+    """Whether a run lies between blocks of others, or before or after them."""
+    others = np.sort(np.concatenate([time[one] for one in runs]))
+    first, after = (np.searchsorted(others, time[run], side) for side in SIDES)
+    if (first != after).any() or np.count_nonzero(np.diff(first)) > MAX_CROSSED:
+        return False
     # A clock that starts again begins before everything else.
-    return bool(first > min(time[other[0]] for other in runs))
+    return bool(time[run[0]] > others[0])
 
 
 def _without_equal(time: Array, rows: Numbers, lines: Numbers, notes: list[str], row: str) -> Order:

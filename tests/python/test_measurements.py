@@ -1,0 +1,312 @@
+"""Files of measurements: every style of a laboratory, units, samples at any times, damages."""
+
+from __future__ import annotations
+
+import gzip
+
+import h5py
+import measurements
+import mesoslip
+import numpy as np
+import pytest
+from conftest import ROOT
+from mesoslip.measured.headers import read_header
+from mesoslip.measured.sampling import in_order, sampling_report
+from mesoslip.measured.trace import understand
+from mesoslip.measured.units import size_of
+from scipy.io import savemat
+
+ROWS = "".join(f"{0.01 * n:.2f}\t{3 + np.sin(n):.6f}\n" for n in range(60))
+
+
+def record_of(path, text, **options):
+    path.write_text(text, encoding="utf-8")
+    return understand(path, **options).record
+
+
+def refusal(path, text, **options):
+    with pytest.raises(mesoslip.MesoslipError) as found:
+        record_of(path, text, **options)
+    return str(found.value)
+
+
+@pytest.mark.parametrize("number", range(60))
+def test_files_in_many_styles_are_read_as_they_were_made(tmp_path, number):
+    case = measurements.make(f"test {number}")
+    assert measurements.check_whole(case, measurements.write(case, tmp_path)) == []
+
+
+@pytest.mark.parametrize("number", range(200))
+def test_damaged_files_give_no_wrong_numbers(tmp_path, number):
+    case, changed, how = measurements.damage(f"test {number}")
+    path = measurements.write(case, tmp_path)
+    assert measurements.check(case, path, changed, how)[1] == []
+
+
+@pytest.mark.parametrize(
+    ("header", "quantity", "unit"),
+    [
+        ("Time(s)", "time", "s"),
+        ("time_s", "time", "s"),
+        ("t / ms", "time", "ms"),
+        ("Displ(microns)", "either", "microns"),
+        ("lp_disp_um", "load_point", "um"),
+        ("Load point {µm}", "load_point", "um"),
+        ("Force, N", "force", "N"),
+        ("Force / N", "force", "N"),
+        ("Normal_stress(MPa)", "normal_stress", "MPa"),
+        ("Shear stress [MPa] (filtered)", "shear_stress", "MPa"),
+        ("F_over_mg", "friction", None),
+        ("F/N", "friction", None),
+        ("µ", "friction", None),
+        ("CH3 [V]", None, "V"),
+        ("F_N", None, None),
+        ("F_N [mN]", "normal_force", "mN"),
+        ("load [N]", None, "N"),
+    ],
+)
+def test_headers_of_the_field(header, quantity, unit):
+    assert read_header(header)[:2] == (quantity, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "size"),
+    [
+        ("µm", "m", 1e-6),
+        ("μm", "m", 1e-6),
+        ("Âµm", "m", 1e-6),
+        ("\ufffdm", "m", 1e-6),
+        ("msec", "s", 1e-3),
+        ("kgf", "N", 9.80665),
+        ("g", "N", 9.80665e-3),
+        ("N/mm^2", "Pa", 1e6),
+        ("psi", "Pa", 6894.757293168361),
+        ("MPa", "N", None),
+    ],
+)
+def test_units_of_the_field(text, unit, size):
+    found = size_of(text, unit)
+    assert (found and found.size) == (size and pytest.approx(size))
+
+
+def test_volts_have_a_factor_and_an_offset(tmp_path):
+    table = "t_s\tCH3 [V]\n" + ROWS
+    description = tmp_path / "run.toml"
+    (tmp_path / "run.txt").write_text(table)
+    column = '{ column = "CH3", factor = "12.4 mN/V", offset = "300 mV" }'
+    description.write_text(f'[trace]\nfile = "run.txt"\ncolumns = {{ force = {column} }}\n')
+    record = understand(description).record
+    raw = 3 + np.sin(np.arange(60))
+    np.testing.assert_allclose(record.force, (raw - 0.3) * 12.4e-3, atol=1e-8)
+    # Volts alone are no force.
+    assert "--columns" in refusal(tmp_path / "run.txt", table)
+    message = refusal(tmp_path / "x.txt", table.replace("CH3", "force"))
+    assert "has the unit 'V'" in message
+    assert "factor" in message
+    description.write_text(description.read_text().replace("mN/V", "mm/V"))
+    with pytest.raises(mesoslip.ConfigError, match=r"trace\.columns\.force.*expected a quantity"):
+        understand(description)
+
+
+def test_all_mistakes_of_a_description_at_once(tmp_path):
+    path = tmp_path / "run.toml"
+    path.write_text('[trace]\nfile = "run.txt"\nstifness = "1 N/m"\narea = "3 m"\n')
+    with pytest.raises(mesoslip.ConfigError) as found:
+        understand(path)
+    assert "trace.stifness: unknown key; did you mean 'stiffness'?" in str(found.value)
+    assert "trace.area = '3 m': has the unit m" in str(found.value)
+    assert len(found.value.problems) == 2
+
+
+def test_the_output_repeats_its_reading(tmp_path, command):
+    for name in ("basalt-step.toml", "basalt-step.txt.gz"):
+        (tmp_path / name).write_bytes((ROOT / "runs" / "measured" / name).read_bytes())
+    tree = mesoslip.read_trace(tmp_path / "basalt-step.toml", start="11650 s")
+    (tmp_path / "again.toml").write_text(tree.attrs["trace"])
+    again = mesoslip.read_trace(tmp_path / "again.toml")
+    np.testing.assert_array_equal(tree["friction_coefficient"], again["friction_coefficient"])
+    np.testing.assert_array_equal(tree["drive_displacement"], again["drive_displacement"])
+    assert again.attrs["trace"] == tree.attrs["trace"]
+    assert tree["recorded"].sizes["row"] == 5849
+    assert tree["recorded"]["Displ_microns"].attrs["units"] == "microns"
+    assert "spring_force" not in tree
+    (tmp_path / "out").mkdir()
+    status, printed, _ = command(
+        "trace", tmp_path / "again.toml", "--dry-run", "-o", tmp_path / "out" / "o.nc"
+    )
+    assert status == 0
+    assert "samples: 10 Hz from 11650 s to 11674.2 s (243)" in printed
+    assert not any((tmp_path / "out").iterdir())
+
+
+def test_coefficients_become_forces_with_a_normal_force(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,F_over_mg\n" + ROWS.replace("\t", ","))
+    bare = mesoslip.read_trace(path, stiffness="1.6e-3 1/um", velocity="1 um/s")
+    assert "friction_coefficient" in bare
+    force = mesoslip.read_trace(path, normal_force="0.5 N", stiffness="1.6e-3 1/um")
+    np.testing.assert_allclose(force["spring_force"], 0.5 * bare["friction_coefficient"])
+    assert "stiffness = 800.0" in force.attrs["configuration"]
+    with pytest.raises(mesoslip.ConfigError, match="give the normal force too"):
+        mesoslip.read_trace(path, stiffness="1002 N/m")
+    record_of(tmp_path / "f.csv", "time_s,force_N\n" + ROWS.replace("\t", ","))
+    with pytest.raises(mesoslip.ConfigError, match="is for friction coefficients"):
+        understand(tmp_path / "f.csv", stiffness="1.6e-3 1/um")
+
+
+def test_stresses_need_an_area_or_each_other(tmp_path):
+    text = "time_s\tshear stress (MPa)\n" + ROWS
+    record = record_of(tmp_path / "a.txt", text, area="1 cm^2")
+    assert record.force_name == "spring_force"
+    assert record.force[0] == pytest.approx(300.0)
+    record = record_of(tmp_path / "a.txt", text, normal_stress="6 MPa")
+    assert (record.force_name, record.force[0]) == ("friction_coefficient", pytest.approx(0.5))
+    assert "give --area" in refusal(tmp_path / "a.txt", text)
+
+
+def test_a_model_with_a_fit_beside_it_is_accepted(tmp_path):
+    text = (ROOT / "runs" / "klein.toml").read_text() + '\n[fit.free]\n"contacts.delay" = 1\n'
+    (tmp_path / "fit.toml").write_text(text)
+    (tmp_path / "a.txt").write_text("time_s\tforce_uN\n" + ROWS)
+    tree = mesoslip.read_trace(tmp_path / "a.txt", config=tmp_path / "fit.toml")
+    assert mesoslip.Config.from_toml(tree.attrs["configuration"]).spring_stiffness == 97.0
+
+
+def ordered(time, force=None, **options):
+    time = np.asarray(time, dtype=float)
+    force = np.arange(len(time)) * 1.0 if force is None else np.asarray(force, dtype=float)
+    lines = np.arange(2, len(time) + 2)
+    found = in_order("a.txt", time, force[np.newaxis], lines, options.get("part"), "line")
+    return found.time, force[found.rows], " ".join(found.notes)
+
+
+def test_blocks_written_twice_are_used_once():
+    time = [0, 1, 2, 3, 2, 3, 4, 5]
+    found, force, notes = ordered(time, time)
+    np.testing.assert_array_equal(found, np.arange(6))
+    np.testing.assert_array_equal(force, np.arange(6))
+    assert "2 lines written twice, used once: line 6, 7" in notes
+
+
+def test_a_late_block_goes_where_it_belongs():
+    time = np.r_[0:10, 20:30, 10:20, 30:40]
+    found, force, notes = ordered(time, time)
+    np.testing.assert_array_equal(found, np.arange(40))
+    np.testing.assert_array_equal(force, np.arange(40))
+    assert "put in order" in notes
+
+
+def test_one_time_out_of_order_is_left_out():
+    found, _, notes = ordered([0, 1, 2, 900, 3, 4, 5, 6, 7])
+    np.testing.assert_array_equal(found, np.arange(8))
+    assert "line 5: the time is out of order, left out" in notes
+
+
+def test_a_clock_that_starts_again_makes_parts():
+    time = np.r_[0:10, 0:20] * 0.1
+    _, force, notes = ordered(time)
+    np.testing.assert_array_equal(force, np.arange(10, 30))
+    assert "part 2 is used" in notes
+    assert len(ordered(time, part=1)[0]) == 10
+    with pytest.raises(mesoslip.FileError, match="there is no part 3"):
+        ordered(time, part=3)
+
+
+def test_rounded_times_are_spread():
+    found, _, notes = ordered(np.floor(np.arange(400) / 4) * 1e-3)
+    np.testing.assert_allclose(found, np.arange(400) * 0.25e-3, atol=1e-12)
+    assert "guess: times are rounded to 1 ms" in notes
+
+
+def test_rates_and_gaps_are_reported():
+    time = np.concatenate([np.arange(0, 50, 0.1), np.arange(50, 60, 0.01), np.arange(62, 70, 0.01)])
+    lines = sampling_report(time)
+    assert lines[0] == "samples: 10 Hz from 0 s to 50 s (501)"
+    assert lines[1].startswith("samples: 100 Hz from 50 s to 69.99 s")
+    assert lines[2] == "gaps: 2.01 s after 59.99 s; nothing is filled in"
+
+
+def test_a_million_times_in_disorder_are_refused():
+    time = np.random.default_rng(1).uniform(size=10_000)
+    with pytest.raises(mesoslip.FileError, match="is it the column of the time"):
+        ordered(time)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s,force_N\n0,001,1,2\n0,002,1,3\n", "another delimiter is needed in the file"),
+        ("time_s\tforce_N\n1,500\t2\n2,500\t3\n", "give --decimal ','"),
+        ("time_s;force_N\n0,5;1.5\n0,6;1.7\n0,7;1.8\n", "column"),
+        ("time_s\tforce_N\n0.1\t5\n0.2\t7x\n0.3\t5\n0.4\t6\n0.5\t6\n", "line 3: column 'force_N'"),
+        ("time_s\tforce_N\n0.1\t5\n0.2\t1e999\n0.3\t5\n0.4\t6\n0.5\t6\n", "is too large"),
+        ("a b\n1 2 3\n2 3 4\n", "line 1: 'a b' is no header of the 3 columns"),
+        ("time_s\tforce\n" + ROWS, "column 'force' has no unit"),
+        ("time_s\tforce_N\tForce [mN]\n" + ROWS.replace("\n", "\t1\n"), "two columns of force"),
+        ("stopped\nnothing here\n", "no columns of numbers"),
+    ],
+)
+def test_what_is_not_clear_is_one_message(tmp_path, text, said):
+    message = refusal(tmp_path / "a.txt", text)
+    assert said in message
+    assert "\n" not in message
+
+
+def test_guesses_are_reported(tmp_path):
+    record = record_of(tmp_path / "a.txt", "time\tF/N\n" + ROWS)
+    report = "\n".join(record.report)
+    assert "guess: 'time' has no unit: taken as seconds" in report
+    assert "guess: 'F/N' taken as" in report
+    record = record_of(tmp_path / "a.txt", "time_s\tforce [g]\n" + ROWS)
+    assert "taken as a weight" in "\n".join(record.report)
+    record = record_of(tmp_path / "a.txt", "time_s\tforce_N\tPump\n" + ROWS.replace("\n", "\t1\n"))
+    assert "not used: column 3 'Pump'" in record.report
+
+
+def test_a_displacement_is_the_slider_s_if_it_moves_in_slips(tmp_path):
+    saw = np.arange(200) % 20
+    slider = (np.arange(200) - saw) * 1.0
+    for values, name in ((slider, "displacement"), (np.arange(200.0), "load_point")):
+        rows = zip(np.arange(200) * 0.01, saw, values, strict=True)
+        text = "time_s\tforce_N\tdisp_um\n" + "".join(f"{t:.2f}\t{f}\t{x}\n" for t, f, x in rows)
+        record = record_of(tmp_path / "a.txt", text)
+        np.testing.assert_allclose(getattr(record, name), 1e-6 * values)
+        assert "taken as the displacement" in "\n".join(record.report)
+
+
+def test_matlab_structures_and_hdf5_units(tmp_path):
+    time, force = np.arange(50) * 0.01, np.sin(np.arange(50))
+    savemat(tmp_path / "a.mat", {"run": {"time_ms": 1e3 * time, "force_mN": force}, "fs": 100.0})
+    record = understand(tmp_path / "a.mat").record
+    np.testing.assert_allclose(record.time, time)
+    np.testing.assert_allclose(record.force, 1e-3 * force)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"], file["ch1"] = time, (force * 1000).astype("i2")
+        file["time"].attrs["units"] = "seconds since 2020-01-01"
+        file["ch1"].attrs.update(
+            {"units": "mN", "scale_factor": 1e-3, "long_name": "shear force", "_FillValue": 0}
+        )
+        file["other"] = h5py.ExternalLink("secret.h5", "/time")
+    record = understand(tmp_path / "a.h5").record
+    assert len(record.time) == 49
+    np.testing.assert_allclose(record.force, 1e-3 * force[1:], atol=1e-6)
+
+
+def test_what_lies_in_other_files_is_not_read(tmp_path):
+    (tmp_path / "secret").write_bytes(np.arange(50.0).tobytes())
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["force_N"] = np.arange(50.0)
+        outside = [(str(tmp_path / "secret"), 0, 400)]
+        file.create_dataset("time_s", (50,), "f8", external=outside)
+    with pytest.raises(mesoslip.FileError, match="time_s has its data in another file"):
+        understand(tmp_path / "a.h5")
+    np.savez(tmp_path / "a.npz", time_s=np.array([{}], dtype=object))
+    with pytest.raises(mesoslip.FileError, match="damaged file of NumPy"):
+        understand(tmp_path / "a.npz")
+
+
+def test_a_compressed_file_that_is_cut_is_refused(tmp_path):
+    data = gzip.compress(("time_s\tforce_N\n" + ROWS).encode())
+    (tmp_path / "a.txt.gz").write_bytes(data[:-20])
+    with pytest.raises(mesoslip.FileError, match="cut short"):
+        understand(tmp_path / "a.txt.gz")

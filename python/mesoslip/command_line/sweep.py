@@ -83,9 +83,8 @@ def sweep(
                 )
         except WriteError as error:
             kept = len(store.names())
-            raise WriteError(
-                f"{error}; {counted(kept, 'point')} stored: the same command continues"
-            ) from error
+            stored = f"{counted(kept, 'point')} {'is' if kept == 1 else 'are'} stored"
+            raise WriteError(f"{error}; {stored}: the same command continues") from error
         status = _write(done, path, stop)
     _report(done, path, quiet)
     if status:

@@ -15,7 +15,7 @@ from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError
-from mesoslip.output.access import group_of
+from mesoslip.output.access import group_of, is_measured
 
 Array = NDArray[np.float64]
 
@@ -185,6 +185,11 @@ class Experiment:
     def static_force(self) -> float:
         """F_s of the configuration, in the unit of the force; NaN without one."""
         return math.nan if self.config is None else self.config.contacts.static_force
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether it is a measured trace, and no run."""
+        return is_measured(self.tree)
 
     @property
     def stiffness(self) -> float:

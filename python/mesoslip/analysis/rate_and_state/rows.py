@@ -20,7 +20,10 @@ MAX_MISFIT = 0.01
 
 FIT = Group(
     output_index=Meaning("1", "number of the output, from 0", np.int64),
-    law=Meaning("1", "evolution law of the state variable", np.str_),
+    stage_number=Meaning(
+        "1", "stage that starts with the step or hold, -1 for all stages together", np.int64
+    ),
+    law=Meaning("1", "evolution law of the state variables", np.str_),
     reference_velocity=Meaning("m s-1", "V0"),
     reference_force=Meaning("N", "steady force at V0"),
     reference_force_error=Meaning("N", "standard error of the reference force"),
@@ -30,10 +33,19 @@ FIT = Group(
     b_error=Meaning("N", "standard error of b"),
     slip_distance=Meaning("m", "characteristic slip distance D_c"),
     slip_distance_error=Meaning("m", "standard error of D_c"),
+    b2=Meaning("N", "parameter b of a second state variable"),
+    b2_error=Meaning("N", "standard error of b2"),
+    slip_distance2=Meaning("m", "characteristic slip distance of the second state variable"),
+    slip_distance2_error=Meaning("m", "standard error of the second slip distance"),
+    a_minus_b=Meaning("N", "rate dependence of steady sliding, with the second state variable"),
+    a_minus_b_error=Meaning("N", "standard error of the rate dependence"),
+    trend=Meaning("N m-1", "trend of the friction with displacement that was fitted"),
+    trend_error=Meaning("N m-1", "standard error of the trend"),
     stiffness=Meaning("N m-1", "stiffness of the spring, infinite for a prescribed slider"),
     stiffness_error=Meaning("N m-1", "standard error of the stiffness, 0 if it is that of the run"),
     critical_stiffness=Meaning("N m-1", "stiffness of the spring below which sliding is unstable"),
     noise=Meaning("N", "standard deviation of the noise of the averaged record"),
+    noise_time=Meaning("s", "correlation time of the noise, 0 if it is white"),
     residual=Meaning("N", "root mean square of the residuals"),
     relative_misfit=Meaning("1", "residual over the standard deviation of the record"),
     chi_square=Meaning("1", "mean square of the residuals over their noise"),
@@ -43,7 +55,9 @@ FIT = Group(
     information_criterion=Meaning(
         "1", "Akaike's criterion; the law with the lower one is likelier"
     ),
+    evolution_chi_square=Meaning("1", "chi square that the evolution of the state explains"),
     is_described=Meaning("1", "whether the law describes the record", np.int8),
+    is_preferred=Meaning("1", "whether the record prefers the law to the others", np.int8),
     note=Meaning("1", "assessment of the fit", np.str_),
 )
 
@@ -64,20 +78,30 @@ def fit_rows(
     """
     record = record_of(experiment)
     if isinstance(record, str):
-        return [_empty_row(number, "", record)]
+        return [empty_row(number, "", record)]
     rows = []
     for law in LAWS:
         try:
             rows.append(_fit_row(number, record, fit(record, law, free_stiffness=free_stiffness)))
         except RunError as error:
-            rows.append(_empty_row(number, law, str(error)))
+            rows.append(empty_row(number, law, str(error)))
     return rows
 
 
-def _empty_row(number: int, law: str, note: str) -> dict[str, Any]:
-    """A row without parameters."""
+def empty_row(number: int, law: str, note: str) -> dict[str, Any]:
+    """A row without parameters.
+
+    Parameters
+    ----------
+    number
+        Number of the output.
+    law
+        The law; empty if there is none.
+    note
+        The note.
+    """
     row = {name: math.nan if one.dtype is np.float64 else 0 for name, one in FIT.items()}
-    return row | {"output_index": number, "law": law, "note": note}
+    return row | {"output_index": number, "stage_number": -1, "law": law, "note": note}
 
 
 def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
@@ -88,9 +112,7 @@ def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
         if record.has_noise
         else relative < MAX_MISFIT
     ) and not found.at_bounds
-    return {
-        "output_index": number,
-        "law": found.law.law,
+    return empty_row(number, found.law.law, _assessment(record, found, relative, described)) | {
         "reference_velocity": found.law.reference_velocity,
         "reference_force": found.law.reference_force,
         "reference_force_error": errors[0],
@@ -100,6 +122,10 @@ def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
         "b_error": errors[2],
         "slip_distance": found.law.slip_distance,
         "slip_distance_error": errors[3],
+        "a_minus_b": found.law.a - found.law.b,
+        "a_minus_b_error": math.sqrt(
+            max(float(np.array([0, 1, -1, 0]) @ found.covariance[:4, :4] @ [0, 1, -1, 0]), 0.0)
+        ),
         "stiffness": found.stiffness,
         "stiffness_error": errors[4] if errors.size > 4 else 0.0,
         "critical_stiffness": found.law.critical_stiffness,
@@ -112,7 +138,6 @@ def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
         "runs_p_value": found.runs_p_value,
         "information_criterion": found.information_criterion if record.has_noise else math.nan,
         "is_described": int(described),
-        "note": _assessment(record, found, relative, described),
     }
 
 

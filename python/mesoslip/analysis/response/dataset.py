@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.rate_and_state.measured import measured_rows
 from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows
 from mesoslip.analysis.response.columns import HEALING_LINE, HOLDS, STEADY, STEADY_LINE, STEPS
 from mesoslip.analysis.response.holds import healing_line, hold_rows
@@ -19,6 +20,7 @@ from mesoslip.analysis.response.line import Line
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
 from mesoslip.analysis.slips import write_table
+from mesoslip.errors import FileError
 from mesoslip.output.inputs import OutputLike, as_run, several
 from mesoslip.output.variables import Group
 
@@ -108,10 +110,19 @@ def response_of(
         row
         for number, one in numbered
         if with_fit
-        for row in fit_rows(one, number, free_stiffness=free_stiffness)
+        for row in (measured_rows if one.is_measured else fit_rows)(
+            one, number, free_stiffness=free_stiffness
+        )
     ]
     steady = _dataset(STEADY, "velocity_stage", rows["steady"])
     holds = _dataset(HOLDS, "hold", rows["holds"])
+    names = {one.apparatus.force_name for one in experiments}
+    if len(names) > 1:
+        raise FileError(
+            "outputs with forces and with friction coefficients do not go together; read the trace "
+            "of coefficients again with --normal-force"
+        )
+    are_coefficients = names == {"friction_coefficient"}
     parts = {
         "steady": (
             steady.assign(_line_variables(STEADY_LINE, steady_line(steady))),
@@ -128,14 +139,18 @@ def response_of(
     static = {one.static_force for one in experiments if not math.isnan(one.static_force)}
     groups = {}
     for name, (data, group) in parts.items():
-        if normal_force is not None:
+        if are_coefficients:
+            data = _as_coefficients(data, group)
+        elif normal_force is not None:
             data = _with_ratios(data, group, normal_force, "coefficient", "normal force")
         elif len(static) == 1:
             data = _with_ratios(data, group, static.copy().pop(), "ratio", "static force")
         groups["/" + name] = data
     tree = xr.DataTree.from_dict(groups)
     tree.attrs["outputs"] = [one.name for one in experiments]
-    if normal_force is not None:
+    if are_coefficients:
+        tree.attrs["force_unit"] = "1"
+    elif normal_force is not None:
         tree.attrs["normal_force"] = normal_force
     elif len(static) == 1:
         tree.attrs["static_force"] = static.pop()
@@ -185,6 +200,20 @@ def _with_ratios(data: xr.Dataset, group: Group, scale: float, suffix: str, of: 
         if group[name].units == "N"
     }
     return data.assign(ratios)
+
+
+def _as_coefficients(data: xr.Dataset, group: Group) -> xr.Dataset:
+    """A dataset of a trace of friction coefficients: forces have the suffix ``_coefficient``, and
+    stiffnesses are inverse lengths."""
+    renamed = {
+        name: ratio_name(name, "coefficient")
+        for name in map(str, data.data_vars)
+        if group[name].units == "N"
+    }
+    for name in map(str, data.data_vars):
+        if group[name].units in {"N", "N m-1"}:
+            data[name].attrs["units"] = "1" if group[name].units == "N" else "m-1"
+    return data.rename(renamed)
 
 
 def rows_of(tree: xr.DataTree, name: str) -> list[dict[str, Any]]:

@@ -148,7 +148,7 @@ def drive_stages(time: Array, load_point: Array) -> tuple[DriveStage, ...]:
         return ()
     origin, zero = float(time[0]), float(load_point[0])
     noise = _sample_noise(time, load_point - zero)
-    edges = _even_edges(time.size, MAX_POINTS // 2)
+    edges = _even_edges(load_point, MAX_POINTS // 4)
     bounds: list[int] = []
     for _ in range(PASSES):
         points = _inflated(_means(time - origin, load_point - zero, edges, noise))
@@ -215,9 +215,23 @@ def _inflated(points: _Points) -> _Points:
     return replace(points, variance=points.variance * factor)
 
 
-def _even_edges(size: int, count: int) -> Integers:
-    """First samples of at most ``count`` means of as many samples each, and the end."""
-    return np.unique(np.linspace(0, size, min(size, count) + 1).astype(np.int64))
+def _even_edges(values: Array, count: int) -> Integers:
+    """First samples of means, and the end: at most ``count`` means of as many samples each, divided
+    where they pass more than their share of the path, so that a short stage has some too."""
+    size = values.size
+    edges = np.unique(np.linspace(0, size, min(size, count) + 1).astype(np.int64))
+    means = np.add.reduceat(values, edges[:-1]) / np.diff(edges)
+    passed = np.abs(np.diff(means, prepend=means[0], append=means[-1]))
+    passed = np.maximum(passed[:-1], passed[1:])
+    total = float(passed.sum())
+    if total == 0:
+        return edges
+    parts = np.maximum(1, np.ceil(count * passed / total)).astype(np.int64)
+    divided = [
+        np.linspace(begin, end, min(part, end - begin) + 1).astype(np.int64)
+        for begin, end, part in zip(edges[:-1], edges[1:], parts, strict=True)
+    ]
+    return np.unique(np.concatenate(divided))
 
 
 def _means(time: Array, values: Array, edges: Integers, noise: tuple[float, float]) -> _Points:

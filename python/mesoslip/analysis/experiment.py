@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -185,6 +186,20 @@ class Experiment:
     def static_force(self) -> float:
         """F_s of the configuration, in the unit of the force; NaN without one."""
         return math.nan if self.config is None else self.config.contacts.static_force
+
+    def without_trend(self, trend: float) -> Experiment:
+        """The experiment without a linear trend of the force along the drive.
+
+        Parameters
+        ----------
+        trend
+            Increase of the force over the displacement of the slider, unit of the force per metre.
+        """
+        changed = copy.copy(self)
+        changed.__dict__.pop("steady_means", None)
+        moved = self.displacement - self.displacement[:, :1]
+        changed.force = self.force - trend * moved
+        return changed
 
     @property
     def is_measured(self) -> bool:

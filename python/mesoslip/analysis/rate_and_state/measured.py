@@ -132,6 +132,26 @@ def trend_of(experiment: Experiment) -> bool:
     return bool(described.get("trend", "linear") != "none")
 
 
+def fitted_trend(rows: Sequence[dict[str, Any]]) -> float:
+    """Trend of the friction with displacement of the law of one state that fits a whole record
+    best, unit of the force over metre; 0 without one.
+
+    Parameters
+    ----------
+    rows
+        Rows of `measured_rows`.
+    """
+    able = [
+        one
+        for one in rows
+        if one["stage_number"] < 0 and math.isfinite(one["trend"]) and "two" not in one["law"]
+    ]
+    if not able:
+        return 0.0
+    best = min(able, key=lambda one: float(one["information_criterion"]))
+    return float(best["trend"])
+
+
 def measured_rows(
     experiment: Experiment,
     number: int,

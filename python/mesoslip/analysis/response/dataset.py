@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from mesoslip.analysis.experiment import Experiment
-from mesoslip.analysis.rate_and_state.measured import measured_rows
+from mesoslip.analysis.rate_and_state.measured import fitted_trend, measured_rows
 from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows
 from mesoslip.analysis.response.columns import HEALING_LINE, HOLDS, STEADY, STEADY_LINE, STEPS
 from mesoslip.analysis.response.holds import healing_line, hold_rows
@@ -100,20 +100,18 @@ def response_of(
         Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
         (``hold``), and ``rate_and_state`` (``fit``, one for each output and law).
     """
-    numbered = list(enumerate(experiments))
+    fits: list[dict[str, Any]] = []
+    analysed = []
+    for number, one in enumerate(experiments):
+        mine = _fits(one, number, free_stiffness) if with_fit else []
+        fits += mine
+        analysed.append(one.without_trend(fitted_trend(mine)) if one.is_measured else one)
+    numbered = list(enumerate(analysed))
     rows = {
         "steady": [row for number, one in numbered for row in steady_rows(one, number)],
         "steps": [row for number, one in numbered for row in step_rows(one, number)],
         "holds": [row for number, one in numbered for row in hold_rows(one, number)],
     }
-    fits = [
-        row
-        for number, one in numbered
-        if with_fit
-        for row in (measured_rows if one.is_measured else fit_rows)(
-            one, number, free_stiffness=free_stiffness
-        )
-    ]
     steady = _dataset(STEADY, "velocity_stage", rows["steady"])
     holds = _dataset(HOLDS, "hold", rows["holds"])
     names = {one.apparatus.force_name for one in experiments}
@@ -155,6 +153,12 @@ def response_of(
     elif len(static) == 1:
         tree.attrs["static_force"] = static.pop()
     return tree
+
+
+def _fits(experiment: Experiment, number: int, free_stiffness: bool) -> list[dict[str, Any]]:
+    """Rows of rate-and-state parameters."""
+    rows_of_fit = measured_rows if experiment.is_measured else fit_rows
+    return rows_of_fit(experiment, number, free_stiffness=free_stiffness)
 
 
 def _line_variables(group: Group, found: Line | None) -> dict[str, xr.Variable]:

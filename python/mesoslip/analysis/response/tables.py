@@ -58,6 +58,10 @@ class _Column:
         Variables of other columns with the same unit and decimals.
     digits
         Significant digits of values without error.
+    is_optional
+        Whether the column is left out if it has no values.
+    is_stage
+        Whether it has numbers of stages, -1 for all of them.
     """
 
     header: str
@@ -66,10 +70,20 @@ class _Column:
     error: str = ""
     beside: tuple[str, ...] = ()
     digits: int = 4
+    is_optional: bool = False
+    is_stage: bool = False
+
+    def is_empty(self, rows: Sequence[Row]) -> bool:
+        """Whether the column is left out: it may be, and says nothing."""
+        if self.is_stage:
+            return all(row[self.name] < 0 for row in rows)
+        return self.is_optional and all(math.isnan(row[self.name]) for row in rows)
 
     def cells(self, rows: Sequence[Row]) -> tuple[str, ...]:
         """The header and the cells."""
         values = [row[self.name] for row in rows]
+        if self.is_stage:
+            return (self.header, *("all" if one < 0 else str(one) for one in values))
         if not self.unit:
             return (self.header, *map(str, values))
         alike = [row[name] for name in self.beside for row in rows]
@@ -80,11 +94,13 @@ class _Column:
 
 def force_scale(tree: xr.DataTree) -> str:
     """A sentence on the scale of the forces in the tables."""
+    if "force_unit" in tree.attrs:
+        return "Forces are friction coefficients."
     if "normal_force" in tree.attrs:
         return f"Forces are divided by the normal force, {_size(tree.attrs['normal_force'])}."
     if "static_force" in tree.attrs:
         return f"Forces are divided by the static force, {_size(tree.attrs['static_force'])}."
-    return "Forces are not divided by the static force, which differs between the outputs."
+    return "Forces are not divided by a static force, which is unknown or differs between outputs."
 
 
 def _size(force: float) -> str:
@@ -101,7 +117,7 @@ def tables(tree: xr.DataTree) -> list[ResponseTable]:
     """
     suffix = (
         "coefficient"
-        if "normal_force" in tree.attrs
+        if tree.attrs.keys() & {"normal_force", "force_unit"}
         else "ratio"
         if "static_force" in tree.attrs
         else ""
@@ -111,28 +127,33 @@ def tables(tree: xr.DataTree) -> list[ResponseTable]:
         "holds": ("healing_per_decade", "healing per decade of hold time"),
     }
     result = []
-    for name, (title, columns) in _columns(suffix, len(tree.attrs["outputs"]) > 1).items():
+    several = len(tree.attrs["outputs"]) > 1
+    stiffness = "1/m" if "force_unit" in tree.attrs else "N/m"
+    for name, (title, columns) in _columns(suffix, several, stiffness).items():
         rows = rows_of(tree, name)
         if not rows:
             continue
-        head, *cells = zip(*(one.cells(rows) for one in columns), strict=True)
+        used = [one for one in columns if not one.is_empty(rows)]
+        head, *cells = zip(*(one.cells(rows) for one in used), strict=True)
         line = _line(scalars_of(tree, name), *lines[name], suffix) if name in lines else ""
         notes = tuple(str(row["note"]) for row in rows)
         result.append(ResponseTable(title, head, tuple(cells), notes, line))
     return result
 
 
-def _columns(suffix: str, several: bool) -> dict[str, tuple[str, tuple[_Column, ...]]]:
-    """Title and columns of the table of each group."""
+def _columns(
+    suffix: str, several: bool, stiffness: str
+) -> dict[str, tuple[str, tuple[_Column, ...]]]:
+    """Title and columns of the table of each group; the last is the unit of stiffnesses."""
     outputs = (_Column("output", "output_index"),) if several else ()
     stages = (*outputs, _Column("stage", "stage_number"))
 
-    def force(header: str, name: str, digits: int = 4) -> _Column:
+    def force(header: str, name: str, digits: int = 4, *, is_optional: bool = False) -> _Column:
         error = f"{name}_error"
         if not suffix:
-            return _Column(header, name, "N", error, digits=digits)
-        names = (ratio_name(one, suffix) for one in (name, error))
-        return _Column(header, next(names), "1", next(names), digits=digits)
+            return _Column(header, name, "N", error, digits=digits, is_optional=is_optional)
+        name, error = (ratio_name(one, suffix) for one in (name, error))
+        return _Column(header, name, "1", error, digits=digits, is_optional=is_optional)
 
     def length(header: str, name: str, beside: str = "") -> _Column:
         return _Column(header, name, "m", f"{name}_error", (beside,) if beside else ())
@@ -180,13 +201,25 @@ def _columns(suffix: str, several: bool) -> dict[str, tuple[str, tuple[_Column, 
             "Rate and state",
             (
                 *outputs,
+                _Column("stage", "stage_number", is_stage=True),
                 _Column("law", "law"),
                 force("a", "a"),
                 force("b", "b"),
-                length("D_c", "slip_distance"),
-                _Column("stiffness", "stiffness", "N/m", "stiffness_error"),
+                length("D_c", "slip_distance", "slip_distance2"),
+                force("b2", "b2", is_optional=True),
+                _Column(
+                    "D_c2",
+                    "slip_distance2",
+                    "m",
+                    "slip_distance2_error",
+                    ("slip_distance",),
+                    is_optional=True,
+                ),
+                force("a - b", "a_minus_b"),
+                _Column("stiffness", "stiffness", stiffness, "stiffness_error"),
                 _Column("misfit", "relative_misfit", "1", digits=2),
                 _Column("p", "fit_p_value", "1", digits=2),
+                _Column("AIC", "information_criterion", "1"),
             ),
         ),
     }

@@ -10,8 +10,11 @@ UV := $(VENV)/bin/uv
 # Stamps: the locked Python packages, and mesoslip itself, built from these sources.
 ENVIRONMENT := $(VENV)/.environment
 INSTALLED := $(VENV)/.installed
-# Packages that only the documentation needs.
+# Packages that only the documentation needs, and only wheels.
 DOCUMENTATION := $(VENV)/.documentation
+WHEEL_TOOLS := $(VENV)/.wheel-tools
+# Stamp: a wheel of these sources in dist.
+WHEEL := build/wheel/.built
 
 # .git/logs/HEAD, as outputs have the commit of the program.
 SOURCES := meson.build meson.options pyproject.toml \
@@ -31,7 +34,7 @@ export UV_COMPILE_BYTECODE := 1
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser figures \
-  claims campaign docs bench fuzz mutants reference lint clean
+  claims campaign docs bench fuzz mutants reference lint wheel test-wheel test-sdist clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -98,8 +101,17 @@ docs: $(INSTALLED) $(DOCUMENTATION) ## Build the documentation into out/docs, an
 	$(VENV)/bin/python -m sphinx -b html -W --keep-going -q -d build/docs docs out/docs
 	$(VENV)/bin/python tools/self-contained out/docs
 
+wheel: $(WHEEL) ## Build a wheel that needs neither gfortran nor SUNDIALS, into dist
+	@ls -sh1 dist/*.whl
+
+test-wheel: $(WHEEL) ## Test the wheel where neither gfortran nor SUNDIALS can be found
+	PYTHON=$(VENV)/bin/python tools/test-wheel dist/*.whl
+
+test-sdist: $(ENVIRONMENT) ## Build from the source archive of the last commit, without a network
+	PYTHON=$(VENV)/bin/python tools/test-sdist
+
 clean: ## Remove the environment, what was built, and outputs
-	rm -rf build out $(VENV) docs/examples docs/reference/generated
+	rm -rf build dist out $(VENV) docs/examples docs/reference/generated
 
 $(ENVIRONMENT): pyproject.toml uv.lock tools/system-packages
 	@PYTHON=$(PYTHON) tools/system-packages $(SYSTEM_PACKAGES)
@@ -120,6 +132,21 @@ $(INSTALLED): $(ENVIRONMENT) $(SOURCES)
 $(DOCUMENTATION): $(ENVIRONMENT)
 	@echo "Installing what builds the documentation"
 	@$(UV) sync --quiet --locked --inexact --no-install-project --group docs
+	@touch $@
+
+$(WHEEL_TOOLS): $(ENVIRONMENT)
+	@echo "Installing what builds wheels"
+	@$(UV) sync --quiet --locked --inexact --no-install-project --group wheel
+	@touch $@
+
+# auditwheel copies the libraries into the wheel and finds out the oldest glibc that it runs with.
+$(WHEEL): $(WHEEL_TOOLS) $(SOURCES)
+	@echo "Building a wheel"
+	@mkdir -p build/wheel
+	@rm -f build/wheel/*.whl dist/*.whl
+	@$(UV) build --quiet --wheel --no-build-isolation --python $(VENV)/bin/python --out-dir build/wheel \
+	  -Cbuild-dir=build/wheel/meson $(addprefix -Csetup-args=,$(MESON_ARGS)) .
+	@$(VENV)/bin/auditwheel repair --wheel-dir dist build/wheel/*.whl
 	@touch $@
 
 # The Fortran tests, without Python, in three profiles.

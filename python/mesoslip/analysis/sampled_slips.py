@@ -5,8 +5,8 @@ The rule, explained in `docs/fit.md`:
 - Impulses and hum are taken off. A running median, which keeps steps, takes off noise. It is as
   wide as the noise demands, and at most half as wide as the deep falls of the trace are long.
 - A **fall** leads from a maximum to a minimum of alternating extremes that differ by more than a
-  threshold. The threshold is above the range of the noise that is left. Where the number of slips
-  depends on it there, it is the start of the widest range of thresholds in which it does not.
+  threshold. The threshold is the start of the first range of thresholds above the white noise in
+  which the number of slips hardly changes; without one, it is above the range of all the noise.
 - A fall that begins within half a period after the end of another, and reaches a lower force,
   belongs to it. The period is twice the duration of deep falls.
 - A fall is a **slip** if it is deeper than twice what ringing regained before it. A rise within
@@ -47,7 +47,7 @@ MAX_LOADING, MAX_RISING = 1.1, 3.0
 # Contribution of noise to the difference of a maximum and a minimum, in standard deviations.
 EXTREME_NOISE = 4.0
 # Minimum rate of fall, in 2 pi over the period times the deepest fall.
-MIN_RATE = 0.012
+MIN_RATE = 0.015
 # Minimum rate of a fall over its depth, over that of the deep falls.
 MIN_STEEPNESS = 0.15
 # Minimum fall over the range of the force.
@@ -59,7 +59,7 @@ WIDTHS = (1, 3, 5, 9, 17, 33, 65, 129, 257)
 # Ratio of thresholds for which slips are counted.
 THRESHOLD_RATIO = 1.25
 # A plateau: maximum change of the count, and minimum ratio of its thresholds.
-MAX_CHANGE, MIN_PLATEAU = 0.1, 2.0
+MAX_CHANGE, MIN_PLATEAU = 0.1, 1.5
 # Minimum number of slips at the plateau, over that of all that stands out of the noise.
 MIN_KEPT = 0.5
 # Falls of a decaying oscillation: minimum number, and maximum ratio of the last to the first.
@@ -222,8 +222,8 @@ def _none(period: float, min_fall: float = 0.0, counts: SlipCounts | None = None
 class _Trace:
     """A trace after a running median, along the drive.
 
-    ``width`` is that of the median [s], ``noise`` what it left, and ``floor`` the minimum fall that
-    stands out of it.
+    ``width`` is that of the median [s], ``noise`` what it left, ``floor`` the minimum fall that
+    stands out of it, and ``white_floor`` that which stands out of the white noise.
     """
 
     time: Array
@@ -233,6 +233,7 @@ class _Trace:
     width: float
     noise: float
     floor: float
+    white_floor: float
     period: float
 
     def on_samples(
@@ -265,6 +266,7 @@ def _denoise(
     """
     parts = parts_of(time)
     interval = max(parts, key=len).interval
+    white = noise.deviation if isinstance(noise, TraceNoise) else noise
     found = None
     for width in WIDTHS:
         if found is not None and width * interval > found.period / 4:
@@ -272,16 +274,26 @@ def _denoise(
         filtered = _running_median(force, parts, width * interval)
         rest = _after_median(noise, width, interval)
         height = MIN_HEIGHT * float(np.ptp(filtered))
-        highest = _noise_range(len(force) / width) * rest
-        floor = max(highest, height)
+        size = _noise_range(len(force) / width)
+        floor = max(size * rest, height)
         extremes = extremes_of(filtered)
         tops, bottoms = extremes.falls(floor)
         tops, bottoms = tops[tops > 0], bottoms[tops > 0]
         if tops.size:
             own = period if period is not None else _period(time, filtered, tops, bottoms)
             if found is None or width * interval <= own / 4:
-                found = _Trace(time, filtered, parts, extremes, width * interval, rest, floor, own)
-        if highest <= height or width >= len(force) // 8:
+                found = _Trace(
+                    time=time,
+                    force=filtered,
+                    parts=parts,
+                    extremes=extremes,
+                    width=width * interval,
+                    noise=rest,
+                    floor=floor,
+                    white_floor=max(size * _after_median(white, width, interval), height),
+                    period=own,
+                )
+        if size * rest <= height or width >= len(force) // 8:
             break
     return found
 
@@ -462,11 +474,14 @@ def _decaying(start: Array, end: Array, drop: Array, period: float) -> NDArray[n
 
 
 def _count(search: _Search) -> SlipCounts:
-    """Slips by threshold, from the noise to the deepest fall, and the plateau of their number."""
+    """Slips by threshold, and the plateau of their number.
+
+    From what stands out of the white noise on: what seems to be correlated noise may be the trace.
+    """
     trace = search._trace
     deepest = float(trace.extremes.fall_sizes[-1])
-    steps = max(1, math.ceil(math.log(deepest / trace.floor) / math.log(THRESHOLD_RATIO)))
-    thresholds: Array = trace.floor * THRESHOLD_RATIO ** np.arange(steps, dtype=np.float64)
+    steps = max(1, math.ceil(math.log(deepest / trace.white_floor) / math.log(THRESHOLD_RATIO)))
+    thresholds: Array = trace.white_floor * THRESHOLD_RATIO ** np.arange(steps, dtype=np.float64)
     counts = np.array([len(search.slips(float(one))[0]) for one in thresholds])
     for first, count in enumerate(counts):
         same = np.abs(counts[first:] - count) <= max(1.0, MAX_CHANGE * count)

@@ -141,7 +141,7 @@ def _fitted(residual: Array) -> tuple[float, float]:
     distance = np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
     white = _products(unit)
     best = (math.inf, 0.0, 0.0)
-    for time in np.geomspace(MIN_TIME, length / 2, TIMES):
+    for time in np.geomspace(MIN_TIME, max(length / 8, 1.0), TIMES):
         basis = np.stack([white, _products(np.exp(-distance / time))], axis=1)
         weights, misfit = nnls(basis, wanted)
         if misfit < best[0]:

@@ -13,6 +13,7 @@ from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
 from mesoslip.plots.close_up import draw_slip, largest_slip
 from mesoslip.plots.curves import about_realizations, curve, draw_curves, others_behind
 from mesoslip.plots.extent import Extent
+from mesoslip.plots.marks import draw_marks
 from mesoslip.plots.style import (
     COLORS,
     OTHERS,
@@ -71,7 +72,7 @@ def draw_force(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 
 def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: HorizontalAxis) -> None:
     name = force_of(tree)
-    is_elastic = name != "spring_force"
+    is_elastic = name == "elastic_force"
     curves = [curve(tree, name, other, **OTHERS) for other in others_behind(tree, extent)]
     front: dict[str, Any] = {"color": "black"}
     if is_elastic:
@@ -80,8 +81,13 @@ def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: Horiz
         front["label"] = "mean elastic force $K(X_d - X_1)$"
     curves.append(curve(tree, name, extent, **front))
     draw_curves(axes, curves, name, horizontal)
+    if is_measured(tree):
+        marked = draw_marks(axes, tree, name, extent, horizontal)
+        if marked:
+            legend_above(axes)
+        is_elastic = is_elastic or marked
     titles(axes, tree, about_realizations(tree, extent), beside_legend=is_elastic)
-    if is_elastic:
+    if is_elastic and not is_measured(tree):
         legend_above(axes)
 
 

@@ -1,0 +1,76 @@
+"""Marks in pictures of measured traces: slips, and impulses of the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from mesoslip.output.access import group_of
+from mesoslip.plots.axis import HorizontalAxis
+from mesoslip.plots.extent import Extent
+from mesoslip.plots.trace import UNITS
+from mesoslip.quantities import scale_for
+
+# Maximum number of slips or impulses that are marked: more are a band.
+MAX_MARKS = 2000
+
+
+def draw_marks(
+    axes: Axes, tree: xr.DataTree, name: str, extent: Extent, horizontal: HorizontalAxis
+) -> bool:
+    """Mark starts and ends of slips, and samples of impulses, on the force of a measured trace.
+
+    Parameters
+    ----------
+    axes
+        Axes in which the force is drawn.
+    tree, name
+        The output, and the variable with its force.
+    extent, horizontal
+        What is shown of it.
+
+    Returns
+    -------
+    bool
+        Whether anything is marked.
+    """
+    root = tree.to_dataset()
+    time, force = root["time"].values, root[name].values[0]
+    window = extent.window(tree)
+    inside = (time >= window[0]) & (time <= window[1])
+    scale = scale_for(float(np.max(np.abs(force[inside]), initial=0.0)), UNITS[name])
+    across = root[extent.horizontal[0]].values
+    across = across if across.ndim == 1 else across[0]
+    slips = group_of(tree, "slips")
+    marks = [
+        (
+            slips["start_time"].values,
+            slips["force_before"].values,
+            "v",
+            "start of a slip",
+            "tab:red",
+        ),
+        (slips["end_time"].values, slips["force_after"].values, "^", "end of a slip", "tab:blue"),
+    ]
+    if "noise" in tree.children and "impulse_time" in tree["noise"]:
+        at = group_of(tree, "noise")["impulse_time"].values
+        marks.append((at, np.interp(at, time, force), "x", "impulse, taken off", "tab:orange"))
+    found = False
+    for at, level, marker, label, color in marks:
+        shown = (at >= window[0]) & (at <= window[1])
+        if not 0 < np.count_nonzero(shown) <= MAX_MARKS:
+            continue
+        place = np.interp(at[shown], time, across)
+        axes.plot(
+            (place - horizontal.origin) / horizontal.scale.size,
+            level[shown] / scale.size,
+            marker,
+            color=color,
+            markersize=3.5,
+            markeredgewidth=0.8,
+            label=label,
+            zorder=3,
+        )
+        found = True
+    return found

@@ -1,6 +1,7 @@
 !> The kinds of contacts by name: the only place that knows them all.
 module mesoslip_contacts
-   use mesoslip_contacts_activated, only: make_contact_activated
+   use mesoslip_contacts_activated_ageing, only: make_activated_ageing
+   use mesoslip_contacts_activated_contacts, only: make_contact_activated
    use mesoslip_contacts_ageing_contacts, only: make_contact_ageing
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
@@ -36,6 +37,8 @@ contains
       select case (kind)
       case ("activated")
          call make_contact_activated(contacts, common, parameters, error)
+      case ("activated ageing")
+         call make_activated_ageing(contacts, common, parameters, error)
       case ("ageing")
          call make_contact_ageing(contacts, common, parameters, error)
       case ("ageing populations")

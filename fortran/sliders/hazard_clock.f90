@@ -2,7 +2,8 @@
 !>
 !> The reading is the integral of exp(slope X) over the motion, which is known as a series of the
 !> velocity. It is a Gauss rule over parts of a step so short that the rule is exact to rounding;
-!> the time of a reading is found by Halley's method.
+!> the time of a reading is found by Halley's method. In most steps between two events the exponent
+!> changes so little that the reading is a polynomial of the time.
 module mesoslip_sliders_hazard_clock
    use mesoslip_interface_law, only: clocks, hazard_clock_type
    use mesoslip_numerics_kinds, only: wp
@@ -18,6 +19,15 @@ module mesoslip_sliders_hazard_clock
    !> Relative change of a time after which one more step changes nothing: convergence is cubic
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
+   !> A step is short if the terms of the exponent, from the first to the fifth, change it by no
+   !> more than this, and others not at all: what a series of the eighth order leaves out of its
+   !> exponential function is below 1e-14 of it
+   integer, parameter :: short_terms = 5, short_order = 8
+   real(wp), parameter :: max_short(short_terms) = [0.1_wp, 1.0e-4_wp, 1.0e-6_wp, 1.0e-8_wp, &
+      & 1.0e-10_wp]
+   real(wp), parameter :: no_change = 1.0e-16_wp
+   !> Bounds on the integral over a short step, relative to its length
+   real(wp), parameter :: min_growth = 0.9_wp, max_growth = 1.11_wp
    !> Change of an exponent below which three terms of a series do
    real(wp), parameter :: small = 1.0e-4_wp
 
@@ -38,9 +48,12 @@ module mesoslip_sliders_hazard_clock
 
    !> The exponent of a clock during a step: time times a polynomial.
    type :: exponent_type
-      integer :: terms = 1
+      integer :: terms
       !> Coefficients of the exponent over the time [1/s], and of its rate
-      real(wp) :: mean(0:max_terms - 1) = 0.0_wp, rate(0:max_terms - 1) = 0.0_wp
+      real(wp) :: mean(0:max_terms - 1), rate(0:max_terms - 1)
+      !> Whether the step is short, and then coefficients of the exponential function
+      logical :: is_short
+      real(wp) :: growth(0:short_order)
    end type exponent_type
 
 contains
@@ -108,7 +121,11 @@ contains
          time = steady_time(clock%slope * series(0), wanted)
          return
       end if
-      exponent = exponent_of(clock%slope, series, terms)
+      call expand_exponent(clock%slope, series, terms, step, exponent)
+      if (exponent%is_short) then
+         if (wanted <= step * max_growth) time = short_time(exponent, step, wanted)
+         return
+      end if
       parts = parts_of(exponent, step)
       length = step / parts
       do number = 1, parts
@@ -143,7 +160,11 @@ contains
          reading = step * mean_growth(slope * series(0) * step)
          return
       end if
-      exponent = exponent_of(slope, series, terms)
+      call expand_exponent(slope, series, terms, step, exponent)
+      if (exponent%is_short) then
+         reading = short_integral(exponent%growth, step)
+         return
+      end if
       parts = parts_of(exponent, step)
       length = step / parts
       reading = 0.0_wp
@@ -154,20 +175,84 @@ contains
       end do
    end function reading_after
 
-   !> The exponent during a step.
-   pure function exponent_of(slope, series, terms) result(exponent)
-      real(wp), intent(in) :: slope, series(0:)
+   !> The exponent during a step, and its exponential function if the step is short.
+   pure subroutine expand_exponent(slope, series, terms, step, exponent)
+      real(wp), intent(in) :: slope, series(0:), step
       integer, intent(in) :: terms
-      type(exponent_type) :: exponent
+      type(exponent_type), intent(out) :: exponent
 
-      integer :: term
+      integer :: term, order
+      real(wp) :: change, power, part(short_terms)
 
       exponent%terms = terms
       do term = 0, terms - 1
          exponent%rate(term) = slope * series(term)
          exponent%mean(term) = exponent%rate(term) * inverse(term + 1)
       end do
-   end function exponent_of
+      part = 0.0_wp
+      change = 0.0_wp
+      do term = terms, short_terms + 1, -1
+         change = (change + abs(exponent%mean(term - 1))) * step
+      end do
+      power = 1.0_wp
+      exponent%is_short = .true.
+      do term = 1, min(terms, short_terms)
+         power = power * step
+         part(term) = exponent%rate(term - 1)
+         if (abs(exponent%mean(term - 1)) * power > max_short(term)) exponent%is_short = .false.
+      end do
+      if (.not. change * power <= no_change) exponent%is_short = .false.
+      if (.not. exponent%is_short) return
+      ! Of g = exp(e): n g_n is the sum over j of j e_j g_(n-j).
+      exponent%growth(0) = 1.0_wp
+      do order = 1, short_order
+         change = 0.0_wp
+         do term = 1, min(order, short_terms)
+            change = change + part(term) * exponent%growth(order - term)
+         end do
+         exponent%growth(order) = change * inverse(order)
+      end do
+   end subroutine expand_exponent
+
+   !> Integral of the exponential function over a short step.
+   pure function short_integral(growth, time) result(integral)
+      !> Its coefficients
+      real(wp), intent(in) :: growth(0:short_order)
+      real(wp), intent(in) :: time
+      real(wp) :: integral
+
+      integer :: order
+
+      integral = 0.0_wp
+      do order = short_order, 0, -1
+         integral = integral * time + growth(order) * inverse(order + 1)
+      end do
+      integral = integral * time
+   end function short_integral
+
+   !> Time at which an integral is reached in a short step; huge if it is not.
+   pure function short_time(exponent, step, wanted) result(time)
+      type(exponent_type), intent(in) :: exponent
+      real(wp), intent(in) :: step, wanted
+      real(wp) :: time
+
+      real(wp) :: change, pace
+      integer :: iteration
+
+      time = huge(1.0_wp)
+      if (wanted > step * min_growth) then
+         if (wanted > short_integral(exponent%growth, step)) return
+      end if
+      pace = exponent%rate(0) * wanted
+      time = wanted * (1.0_wp - pace * (0.5_wp - pace * (inverse(3) - 0.25_wp * pace)))
+      do iteration = 1, max_iterations
+         change = (short_integral(exponent%growth, time) - wanted) &
+            & / horner(exponent%growth, short_order + 1, time)
+         time = time - change * (1.0_wp + 0.5_wp * change * exponent%rate(0))
+         if (abs(change) <= converged * time) exit
+      end do
+      time = min(time, step)
+   end function short_time
 
    !> Parts of a step in each of which the exponent changes so little that a rule is exact.
    pure function parts_of(exponent, step) result(parts)

@@ -108,6 +108,13 @@ KINDS: dict[str, dict[str, Any]] = {
     "layered, thermal": THERMAL | {"slider": LAYERED | {"base": BASE}},
     "layered, thermal, adams": THERMAL | {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "quasistatic, thermal": THERMAL | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
+    "rigid, thermal, ageing": AGEING | THERMAL,
+    "prescribed, thermal, ageing, log": AGEING
+    | THERMAL
+    | {
+        "slider": {"kind": "prescribed"},
+        "contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03},
+    },
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},

@@ -11,7 +11,7 @@ import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.theory.thermal import hold_force, steady_force, steady_slope
-from oracles import fixed_step, frozen_law, uniforms
+from oracles import aged, fixed_step, frozen_law, uniforms
 from scipy import integrate, special
 from test_events import breaks
 
@@ -197,6 +197,48 @@ def test_steady_sliding_has_the_force_of_the_theory(changes):
     assert error < 5e-3 * 2000
     expected = steady_force(config, config.drive_speed)
     assert abs(blocks.mean() - expected) < 4 * error
+
+
+def aged_force(config: Config) -> float:
+    """F(v) of contacts that age, by a plain quadrature over thresholds and stretches."""
+    contacts, speed = config.contacts, config.drive_speed
+    law = frozen_law("gaussian", contacts.threshold.relative_width)
+    stretch = np.linspace(0.0, 2.5, 10_001)
+    mean, spread = aged(config, stretch / speed)
+    work = life = 0.0
+    for threshold in law.isf((np.arange(200) + 0.5) / 200 * law.sf(0.0)):
+        limit = mean + spread * (threshold - 1) / contacts.threshold.relative_width
+        rate = contacts.thermal.rate * np.exp((stretch - limit) / contacts.thermal.force_ratio)
+        hazard = integrate.cumulative_trapezoid(rate, stretch / speed, initial=0)
+        survival = np.where(np.cumsum(stretch >= limit) > 0, 0.0, np.exp(-hazard))
+        work += integrate.trapezoid(stretch * survival, stretch) / 200
+        life += integrate.trapezoid(survival, stretch) / 200
+    return contacts.count * work / (life + speed * contacts.delay)
+
+
+@pytest.mark.parametrize(
+    "ageing",
+    [
+        {"law": "log", "time": 1.0, "growth": 0.05},
+        {"law": "relax", "time": 20.0, "young_force_ratio": 0.6, "young_relative_width": 0.3},
+        {"law": "relax", "time": 20.0, "young_force_ratio": 1.3, "young_relative_width": 0.3},
+    ],
+    ids=["log", "relax", "weaker"],
+)
+def test_steady_sliding_of_ageing_contacts(ageing):
+    """Where neither ageing nor activation is fast or slow."""
+    config = unit(
+        1000,
+        run__duration=4000.0,
+        contacts__threshold__relative_width=0.2,
+        contacts__ageing=ageing,
+        contacts__delay=2.0,
+        output__interval=4.0,
+    )
+    force = mesoslip.run(config)["spring_force"].values[0]
+    blocks = force[-700:].reshape(7, 100).mean(axis=1)
+    error = blocks.std(ddof=1) / math.sqrt(7)
+    assert abs(blocks.mean() - aged_force(config)) < 4 * error + 1e-3 * 1000
 
 
 def test_a_hold_of_a_million_seconds():

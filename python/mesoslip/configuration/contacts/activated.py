@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from mesoslip.configuration.contacts.ageing import ageing_of, ageing_problems
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.tables import (
     MAX_IDLE_BREAKS,
@@ -14,6 +15,8 @@ from mesoslip.configuration.contacts.tables import (
 )
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
+
+INITIAL_AGE = "contacts.ageing.initial_age"
 
 
 def thermal_of(config: Setting) -> Thermal:
@@ -37,12 +40,6 @@ def thermal_problems(config: Setting) -> Complaints:
             'must be "equal" with contacts.thermal: contacts of one stiffness share the clock by '
             "which they break",
             contacts.coupling,
-        )
-    if contacts.ageing is not None:
-        yield Complaint(
-            "contacts.ageing",
-            "is not for contacts.thermal: contacts whose thresholds change with age do not share "
-            "the clock by which they break",
         )
     if config.interaction is not None and config.interaction.strength > 0:
         yield Complaint(
@@ -89,3 +86,23 @@ class ActivatedContacts(ContactKind):
         if self.interaction is not None:
             yield from self.interaction.problems(config.contacts)
         yield from thermal_problems(config)
+
+
+class ActivatedAgeingContacts(ActivatedContacts):
+    """The same contacts with thresholds that change with age."""
+
+    kernel_kind: ClassVar[str] = "activated ageing"
+    # A contact whose threshold moves breaks within a tiny gap of it.
+    force_error_bound: ClassVar[float] = 1e-9
+
+    @classmethod
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
+        return super().is_meant(run, contacts, interaction) and contacts.ageing is not None
+
+    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+        return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
+
+    def problems(self, config: Setting) -> Complaints:
+        yield from super().problems(config)
+        # Coupling and interaction have been checked.
+        yield from (one for one in ageing_problems(config) if one.key == INITIAL_AGE)

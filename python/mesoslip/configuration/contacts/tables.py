@@ -163,8 +163,8 @@ class Thermal(Table):
     """Thermally activated breaking (model section 13).
 
     A contact that bears the force f below its threshold f_s breaks at the rate
-    ω_0 exp((|f| − f_s)/f_T), and at once at the threshold. The force f_T is given relative to the
-    mean threshold, or as k_B T over an activation length.
+    ω_0 exp((|f| − f_s)/f_T), and at once at the threshold, which may change with age. The force f_T
+    is given relative to the mean threshold, or as k_B T over an activation length.
     """
 
     rate: Annotated[Rate, Field(gt=0)]

@@ -1,0 +1,318 @@
+!> Contacts that break by thermal activation, whose thresholds change with their age.
+!>
+!> The rate of breaking of a contact then depends on its age, and clocks are not shared. A contact
+!> goes by the clock of a lower bound on its threshold, which gives a rate that is too high. Where
+!> it comes to its key it breaks with a probability, the ratio of its rate to that one; if it does
+!> not, it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly 26
+!> (1979) 403). No error is made, and there is no time step. The bound of a threshold that grows is
+!> what it was the last time; that of one that falls is what it will be after a while, when the
+!> contact gets another one.
+module mesoslip_contacts_activated_ageing
+   use mesoslip_contacts_activated_contacts, only: contact_activated_type, initialize_activated, &
+      & offer_activated, respond_activated
+   use mesoslip_contacts_activated_keys, only: exchange_activated, life_left, never, &
+      & set_up_activated
+   use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
+   use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
+   use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_random, only: uniform_pair
+   implicit none
+   private
+
+   public :: contact_activated_ageing_type, make_activated_ageing
+
+   !> Gap to its threshold over the mean breaking stretch at which a contact breaks
+   real(wp), parameter :: tiny_gap = 1.0e-12_wp
+   !> By how much a threshold falls until it has another bound: in units of f_T, and over the gap
+   !> between it and the force
+   real(wp), parameter :: max_drop = 0.5_wp, max_gap_part = 0.9_wp
+   !> Number of deviates that a contact may draw in a life, which are then drawn again
+   integer(i8), parameter :: max_attempts = 65535_i8
+
+   !> Numbers of the age of a contact: when it attached [s], its configured breaking stretch [m],
+   !> when its bound changes [s], and deviates drawn in its life
+   integer, parameter :: age_length = 4
+   integer, parameter :: age_birth = 1, age_limit = 2, age_renewal = 3, age_attempts = 4
+
+   !> Activated contacts that age. The limit in a record is a bound from below on the breaking
+   !> stretch.
+   type, extends(contact_activated_type) :: contact_activated_ageing_type
+      !> How thresholds change
+      type(ageing_law_type), private :: ageing
+      !> Numbers of their ages, shape (age_length, count)
+      real(wp), allocatable, private :: age(:, :)
+      !> Contacts in the order in which their bounds change
+      type(break_tree_type), private :: order_renewal
+      !> Time of the last response [s], and whether contacts are those of the start
+      real(wp), private :: now = 0.0_wp
+      logical, private :: is_start = .false.
+   contains
+      procedure :: initialize
+      procedure :: offer
+      procedure :: respond
+      procedure :: prepare
+      procedure :: confirms
+      procedure :: renew_due
+      procedure :: rebuild
+      procedure :: records
+      procedure :: exchange
+      procedure, non_overridable, private :: bound, renew, threshold
+   end type contact_activated_ageing_type
+
+contains
+
+   !> Set up contacts from named numbers.
+   subroutine make_activated_ageing(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: the law of ageing, columns and rows, rate and force of activation
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_activated_ageing_type), allocatable :: self
+      integer :: stat
+
+      allocate (self)
+      self%parameters = common
+      call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
+      if (allocated(error)) return
+      call set_up_activated(self, parameters, error)
+      if (allocated(error)) return
+      allocate (self%age(age_length, common%count), source=0.0_wp, stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the ages of contacts")
+         return
+      end if
+      call new_break_tree(self%order_renewal, common%count, error)
+      call move_alloc(self, contacts)
+   end subroutine make_activated_ageing
+
+   !> Draw all contacts for the start of a run.
+   subroutine initialize(self, state)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> One of the initial_ codes
+      integer, intent(in) :: state
+
+      self%is_start = .true.
+      call initialize_activated(self, state)
+      self%is_start = .false.
+   end subroutine initialize
+
+   !> Contact force as a law, which holds until something happens, or a bound changes.
+   subroutine offer(self, pose, law, window)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds
+      type(window_type), intent(out) :: window
+
+      call offer_activated(self, pose, law, window)
+      window%end_time = min(window%end_time, self%order_renewal%first())
+   end subroutine offer
+
+   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
+   subroutine respond(self, before, after)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+
+      self%now = after%time
+      call respond_activated(self, before, after)
+   end subroutine respond
+
+   !> Prepare the life of a contact that has attached.
+   subroutine prepare(self, contact, pose)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp]
+      if (self%is_start) self%age(age_birth, contact) = -self%ageing%initial_age
+      call self%bound(contact, pose)
+   end subroutine prepare
+
+   !> Threshold of a contact now, as a stretch.
+   pure function threshold(self, contact, time)
+      class(contact_activated_ageing_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time
+      real(wp) :: threshold
+
+      threshold = self%ageing%threshold(self%age(age_limit, contact), self%stretch, &
+         & time - self%age(age_birth, contact))
+   end function threshold
+
+   !> Find a lower bound on the threshold of a contact, and until when it is one.
+   subroutine bound(self, contact, pose)
+      class(contact_activated_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: here, gap, lack
+
+      here = self%threshold(contact, pose%time)
+      self%record(row_limit, contact) = here
+      self%age(age_renewal, contact) = never
+      associate (age => self%age(:, contact))
+         if (self%ageing%falls(age(age_limit), self%stretch) &
+            & .and. here > age(age_limit)) then
+            gap = here - abs(pose%displacement - self%record(row_origin, contact))
+            gap = min(max_drop / self%slope, max_gap_part * max(gap, tiny_gap * self%stretch))
+            if (here - gap > age(age_limit)) then
+               lack = self%ageing%lack(age(age_limit), self%stretch)
+               age(age_renewal) = max(nearest(pose%time, huge(1.0_wp)), age(age_birth) &
+                  & - self%ageing%time * log((here - gap - age(age_limit)) / (-lack)))
+               self%record(row_limit, contact) = min(here - gap, &
+                  & self%threshold(contact, age(age_renewal)))
+            else
+               self%record(row_limit, contact) = age(age_limit)
+            end if
+         end if
+      end associate
+      call self%order_renewal%set(contact, self%age(age_renewal, contact))
+   end subroutine bound
+
+   !> Give a contact another bound.
+   subroutine renew(self, contact, pose)
+      class(contact_activated_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      call self%settle_deviate(contact)
+      call self%take_out(contact)
+      call self%bound(contact, pose)
+      call self%put(contact)
+   end subroutine renew
+
+   !> Whether a contact breaks that has come to its bound, or its clock to its key.
+   function confirms(self, contact, pose, by_clock)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Whether it is the clock
+      logical, intent(in) :: by_clock
+      !> Whether it breaks
+      logical :: confirms
+
+      real(wp) :: here, uniform(2)
+      integer(i8) :: attempt
+
+      here = self%threshold(contact, pose%time)
+      confirms = here - abs(pose%displacement - self%record(row_origin, contact)) &
+         & <= tiny_gap * self%stretch
+      if (by_clock .and. .not. confirms) then
+         attempt = int(self%age(age_attempts, contact), i8)
+         call draw(attempt)
+         confirms = uniform(2) <= exp(-self%slope * (here - self%record(row_limit, contact)))
+      end if
+      if (confirms) then
+         call self%order_renewal%remove(contact)
+         return
+      end if
+      call self%renew(contact, pose)
+      if (.not. by_clock) return
+      attempt = mod(attempt, max_attempts) + 1_i8
+      self%age(age_attempts, contact) = real(attempt, wp)
+      call draw(attempt)
+      call self%take_out(contact)
+      self%life(life_left, contact) = -log(uniform(1))
+      call self%put(contact)
+
+   contains
+
+      !> Draw the deviates of an attempt: the exponential one is of the first, and whether the
+      !> contact breaks is of the second.
+      subroutine draw(attempt)
+         integer(i8), intent(in) :: attempt
+
+         call uniform_pair(self%parameters%seed, self%parameters%realization, &
+            & int(contact - 1, i8), int(self%record(row_renewal, contact), i8), attempt, uniform)
+      end subroutine draw
+
+   end function confirms
+
+   !> Give contacts other bounds whose bounds change now; those that fell to their forces break.
+   subroutine renew_due(self, pose)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+
+      do
+         contact = self%order_renewal%due(pose%time)
+         if (contact == 0) return
+         if (self%confirms(contact, pose, .false.)) call self%break_contact(contact, pose)
+      end do
+   end subroutine renew_due
+
+   !> Order all contacts anew, from the records, lives and ages.
+   subroutine rebuild(self, displacement)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+
+      integer :: contact
+
+      call self%contact_activated_type%rebuild(displacement)
+      call self%order_renewal%clear()
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         call self%order_renewal%put(contact, self%age(age_renewal, contact))
+      end do
+      call self%order_renewal%arrange()
+   end subroutine rebuild
+
+   !> What each contact is.
+   pure subroutine records(self, values)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(in) :: self
+      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch of now [m], number of
+      !> renewals of each contact, shape (contact_record_length, count)
+      real(wp), intent(out) :: values(:, :)
+
+      integer :: contact
+
+      call self%contact_activated_type%records(values)
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         values(3, contact) = self%threshold(contact, self%now)
+      end do
+   end subroutine records
+
+   !> Put the state into an archive or take it out.
+   subroutine exchange(self, archive)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      call exchange_activated(self, archive)
+      call archive%section("ages of activated contacts")
+      call archive%exchange("age", self%age)
+      call archive%exchange("now", self%now)
+   end subroutine exchange
+
+end module mesoslip_contacts_activated_ageing

@@ -131,6 +131,12 @@ def test_the_output_repeats_its_reading(tmp_path, command):
     assert tree["recorded"]["Displ_microns"].attrs["units"] == "microns"
     assert "spring_force" not in tree
     (tmp_path / "out").mkdir()
+    raw = tmp_path / "basalt-step.txt.gz"
+    raw = raw.rename(tmp_path / "raw.nc")
+    text = (tmp_path / "again.toml").read_text().replace("basalt-step.txt.gz", "raw.nc")
+    (tmp_path / "again.toml").write_text(text)
+    # The data are not written over.
+    assert command("trace", tmp_path / "again.toml", "-o", raw)[0] == 2
     status, printed, _ = command(
         "trace", tmp_path / "again.toml", "--dry-run", "-o", tmp_path / "out" / "o.nc"
     )

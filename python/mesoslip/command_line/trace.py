@@ -86,7 +86,8 @@ def trace(
     from mesoslip.measured.trace import trace_of, understand
     from mesoslip.output import targets, writing
 
-    path = output or Path("out") / f"{file.name.partition('.')[0]}.nc"
+    is_packed = file.suffix in {".gz", ".bz2", ".xz", ".zip"}
+    path = output or Path("out") / f"{Path(file.stem).stem if is_packed else file.stem}.nc"
     if not dry_run:
         targets.check_output(path, [file, *([] if config is None else [config])])
     understood = understand(
@@ -111,6 +112,7 @@ def trace(
         typer.echo(line)
     if dry_run:
         return
+    targets.check_output(path, [understood.path])
     tree = trace_of(understood)
     writing.write(tree, path)
     typer.echo(f"{path}: {', '.join(_summary(tree))}", err=True)

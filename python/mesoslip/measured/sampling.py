@@ -134,6 +134,8 @@ def _without_repeated(
 ) -> Numbers:
     """Leave out rows that repeat earlier ones in time and values."""
     every = np.ascontiguousarray(np.vstack([time, values])[:, rows].T) + 0.0
+    # A missing number is like another one.
+    every[np.isnan(every)] = np.inf
     view = every.view([("", every.dtype)] * every.shape[1]).ravel()
     _, first = np.unique(view, return_index=True)
     if len(first) == len(rows):

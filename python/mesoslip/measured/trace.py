@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,13 +76,15 @@ class Understood:
         Configuration of a model, if there is one.
     stiffness
         Spring constant, in the unit of the force over metre; None if unknown.
+    path
+        The file of the measurement.
     """
 
     record: Record
     experiment: Experiment
     config: Config | None
     stiffness: float | None
-    name: str
+    path: Path
 
     @cached_property
     def noise(self) -> TraceNoise | float:
@@ -119,7 +122,7 @@ def understand(
     stiffness = _stiffness(record, trace) if model is None else model.spring_stiffness
     _check_units(record, trace, model)
     resolved = experiment.model_copy(update={"trace": resolve(trace, record)})
-    return Understood(record, resolved, model, stiffness, path.name)
+    return Understood(record, resolved, model, stiffness, path)
 
 
 def _stiffness(record: Record, trace: TraceDescription) -> float | None:
@@ -257,7 +260,7 @@ def read_trace(
 def trace_of(understood: Understood) -> xr.DataTree:
     """The output of a file that was understood; see `read_trace`."""
     record, trace = understood.record, understood.experiment.trace
-    title = understood.experiment.title or f"Measured: {understood.name}"
+    title = understood.experiment.title or f"Measured: {understood.path.name}"
     velocity, stiffness = trace.si("velocity"), understood.stiffness
     period = trace.si("period")
     known: Config | PartialConfig = PartialConfig(title, velocity, stiffness)
@@ -284,7 +287,7 @@ def trace_of(understood: Understood) -> xr.DataTree:
     level = noise.deviation if isinstance(noise, TraceNoise) else noise
     details = {
         "origin": "measured",
-        "measured_file": understood.name,
+        "measured_file": understood.path.name,
         "trace": understood.experiment.trace.to_toml(),
         "understood": "\n".join(understood.report),
         "complete": "true",

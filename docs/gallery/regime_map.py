@@ -7,7 +7,6 @@ numbers; see the page on campaigns.
 """
 
 import mesoslip
-import xarray as xr
 
 data = mesoslip.sweep(
     {
@@ -29,12 +28,12 @@ data = mesoslip.sweep(
         },
     }
 )
-mesoslip.plot(xr.DataTree(data), view="regime")
+mesoslip.plot(data, view="regime")
 
 # %%
 # The mean force falls where the slider sticks and slips.
 
-mesoslip.plot(xr.DataTree(data), view="mean_force")
+mesoslip.plot(data, view="mean_force")
 
 # %%
 # The result is an xarray dataset, here as a table: 0 smooth, 1 stick-slip, 2 irregular,

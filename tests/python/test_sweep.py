@@ -202,7 +202,7 @@ def test_a_map_shows_each_value_where_it_belongs(tmp_path):
         {"contacts.delay": delays, "slider.stiffness": stiffnesses, "realization": [0, 1]},
         {"configuration": ""},
     )
-    figure = mesoslip.plot(xr.DataTree(data), tmp_path / "map.png")
+    figure = mesoslip.plot(data, tmp_path / "map.png")
     maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
     for axes, expected in zip(maps, (force.mean(-1), regime[..., 0]), strict=True):
         mesh = axes.collections[0]
@@ -223,7 +223,7 @@ def test_names_can_be_drawn():
     law = {"contacts.threshold.law": ["uniform", "gaussian", "weibull"]}
     for grid in (law, law | {"contacts.delay": [1e-4, 5e-4]}):
         data = mesoslip.sweep(tables(grid=grid), executor=mesoslip.Threads())
-        figure = mesoslip.plot(xr.DataTree(data))
+        figure = mesoslip.plot(data)
         figure.canvas.draw()
         texts = [
             text.get_text()

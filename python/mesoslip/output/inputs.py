@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
-OutputLike: TypeAlias = "PathLike | xr.DataTree"
+OutputLike: TypeAlias = "PathLike | xr.DataTree | xr.Dataset"
 
 
 def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
@@ -104,14 +104,18 @@ def opened(outputs: Sequence[OutputLike], stack: ExitStack) -> tuple[list[xr.Dat
             names.append(str(one))
             trees.append(stack.enter_context(files.opened(Path(one))))
         else:
-            trees.append(_tree(one))
-            names.append(one.attrs.get("title", f"output {number}"))
+            tree = _tree(one)
+            trees.append(tree)
+            names.append(tree.attrs.get("title", f"output {number}"))
     return trees, names
 
 
 def _tree(output: object) -> xr.DataTree:
     import xarray as xr
 
+    if isinstance(output, xr.Dataset):
+        # That of a sweep, which has no groups.
+        return xr.DataTree(output)
     if not isinstance(output, xr.DataTree):
         raise FileError(f"{shown(output)}: is not an output; give its path or its DataTree")
     return output

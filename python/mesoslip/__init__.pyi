@@ -10,6 +10,7 @@ from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
 from .execution.executors import Dask, Processes, Threads
 from .inference.fit_trace import fit
+from .inference.predict import compare_fits, predict
 from .measured.trace import read_trace
 from .output.inputs import open_output
 from .plots.plot import plot
@@ -34,6 +35,7 @@ __all__ = [
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "compare_fits",
     "curve",
     "derived",
     "example",
@@ -41,6 +43,7 @@ __all__ = [
     "onset",
     "open_output",
     "plot",
+    "predict",
     "read_trace",
     "regime",
     "report",

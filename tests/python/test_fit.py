@@ -14,13 +14,14 @@ from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
 from mesoslip.inference import checks, likelihood
-from mesoslip.inference.fit import prepare
+from mesoslip.inference.experiment import prepare
+from mesoslip.inference.features import Feature
 from mesoslip.inference.plan import Plan
 from mesoslip.inference.prior import FreeParameter, Prior
 from mesoslip.inference.rounds import estimate_posterior
 from mesoslip.inference.sampler import draw, r_hat
-from mesoslip.inference.simulations import Simulations
-from mesoslip.inference.summaries import Feature, Summarizer
+from mesoslip.inference.simulations import Simulations, Simulator
+from mesoslip.inference.summaries import Summarizer
 from scipy.stats import kstest, norm
 
 FREE = {
@@ -60,6 +61,7 @@ class Linear:
 
     def __init__(self, matrix, deviation, seed):
         self.simulator = SimpleNamespace(prior=range(matrix.shape[1]))
+        self.has_coarse = False
         self.matrix, self.deviation = matrix, deviation
         self.rng = np.random.default_rng(seed)
         self.parameters = np.empty((0, matrix.shape[1]))
@@ -394,14 +396,15 @@ def test_what_predictions_never_have_is_reported():
     assert checks.compare(features, simulated, predicted, unlikely).is_rejected
     off = checks.compare(features, simulated, predicted, np.array([0, 0, 30.0, 0, 0]))
     assert off.is_rejected
-    assert off.worst[0].feature.name == "s2"
+    assert np.nanargmax(np.abs(off.scores)) == 2
+    assert off.disagreeing == ("g",)
     lacking = checks.compare(features, simulated, predicted, np.array([0, np.nan, 0, 0, 0]))
     assert lacking.is_rejected
-    assert "but not for the trace" in str(lacking.worst[0])
+    assert "but not for the trace" in lacking.sentences[0]
     predicted[:, 3] = np.nan
     extra = checks.compare(features, simulated, predicted, np.zeros(5))
     assert extra.is_rejected
-    assert "hardly any prediction" in str(extra.worst[0])
+    assert "hardly any prediction" in extra.sentences[0]
 
 
 def test_warnings_report_what_is_not_determined():
@@ -424,8 +427,8 @@ def test_warnings_report_what_is_not_determined():
         ],
         axis=1,
     )
-    fine = checks.Agreement(0.5, np.zeros(1), ())
-    printed = "\n".join(checks.warnings(prior, draws, fine, np.ones(4)))
+    fine = checks.Agreement(0.5, np.zeros(1), {}, ())
+    printed = "\n".join(checks.warnings(prior, draws, fine, np.ones(4), {}))
     assert "c is not determined" in printed
     assert "a and b are only determined together (correlation +" in printed
     assert "d lies at the end of its range: widen fit.free.d.to" in printed
@@ -506,18 +509,17 @@ def test_a_configuration_that_contradicts_the_trace_is_refused():
     with pytest.raises(ConfigError, match="is 140 in the trace"):
         prepare(tree, Plan.from_dict(fit_tables()))
     free = FREE | {"slider.stiffness": {"from": 50, "to": 300}}
-    simulator, _ = prepare(tree, Plan.from_dict(fit_tables(free=free)))
-    assert simulator.noise == NOISE
+    assert prepare(tree, Plan.from_dict(fit_tables(free=free))).noise.deviation == NOISE
 
 
 def test_a_trace_may_count_from_a_time_on():
     """Then its start is not summed up, and simulations are cut as well."""
     plan = Plan.from_dict(fit_tables(after="1 s"))
-    simulator, force = prepare(experiment(), plan)
-    assert len(force) == 1501
-    assert not simulator.summarizer.has_start
-    assert "first_peak" not in simulator.summarizer.names
-    made = Simulations(simulator, expected=4, executor=1)
+    one = prepare(experiment(), plan)
+    assert len(one.force) == 1501
+    assert not one.summarizer.has_start
+    assert "first_peak" not in one.summarizer.names
+    made = Simulations(Simulator((one,), plan.prior, 1), expected=4, executor=1)
     made.add(np.full((2, 2), 0.5))
     assert np.isfinite(made.summaries[:, :3]).all()
 
@@ -536,10 +538,12 @@ def test_a_trace_of_several_stages_may_start_at_any_time():
     tables = klein_tables(**SMALL | drive)
     tables["fit"] = fit_tables()["fit"]
     plan = Plan.from_dict(tables)
-    simulator, force = prepare(later, plan)
+    one = prepare(later, plan)
+    force = one.force
     np.testing.assert_array_equal(force, tree["spring_force"].values[0])
-    np.testing.assert_allclose(simulator.summarizer.time, tree["time"], atol=1e-9)
-    made = simulator.force((3, plan.prior.unit(np.array([18e-6, 1e-3]))), Stop())
+    np.testing.assert_allclose(one.summarizer.time, tree["time"], atol=1e-9)
+    unit = plan.prior.unit(np.array([18e-6, 1e-3]))
+    made = Simulator((one,), plan.prior, 1).forces((3, unit, False), Stop())[0]
     first = np.searchsorted(tree["time"], 0.95 * mesoslip.slips(tree)["start_time"].values[0])
     assert np.max(np.abs(made - force)[:first]) < 6 * NOISE
     # In the hold the force changes by ringing and noise only; before and after, by the drive.
@@ -553,9 +557,11 @@ def test_a_trace_without_noise_is_given_some():
     tables = fit_tables()
     del tables["fit"]["noise"]
     tree = mesoslip.run(klein_tables(**SMALL))
-    simulator, force = prepare(tree, Plan.from_dict(tables))
-    assert simulator.noise == pytest.approx(5e-4 * np.max(np.abs(tree["spring_force"].values)))
-    assert np.std(force - tree["spring_force"].values[0]) == pytest.approx(simulator.noise, rel=0.1)
+    one = prepare(tree, Plan.from_dict(tables))
+    deviation = one.noise.deviation
+    assert deviation == pytest.approx(5e-4 * np.max(np.abs(tree["spring_force"].values)))
+    added = one.force - tree["spring_force"].values[0]
+    assert np.std(added) == pytest.approx(deviation, rel=0.1)
 
 
 def test_without_emcee_it_is_reported_before_anything_is_simulated(monkeypatch):

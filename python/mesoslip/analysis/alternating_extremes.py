@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Samples = NDArray[np.int_]
 
+# Turning points from which on cycles are found one by one.
+MIN_POINTS = 100
+
 
 @dataclass(frozen=True)
 class Extremes:
@@ -70,7 +73,7 @@ def extremes_of(values: Array) -> Extremes:
     values
         Samples, shape (samples,).
     """
-    at = _turning_points(values)
+    at, inner = _without_inner_cycles(values, _turning_points(values))
     levels = values[at].tolist()
     stack: list[int] = []
     cycles: list[tuple[int, int]] = []
@@ -83,8 +86,29 @@ def extremes_of(values: Array) -> Extremes:
             cycles.append((stack[-2], stack[-1]))
             del stack[-2:]
         stack.append(number)
-    pairs = np.array(cycles, dtype=int).reshape(-1, 2)
-    return Extremes(values, at[pairs[:, 0]], at[pairs[:, 1]], at[stack])
+    pairs = np.concatenate([inner, at[np.array(cycles, dtype=int).reshape(-1, 2)]])
+    return Extremes(values, pairs[:, 0], pairs[:, 1], at[stack])
+
+
+def _without_inner_cycles(values: Array, at: Samples) -> tuple[Samples, Samples]:
+    """Turning points without the cycles of neighbours that differ less than those on both sides.
+
+    Such pairs have no point in common, and each pass removes most points of a noisy trace.
+
+    Returns
+    -------
+    at, cycles
+        The turning points that are left, and the pairs of samples, shape (cycles, 2).
+    """
+    found = [np.empty((0, 2), dtype=int)]
+    while at.size > MIN_POINTS:
+        sizes = np.abs(np.diff(values[at]))
+        inner = 1 + np.flatnonzero((sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] < sizes[2:]))
+        if inner.size == 0:
+            break
+        found.append(np.stack([at[inner], at[inner + 1]], axis=1))
+        at = np.delete(at, np.concatenate([inner, inner + 1]))
+    return at, np.concatenate(found)
 
 
 def _turning_points(values: Array) -> Samples:

@@ -10,7 +10,6 @@ import typer
 
 from mesoslip.command_line.options import (
     JsonOption,
-    OutputArgument,
     SetOption,
     print_json,
     print_table,
@@ -19,16 +18,19 @@ from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from mesoslip.inference.posterior import Row
 
 
 def fit(
-    output: OutputArgument,
-    config: Annotated[
-        str,
+    outputs: Annotated[
+        list[Path],
         typer.Argument(
-            help="TOML file with the known parameters, and a table [fit.free] of free ones",
-            metavar="CONFIG",
+            help="Outputs with the traces, then a TOML file with the known parameters and a table "
+            "[fit.free] of free ones; with --predict also the posterior file of an earlier fit; "
+            "with --compare posterior files",
+            metavar="OUT.nc... CONFIG",
         ),
     ],
     posterior: Annotated[
@@ -41,6 +43,18 @@ def fit(
         ),
     ] = None,
     changes: SetOption = None,
+    predict: Annotated[
+        Path | None,
+        typer.Option(
+            "--predict",
+            help="Predict a trace that is not in the fit, into a file of its own",
+            metavar="OUT.nc",
+        ),
+    ] = None,
+    compare: Annotated[
+        bool,
+        typer.Option("--compare", help="Compare fits of the same traces by their predictions"),
+    ] = False,
     workers: Annotated[
         int | None,
         typer.Option(min=1, help="Parallel simulations; the number of processors by default"),
@@ -48,38 +62,120 @@ def fit(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit parameters of the model to a trace, with their uncertainty.
+    """Fit parameters of the model to traces of one interface, with their uncertainty.
 
+    Of several traces each has its own drive and spring, and all have the free parameters.
     Simulations are stored beside the posterior, in NAME.simulations, until the fit is done. After
     an interruption the same command continues.
     """
-    from mesoslip.errors import FileError
+    if compare:
+        _print_scores(outputs, as_json=as_json)
+        return
+    *traces, config = outputs
+    if predict is not None and config.suffix == ".nc" and not traces:
+        target = posterior or config.with_name(f"{config.stem}.{predict.stem}.nc")
+        _predict(config, predict, target, workers, quiet=quiet, as_json=as_json)
+        return
+    check_arguments(traces, config)
+    path = posterior or Path("out") / f"{traces[0].stem}.posterior.nc"
+    tree = _fitted(traces, config, path, changes or (), workers, quiet=quiet)
+    _print(tree, as_json=as_json and predict is None)
+    if predict is not None:
+        target = path.with_name(f"{path.stem}.{predict.stem}.nc")
+        _predict(path, predict, target, workers, quiet=quiet, as_json=as_json)
+
+
+def _fitted(
+    traces: Sequence[Path],
+    config: Path,
+    path: Path,
+    changes: Sequence[str],
+    workers: int | None,
+    *,
+    quiet: bool,
+) -> xr.DataTree:
+    """Fit traces, and write the posterior."""
     from mesoslip.execution.store import Store
-    from mesoslip.inference.fit_trace import fit as fit_trace
-    from mesoslip.inference.plan import Plan
-    from mesoslip.inference.posterior import table
+    from mesoslip.inference.fit_trace import as_plan
+    from mesoslip.inference.fit_trace import fit as fit_traces
     from mesoslip.output import files, targets, writing
 
-    if Path(config).suffix == ".nc":
-        raise FileError(f"{config}: is an output; a fit needs a TOML file with a table [fit.free]")
-    plan = Plan.load(config, changes or ())
-    path = posterior or Path("out") / f"{output.stem}.posterior.nc"
-    targets.check_output(path, [output, config])
+    targets.check_output(path, [*traces, config])
     store = path.with_name(f"{path.stem}.simulations")
-    trace = files.read_run(output)
+    trees = [files.read_run(one) for one in traces]
+    plan = as_plan(config, trees, changes)
     with stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
-                tree = fit_trace(
-                    trace, plan, store=store, executor=workers, progress=progress, stop=stop
+                tree = fit_traces(
+                    traces, plan, store=store, executor=workers, progress=progress, stop=stop
                 )
         except StoppedError:
             say(f"{path}: interrupted; the same command continues from {store}")
             raise typer.Exit(stop.exit_status) from None
     writing.write(tree, path)
     Store(store, "simulations").remove()
+    return tree
+
+
+def _predict(
+    posterior: Path, trace: Path, path: Path, workers: int | None, *, quiet: bool, as_json: bool
+) -> None:
+    """Predict a trace by a posterior, write the predictions, and print the agreement."""
+    from mesoslip.inference.predict import predict
+    from mesoslip.output import targets, writing
+
+    targets.check_output(path, [posterior, trace])
+    with stopped_by_signals() as stop:
+        try:
+            with progress_shown(quiet) as progress:
+                tree = predict(posterior, trace, executor=workers, progress=progress, stop=stop)
+        except StoppedError:
+            say(f"{path}: interrupted")
+            raise typer.Exit(stop.exit_status) from None
+    writing.write(tree, path)
+    probability = tree.attrs["agreement_probability"]
+    notes = [one for one in str(tree.attrs["warnings"]).split("\n") if one]
+    if as_json:
+        print_json({"agreement_probability": probability, "warnings": notes})
+        return
+    typer.echo(f"{path}: agreement of {trace} with its prediction: p = {probability:.2g}")
+    for one in notes:
+        typer.echo(f"warning: {one}")
+
+
+def _print_scores(posteriors: Sequence[Path], *, as_json: bool) -> None:
+    """Compare fits of the same traces, and print their scores."""
+    from mesoslip.inference.predict import compare_fits
+    from mesoslip.quantities import with_error
+
+    scores = compare_fits(posteriors)
+    if as_json:
+        rows = [
+            {
+                "file": str(path),
+                "log_density": one.log_density,
+                "difference": one.difference,
+                "difference_error": one.error,
+            }
+            for path, one in zip(posteriors, scores, strict=True)
+        ]
+        print_json({"fits": rows})
+        return
+    cells = [["fit", "log predictive density", "below the best"]]
+    for path, one in zip(posteriors, scores, strict=True):
+        below = with_error(one.difference, one.error) if one.difference > 0 else "best"
+        cells.append([str(path), f"{one.log_density:.1f}", below])
+    print_table(cells)
+
+
+def _print(tree: xr.DataTree, *, as_json: bool) -> None:
+    """Print the table of a fit, its notes and its warnings."""
+    from mesoslip.inference.posterior import table
+
     rows = table(tree)
     notes = [one for one in str(tree.attrs["warnings"]).split("\n") if one]
+    remarks = [one for one in str(tree.attrs["notes"]).split("\n") if one]
     if as_json:
         print_json(
             {
@@ -92,17 +188,37 @@ def fit(
                         "shrinkage": row.shrinkage,
                         "verdict": row.verdict,
                         "most_informative": row.most_informative,
+                        "follows_from": row.follows_from,
                     }
                     for row in rows
                 },
                 "agreement_probability": tree.attrs["agreement_probability"],
                 "warnings": notes,
+                "notes": remarks,
             }
         )
         return
     _print_rows(rows, tree.attrs)
+    for one in remarks:
+        typer.echo(one)
     for one in notes:
         typer.echo(f"warning: {one}")
+
+
+def check_arguments(traces: Sequence[Path], config: Path) -> None:
+    """Check that traces and a configuration are given, in this order.
+
+    Raises
+    ------
+    FileError
+        If they are not.
+    """
+    from mesoslip.errors import FileError
+
+    if config.suffix == ".nc":
+        raise FileError(f"{config}: is an output; a fit needs a TOML file with a table [fit.free]")
+    if not traces:
+        raise FileError("a fit needs an output with a trace, and a TOML file with [fit.free]")
 
 
 def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:
@@ -118,7 +234,7 @@ def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:
             "unit",
             "verdict",
             "shrinkage",
-            "most informative feature",
+            "follows from",
         ]
     ]
     for row in rows:
@@ -135,7 +251,7 @@ def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:
                 scale.name,
                 row.verdict,
                 f"{row.shrinkage:.2f}",
-                row.most_informative,
+                row.follows_from,
             ]
         )
     print_table(cells)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.inference.features import Feature
 from mesoslip.inference.likelihood import project
+from mesoslip.inference.misfit import sentences
 from mesoslip.inference.prior import Prior
-from mesoslip.inference.summaries import Feature
 
 Array = NDArray[np.float64]
 
@@ -32,37 +33,15 @@ MAX_CORRELATION = 0.9
 MARGIN, MAX_IN_MARGIN = 0.02, 0.1
 # Maximum R-hat of converged chains.
 MAX_R_HAT = 1.05
-# Maximum number of disagreements in a warning.
-MAX_NAMED = 3
-
-
-@dataclass(frozen=True)
-class Disagreement:
-    """A summary in which the trace disagrees with the predictions.
-
-    Attributes
-    ----------
-    feature
-        The summary.
-    score
-        Deviation of the trace from the median prediction, in spreads of the predictions; infinite
-        if the summary is defined only for one of them.
-    """
-
-    feature: Feature
-    score: float
-
-    def __str__(self) -> str:
-        if np.isfinite(self.score):
-            return f"{self.feature.name} ({self.feature.meaning}) is off by {self.score:+.1f} sigma"
-        if self.score > 0:
-            return f"{self.feature.name} is defined for the trace, but for hardly any prediction"
-        return f"{self.feature.name} is defined for nearly all predictions, but not for the trace"
+# Information of a group over that of the most informative one from which a parameter follows from
+# it too, and maximum number of such groups.
+SHARE = 0.7
+MAX_NEEDED = 2
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Comparison of the trace with predictions.
+    """Comparison of traces with predictions.
 
     Attributes
     ----------
@@ -70,19 +49,28 @@ class Agreement:
         Fraction of predicted traces that deviate from the others at least as much as the trace.
     scores
         Deviation of each summary from the median prediction, in spreads of the predictions; NaN
-        if they cannot be compared.
-    worst
-        The summary with the largest deviation of each of the groups that disagree most.
+        if they cannot be compared, infinite if it is defined only for one of them.
+    groups
+        For each group of summaries, the fraction of the predictions that deviate as much in it.
+    sentences
+        The disagreements, in words.
     """
 
     probability: float
     scores: Array
-    worst: tuple[Disagreement, ...]
+    groups: dict[str, float]
+    sentences: tuple[str, ...]
 
     @property
     def is_rejected(self) -> bool:
         """Whether the model is rejected."""
         return self.probability < REJECTED
+
+    @property
+    def disagreeing(self) -> tuple[str, ...]:
+        """Groups of summaries in which the trace disagrees, the worst first."""
+        found = [name for name, one in self.groups.items() if one < REJECTED]
+        return tuple(sorted(found, key=lambda name: self.groups[name]))
 
 
 def compare(
@@ -144,17 +132,24 @@ def compare(
     parts = (1 + np.sum(own >= trace, axis=0)) / (1 + count)
     min_ranks = ranks.min(axis=1, initial=1.0)
     probability = (1 + np.sum(min_ranks <= parts.min(initial=1.0))) / (1 + count)
-    found = []
-    for index in np.argsort(parts):
-        inside = np.where(compared & (names == groups[index]), np.abs(scores), -1.0)
-        largest = int(np.argmax(inside))
-        found.append(Disagreement(features[largest], float(scores[largest])))
     scores[missing], scores[extra] = -np.inf, np.inf
-    for index in np.flatnonzero(missing | extra)[::-1]:
-        one = Disagreement(features[index], float(scores[index]))
-        found = [one, *(other for other in found if other.feature.group != one.feature.group)]
+    found = {groups[index]: float(parts[index]) for index in np.argsort(parts)}
+    for lost in np.flatnonzero(missing | extra).tolist():
+        found[features[lost].group] = 1 / (1 + count)
         probability = 1 / (1 + count)
-    return Agreement(float(probability), scores, tuple(found[:MAX_NAMED]))
+    # The group whose worst summary is farthest off first.
+    worst = {
+        group: float(np.nanmax(np.abs(scores[names == group]), initial=0.0)) for group in found
+    }
+    order = sorted(found, key=lambda group: (found[group], -worst[group]))
+    ranked = {str(group): found[group] for group in order}
+    disagreeing = [group for group in order if found[group] < REJECTED]
+    return Agreement(
+        float(probability),
+        scores,
+        ranked,
+        tuple(sentences(features, disagreeing, scores, observed, predicted)),
+    )
 
 
 def shrinkage(draws: Array) -> Array:
@@ -203,15 +198,62 @@ def information(
     return result
 
 
-def warnings(prior: Prior, draws: Array, agreement: Agreement, r_hat: Array) -> Iterator[str]:
-    """Warnings on the parameters of a fit."""
+def needed_groups(prior: Prior, informed: dict[str, Array]) -> dict[str, tuple[str, ...]]:
+    """The groups of summaries that each parameter follows from, the most informative first.
+
+    Parameters
+    ----------
+    prior
+        The free parameters.
+    informed
+        Information of each group, see `information`.
+    """
+    found = {}
+    for index, one in enumerate(prior.free):
+        parts = {group: float(values[index]) for group, values in informed.items()}
+        limit = SHARE * max(parts.values(), default=0.0)
+        groups = [group for group, part in parts.items() if part >= limit > 0]
+        found[one.key] = tuple(sorted(groups, key=lambda group: -parts[group])[:MAX_NEEDED])
+    return found
+
+
+def warnings(
+    prior: Prior,
+    draws: Array,
+    agreement: Agreement,
+    r_hat: Array,
+    needs: dict[str, tuple[str, ...]],
+) -> Iterator[str]:
+    """Warnings on the parameters of a fit.
+
+    Parameters
+    ----------
+    prior
+        The free parameters.
+    draws
+        Draws of the posterior on the unit cube, shape (draws, parameters).
+    agreement
+        Comparison of the traces with predictions.
+    r_hat
+        Agreement of the chains.
+    needs
+        The groups of summaries that each parameter follows from, see `needed_groups`.
+    """
     if agreement.is_rejected:
-        reasons = "; ".join(str(one) for one in agreement.worst)
+        reasons = "; ".join(agreement.sentences)
         yield (
             "no parameters in the ranges describe the trace "
-            f"(p = {agreement.probability:.2g}): {reasons}"
+            f"(p = {agreement.probability:.2g}). In the model {reasons}"
         )
     shrunk = shrinkage(draws)
+    for one, part in zip(prior.free, shrunk, strict=True):
+        needed = needs.get(one.key, ())
+        wrong = [group for group in needed if group in agreement.disagreeing]
+        if wrong and agreement.is_rejected and part >= UNDETERMINED:
+            yield (
+                f"{one.key} follows from {' and '.join(needed)}; of these the model does not "
+                f"describe {' and '.join(wrong)}, so its interval cannot be relied on"
+            )
     for one, part in zip(prior.free, shrunk, strict=True):
         if part < UNDETERMINED:
             yield f"{one.key} is not determined by this trace: its posterior is close to its prior"

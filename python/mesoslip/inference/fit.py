@@ -1,47 +1,64 @@
-"""Fits of a trace: from the trace to the posterior of the parameters."""
+"""Fits of traces: from traces to the posterior of the parameters."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.even_traces import even_trace, first_velocity
-from mesoslip.analysis.noise import noise_level
-from mesoslip.analysis.sampled_slips import FoundSlips, estimated_period
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.execution.store import Store
 from mesoslip.inference.checks import Agreement, compare, information
+from mesoslip.inference.experiment import Experiment
+from mesoslip.inference.experiment import prepare as prepare_experiment
+from mesoslip.inference.left_out import dominated_by_noise
 from mesoslip.inference.plan import Plan
 from mesoslip.inference.rounds import Estimate, estimate_posterior
 from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
-from mesoslip.inference.summaries import Summarizer
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
 
-# Minimum noise over the maximum force. It is added to measured and simulated traces with less, as
-# experiments resolve no smaller differences.
-MIN_NOISE = 5e-4
-# Number of predicted traces.
+# Number of predicted traces, also where most simulations have fewer contacts than these.
 PREDICTIONS = 160
+FEW_PREDICTIONS = 100
 # Maximum number of stored samples of a predicted trace.
 MAX_SAMPLES = 3000
-# Minimum number of samples of a trace.
-MIN_SAMPLES = 200
-# Maximum relative difference between a trace and its configuration.
-MAX_DIFFERENCE = 0.01
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predictions of one trace by a posterior.
+
+    Attributes
+    ----------
+    experiment
+        The trace.
+    observed_slips
+        Its slips.
+    force
+        Predicted traces, every `stride`-th sample, shape (traces, samples) [N].
+    slips
+        Slips of the predicted traces.
+    stride
+        Distance of the stored samples.
+    """
+
+    experiment: Experiment
+    observed_slips: FoundSlips
+    force: Array
+    slips: tuple[FoundSlips, ...]
+    stride: int
 
 
 @dataclass(frozen=True)
@@ -53,49 +70,40 @@ class FitResult:
     plan
         The plan of the fit.
     simulator
-        The simulator of the experiment.
-    time, force
-        The trace as used in the fit [s], [N].
+        The simulator of the experiments.
     observed
-        Summaries of the trace.
+        Summaries of the traces.
+    left_out
+        Whether each summary is left out, as noise dominates it.
     estimate
         The posterior.
     agreement
-        Comparison of the trace with predictions.
+        Comparison of the traces with predictions.
     information
         Information of each group of summaries, see `mesoslip.inference.checks.information`.
-    observed_slips
-        Slips of the trace.
     predicted
-        Summaries of predicted traces.
-    predicted_force
-        Predicted traces, every `stride`-th sample, shape (traces, samples) [N].
-    predicted_slips
-        Slips of the predicted traces.
-    stride
-        Distance of the stored samples.
+        Summaries of predicted traces, shape (traces, summaries).
+    predictions
+        Predictions of each trace.
     simulations
         Number of simulations.
     """
 
     plan: Plan
     simulator: Simulator
-    time: Array
-    force: Array
     observed: Array
+    left_out: NDArray[np.bool_]
     estimate: Estimate
     agreement: Agreement
     information: dict[str, Array]
-    observed_slips: FoundSlips
     predicted: Array
-    predicted_force: Array
-    predicted_slips: tuple[FoundSlips, ...]
-    stride: int
+    predictions: tuple[Prediction, ...]
     simulations: int
 
 
 def fit(
-    tree: xr.DataTree,
+    trees: Sequence[xr.DataTree],
+    names: Sequence[str],
     plan: Plan,
     *,
     store: Path | None = None,
@@ -103,12 +111,14 @@ def fit(
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
 ) -> FitResult:
-    """Fit parameters to a trace.
+    """Fit parameters to traces of one interface.
 
     Parameters
     ----------
-    tree
-        An output with a trace; its first realization is fitted.
+    trees
+        Outputs with a trace each; of each the first realization is fitted.
+    names
+        Their names.
     plan
         The free parameters, and the known ones.
     store
@@ -124,148 +134,103 @@ def fit(
     Raises
     ------
     FileError, ConfigError
-        If the trace cannot be fitted, or the configuration contradicts it.
+        If a trace cannot be fitted, or the configuration contradicts it.
     RunError
-        If too few simulations resemble the trace, or emcee is not installed.
+        If too few simulations resemble the traces, or emcee is not installed.
     mesoslip.execution.stop.StoppedError
         If the fit is stopped.
     """
     check_installed()
-    simulator, force = prepare(tree, plan)
-    summarizer = simulator.summarizer
-    observed = summarizer(force)
+    simulator = prepare(trees, names, plan)
+    observed, left_out = usable_summaries(simulator)
+    used = np.where(left_out, np.nan, observed)
     rng = np.random.default_rng(plan.seed)
+    count = FEW_PREDICTIONS if simulator.coarse_count else PREDICTIONS
     with ExitStack() as stack:
         kept = None
         if store is not None:
             kept = stack.enter_context(Store(store, "simulations", simulator.fingerprint(observed)))
         simulations = Simulations(
             simulator,
-            expected=plan.simulations + PREDICTIONS,
+            expected=plan.simulations + count,
             store=kept,
             executor=executor,
             progress=progress,
             stop=stop,
         )
-        estimate = estimate_posterior(simulations, observed, plan.simulations, rng)
-        chosen = estimate.draws[rng.choice(len(estimate.draws), PREDICTIONS, replace=False)]
-        stride = max(1, len(force) // MAX_SAMPLES)
-        forces, slips, predicted = [], [], []
-        for one in simulations.forces(chosen):
-            forces.append(one[::stride].astype(np.float32))
-            slips.append(summarizer.slips(one))
-            predicted.append(summarizer(one))
-    agreement = compare(summarizer.features, estimate.summaries, np.array(predicted), observed)
-    informed = information(summarizer.features, estimate.parameters, estimate.summaries, observed)
+        estimate = estimate_posterior(simulations, used, plan.simulations, rng)
+        chosen = estimate.draws[rng.choice(len(estimate.draws), count, replace=False)]
+        predicted, predictions = predict_traces(simulations, chosen)
+    agreement = compare(
+        simulator.features, estimate.summaries, np.where(left_out, np.nan, predicted), used
+    )
+    informed = information(simulator.features, estimate.parameters, estimate.summaries, used)
     return FitResult(
         plan,
         simulator,
-        summarizer.time,
-        force,
         observed,
+        left_out,
         estimate,
         agreement,
         informed,
-        summarizer.slips(force),
-        np.array(predicted),
-        np.array(forces),
-        tuple(slips),
-        stride,
+        predicted,
+        predictions,
         len(simulations),
     )
 
 
-def prepare(tree: xr.DataTree, plan: Plan) -> tuple[Simulator, Array]:
-    """The simulator of an experiment, and its trace at equal intervals, with noise.
+def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> Simulator:
+    """The simulator of experiments, with their traces.
 
     Raises
     ------
     FileError, ConfigError
         See `fit`.
     """
-    _check_known(tree, plan)
-    time, force = even_trace(tree)
-    time = time - time[0]
-    interval = float(np.median(np.diff(time)))
-    skipped = round(plan.after / interval)
-    if len(force) - skipped < MIN_SAMPLES:
-        raise FileError(
-            f"the trace has {max(len(force) - skipped, 0)} samples"
-            + (f" after {plan.after:g} s" if skipped else "")
-            + f"; a fit needs at least {MIN_SAMPLES}"
-        )
-    if plan.config.drive.parts and plan.config.duration < (len(force) - 1.5) * interval:
-        raise FileError(
-            f"the trace has a duration of {(len(force) - 1) * interval:g} s, the stages of [drive] "
-            f"only {plan.config.duration:g} s: give stages for the whole trace"
-        )
-    changes: dict[str, Any] = {
-        "run": {"engine": "eq", "realizations": 1},
-        "output": {"interval": interval},
-    }
-    if not plan.config.drive.parts:
-        # Longer by half an interval, so that rounding does not lose the last sample.
-        changes["run"]["duration"] = (len(force) - 0.5) * interval
-    tables = plan.config.to_dict()
-    tables["output"] = {}
-    config = type(plan.config).from_dict(tables).replace(changes)
-    whole, force = force, force[skipped:]
-    noise = plan.noise
-    if noise is None:
-        noise = float(tree.attrs.get("noise", noise_level(force)))
-    scale = float(np.max(np.abs(force)))
-    if scale == 0:
-        raise FileError("the force of the trace is 0 throughout")
-    min_noise = MIN_NOISE * scale
-    if noise < min_noise:
-        added = np.random.default_rng([plan.seed, 1]).standard_normal(len(force))
-        force = force + math.sqrt(min_noise**2 - noise**2) * added
-        noise = min_noise
-    velocity = first_velocity(config) or 1.0
-    summarizer = Summarizer(
-        time[: len(force)],
-        noise,
-        _period(plan, time[: len(whole)], whole, noise),
-        scale,
-        math.copysign(1.0, velocity),
-        skipped == 0,
-    )
-    return Simulator(config, plan.prior, summarizer, noise, skipped, plan.seed), force
+    several = len(trees) > 1
+    experiments = [
+        prepare_experiment(tree, plan, name if several else "", number)
+        for number, (tree, name) in enumerate(zip(trees, names, strict=True))
+    ]
+    if several:
+        # One interface has one correlation length of its strength: the longest is seen best.
+        length = float(np.max([one.wander_length for one in experiments]))
+        experiments = [replace(one, wander_length=length) for one in experiments]
+    return Simulator(tuple(experiments), plan.prior, plan.seed, plan.coarse_count)
 
 
-def _period(plan: Plan, time: Array, force: Array, noise: float) -> float:
-    """The period of the setup for finding slips, the same for every trace [s]."""
-    known = 2 * plan.config.slider.quiet_time
-    estimated = estimated_period(time, force, noise)
-    is_known = not {"slider.mass", "slider.stiffness"} & set(plan.prior.keys)
-    if known > 0 and (is_known or not math.isfinite(estimated)):
-        return known
-    return estimated if math.isfinite(estimated) else float(time[-1]) / 100
+def usable_summaries(simulator: Simulator) -> tuple[Array, NDArray[np.bool_]]:
+    """Summaries of the traces, and whether each is left out, as noise dominates it."""
+    left_out = [dominated_by_noise(one, simulator.seed) for one in simulator.experiments]
+    return simulator.observed, np.concatenate(left_out)
 
 
-def _check_known(tree: xr.DataTree, plan: Plan) -> None:
-    """Check that the trace and the configuration do not contradict each other.
+def predict_traces(simulations: Simulations, points: Array) -> tuple[Array, tuple[Prediction, ...]]:
+    """Predicted traces at points of the unit cube.
 
-    Raises
-    ------
-    FileError, ConfigError
-        If there is no trace, or a contradiction.
+    Returns
+    -------
+    summaries, predictions
+        Summaries of the predicted traces, shape (traces, summaries), and the traces.
     """
-    import tomllib
-
-    if "spring_force" not in tree.data_vars:
-        raise FileError("the output has no trace of the spring force")
-    traced = tomllib.loads(tree.attrs["configuration"])
-    free, problems = set(plan.prior.keys), []
-    # Further keys of a simulated trace are not compared: an experiment has none.
-    for table, name in (("drive", "velocity"), ("slider", "stiffness")):
-        measured = traced.get(table, {}).get(name)
-        given = getattr(getattr(plan.config, table), name, None)
-        key = f"{table}.{name}"
-        if measured is None or given is None or key in free:
-            continue
-        if abs(measured - given) > MAX_DIFFERENCE * abs(measured):
-            message = f"is {measured:g} in the trace; change it, or make it free in [fit.free]"
-            problems.append(Problem("configuration", key, message, given))
-    if problems:
-        raise ConfigError(problems)
+    simulator = simulations.simulator
+    experiments = simulator.experiments
+    strides = [max(1, len(one.force) // MAX_SAMPLES) for one in experiments]
+    forces: list[list[Array]] = [[] for _ in experiments]
+    slips: list[list[FoundSlips]] = [[] for _ in experiments]
+    predicted = []
+    for traces in simulations.forces(points):
+        predicted.append(simulator.summarized(traces))
+        for number, force in enumerate(traces):
+            forces[number].append(force[:: strides[number]].astype(np.float32))
+            slips[number].append(experiments[number].summarizer.slips(force))
+    return np.array(predicted), tuple(
+        Prediction(
+            one,
+            one.summarizer.slips(one.force),
+            np.array(forces[number]),
+            tuple(slips[number]),
+            strides[number],
+        )
+        for number, one in enumerate(experiments)
+    )

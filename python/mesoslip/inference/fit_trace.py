@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from mesoslip.analysis.even_traces import even_trace
+from mesoslip.analysis.noise import noise_level
+from mesoslip.analysis.sampled_slips import estimated_period
+from mesoslip.configuration.files import Change
 from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.configuration.units import to_si
+from mesoslip.errors import FileError
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference import fit as fits
-from mesoslip.inference.plan import Plan
+from mesoslip.inference.experiment import MIN_SAMPLES
+from mesoslip.inference.plan import Known, Plan
 from mesoslip.inference.posterior import build_tree
-from mesoslip.output.inputs import OutputLike, as_run
+from mesoslip.output.inputs import OutputLike, as_run, several, trace_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def fit(
-    output: OutputLike,
+    output: OutputLike | Sequence[OutputLike],
     config: PathLike | Mapping[str, Any] | Plan,
     *,
     store: PathLike | None = None,
@@ -26,16 +38,19 @@ def fit(
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
 ) -> xr.DataTree:
-    """Fit parameters of the model to a trace, with their uncertainty.
+    """Fit parameters of the model to a trace, or several of one interface, with their uncertainty.
 
     Parameters
     ----------
     output
-        Output with the trace, measured (see `read_trace`) or simulated; the first realization is
-        fitted.
+        Output with the trace, measured (see `read_trace`) or simulated, or several outputs; of each
+        the first realization is fitted. Of several traces each has its own drive and spring, as far
+        as they are known, and all have the free parameters in common.
     config
         The known parameters, and the free ones in a table ``[fit.free]``: a TOML file, nested
-        tables, or a `mesoslip.inference.plan.Plan`.
+        tables, or a `mesoslip.inference.plan.Plan`. Velocity of the drive, stiffness of the spring
+        and duration are those of the trace where the configuration has none. A mass that is not
+        given is fitted.
     store
         Folder in which each finished simulation is stored, and from which it is read when the fit
         is called again; by default simulations are not stored.
@@ -57,13 +72,18 @@ def fit(
     Raises
     ------
     FileError, ConfigError
-        If the trace cannot be fitted, or the configuration is wrong or contradicts the trace.
+        If a trace cannot be fitted, or the configuration is wrong or contradicts the trace.
     RunError
         If no simulation resembles the trace.
     """
+    outputs = several(output)
+    if not outputs:
+        raise FileError("there is no trace to fit")
+    trees = [as_run(one) for one in outputs]
     fitted = fits.fit(
-        as_run(output),
-        _as_plan(config),
+        trees,
+        trace_names(outputs, trees),
+        as_plan(config, trees),
         store=None if store is None else as_path(store),
         executor=executor,
         progress=progress,
@@ -72,8 +92,20 @@ def fit(
     return build_tree(fitted)
 
 
-def _as_plan(config: PathLike | Mapping[str, Any] | Plan) -> Plan:
-    """A fit from its file or from nested tables.
+def trace_names(outputs: Sequence[OutputLike], trees: Sequence[xr.DataTree]) -> list[str]:
+    """Different names of traces: those of their files, or numbers."""
+    names = [trace_name(one, tree) for one, tree in zip(outputs, trees, strict=True)]
+    if len(set(names)) == len(names):
+        return names
+    return [f"{name} ({number})" for number, name in enumerate(names, 1)]
+
+
+def as_plan(
+    config: PathLike | Mapping[str, Any] | Plan,
+    trees: Sequence[xr.DataTree],
+    changes: Iterable[Change] = (),
+) -> Plan:
+    """The plan of a fit from its file or from nested tables, with what the traces know.
 
     Raises
     ------
@@ -83,7 +115,33 @@ def _as_plan(config: PathLike | Mapping[str, Any] | Plan) -> Plan:
         If it is wrong.
     """
     if isinstance(config, Plan):
-        return config
+        return replace(config, has_several=len(trees) > 1)
     if isinstance(config, Mapping):
-        return Plan.from_dict(config)
-    return Plan.load(as_path(config))
+        return Plan.from_dict(config, known=known_of(trees))
+    return Plan.load(as_path(config), changes, known_of(trees))
+
+
+def known_of(trees: Sequence[xr.DataTree]) -> Known:
+    """What traces say about their apparatus; of several the first says what is known."""
+    tree = trees[0]
+    traced = tomllib.loads(tree.attrs["configuration"])
+    time = tree.to_dataset()["time"].values
+    period = math.inf
+    if "spring_force" in tree.data_vars:
+        force = even_trace(tree)
+        if len(force[0]) > MIN_SAMPLES:
+            period = estimated_period(*force, noise_level(force[1]))
+    return Known(
+        _number(traced, "drive", "velocity", "m/s"),
+        _number(traced, "slider", "stiffness", "N/m"),
+        period,
+        float(time[-1] - time[0]),
+        float(np.median(np.diff(time))) if len(time) > 1 else math.nan,
+        len(trees),
+    )
+
+
+def _number(tables: dict[str, Any], table: str, name: str, unit: str) -> float:
+    """A quantity of a configuration in SI; NaN if it is not there."""
+    value = tables.get(table, {}).get(name)
+    return math.nan if value is None else to_si(value, unit, f"1 {unit}")

@@ -16,7 +16,7 @@ uncertainty of the polynomial, and its misfit as part of the residuals.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
 
@@ -37,6 +37,11 @@ SIMULATIONS_PER_TERM = 8
 FREEDOMS = (3.0, 4.0, 6.0, 9.0, 14.0, 25.0)
 # Median of the absolute value of a standard normal deviate.
 NORMAL_MEDIAN = 0.6744897501960817
+# Minimum number of simulations for a correction of the likelihood, their maximum deviation in
+# standard deviations, and minimum factor of the width.
+MIN_CORRECTION = 20
+MAX_CORRECTION = 4.0
+MIN_CORRECTED = 0.2
 # Maximum change of the logarithm of a standard deviation over one spread of the parameters.
 MAX_LOG_SLOPE = 1.5
 
@@ -212,6 +217,44 @@ class Surrogate:
         log_scale = log_scale + 0.5 * np.log1p(leverage)[..., None]
         deviations = (statistics - terms @ self.coefficients) / np.exp(log_scale)
         return deviations @ self._unmix, log_scale.sum(axis=-1)
+
+    def corrected(self, statistics: Array, parameters: Array) -> Surrogate:
+        """The likelihood with the mean and the width of other simulations.
+
+        The simulations that it was learnt from have fewer contacts than the interface, so their
+        summaries scatter more, and are shifted a little. The errors of shift and width by the
+        number of the others are part of the likelihood.
+
+        Parameters
+        ----------
+        statistics, parameters
+            Of simulations with all contacts, shape (simulations, parameters).
+        """
+        count = len(statistics)
+        if count < MIN_CORRECTION:
+            return self
+        scaled = (parameters - self.centre) / self.spread
+        terms = _terms(scaled, self.powers)
+        scale = np.concatenate([np.ones((count, 1)), scaled], axis=1) @ self.log_scale
+        scale = np.exp(np.clip(scale, *self.log_range))
+        standard = (statistics - terms @ self.coefficients) / scale
+        shift = np.median(standard, axis=0)
+        standard = np.clip(standard - shift, -MAX_CORRECTION, MAX_CORRECTION)
+        shift = shift + standard.mean(axis=0)
+        width = np.sqrt(np.sum((standard - standard.mean(axis=0)) ** 2, axis=0) / (count - 1))
+        width *= math.sqrt(1 + 1 / count)
+        coefficients = self.coefficients.copy()
+        coefficients[0] += shift * np.median(scale, axis=0)
+        log_scale, log_width = self.log_scale.copy(), np.log(np.maximum(width, MIN_CORRECTED))
+        log_scale[0] += log_width
+        return replace(
+            self,
+            coefficients=coefficients,
+            # The errors of the polynomial are those by the simulations that it was learnt from.
+            inverse=self.inverse / float(np.mean(np.exp(2 * log_width))),
+            log_scale=log_scale,
+            log_range=self.log_range + log_width,
+        )
 
     def log_likelihood(self, statistics: Array, parameters: Array) -> Array:
         """Logarithm of the synthetic likelihood up to a constant, shape (...,).

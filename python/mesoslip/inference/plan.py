@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -14,14 +15,22 @@ from mesoslip.configuration.files import Change, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.inference.prior import FreeParameter, Prior
+from mesoslip.inference.prior import WANDER, FreeParameter, Prior
 
-KEYS = ("free", "noise", "after", "simulations", "seed")
+KEYS = ("free", "noise", "after", "simulations", "seed", "wander", "simulated_contacts")
 RANGE_KEYS = ("from", "to", "prior")
+# Range of the amplitude of a slow variation of the strength, relative to the maximum force.
+WANDER_RANGE = (2e-3, 0.5)
 # Tables that do not describe the experiment.
 NOT_FITTED = ("run.", "output.", "curve.")
 PRIORS = ("uniform", "logarithmic")
 MIN_SIMULATIONS = 300
+MIN_CONTACTS = 100
+# Kinds of sliders with a mass, and with a spring.
+HAS_MASS = ("rigid", "layered")
+HAS_SPRING = ("rigid", "layered", "quasistatic")
+# Range of a mass that is not given, around that of the period of the slips.
+MASS_FACTOR = 4.0
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,12 @@ class Plan:
         Number of simulations.
     seed
         Seed of all random numbers of the fit.
+    simulated_contacts
+        Number of contacts of most simulations, where the interface has at least twice as many.
+    has_several
+        Whether several traces are fitted, each with its own drive and spring.
+    assumed
+        Sentences on what the configuration does not say.
     """
 
     config: Config
@@ -50,10 +65,27 @@ class Plan:
     after: float = 0.0
     simulations: int = 1600
     seed: int = 1
+    simulated_contacts: int = 2000
+    has_several: bool = False
+    assumed: tuple[str, ...] = ()
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], overrides: Iterable[Change] = ()) -> Plan:
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        overrides: Iterable[Change] = (),
+        known: Known | None = None,
+    ) -> Plan:
         """Read a configuration file with a table [fit].
+
+        Parameters
+        ----------
+        path
+            The file.
+        overrides
+            Changes of its keys.
+        known
+            What the traces say about their apparatus, used where the file says nothing.
 
         Raises
         ------
@@ -63,19 +95,26 @@ class Plan:
             If the configuration is invalid; all errors at once.
         """
         path = Path(path)
-        return cls._checked(override(read_toml(path), overrides).tables, str(path))
+        return cls._checked(override(read_toml(path), overrides).tables, str(path), known)
 
     @classmethod
-    def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Plan:
+    def from_dict(
+        cls,
+        tables: Mapping[str, Any],
+        source: str = "configuration",
+        known: Known | None = None,
+    ) -> Plan:
         """A fit given as nested tables; see `load`."""
-        return cls._checked(on_base(tables, source, Path()).tables, source)
+        return cls._checked(on_base(tables, source, Path()).tables, source, known)
 
     @classmethod
-    def _checked(cls, tables: Mapping[str, Any], source: str) -> Plan:
-        tables = dict(tables)
+    def _checked(cls, tables: Mapping[str, Any], source: str, known: Known | None) -> Plan:
+        tables = {
+            name: dict(one) if isinstance(one, Mapping) else one for name, one in tables.items()
+        }
         table = tables.pop("fit", None)
-        config = Config.from_dict(tables, source)
         if table is None:
+            Config.from_dict(tables, source)
             raise ConfigError(
                 [Problem(source, "fit", "missing; name the free keys in a table [fit.free]")]
             )
@@ -85,18 +124,120 @@ class Plan:
         for key in table:
             if key not in KEYS:
                 reader.unknown(f"fit.{key}", key, KEYS)
-        prior = Prior(tuple(reader.free(table.get("free"), config)))
+        free = list(reader.free(table.get("free")))
+        assumed: list[str] = []
+        if known is not None:
+            assumed = known.complete(tables, free)
+        for one in free:
+            _place(tables, one)
+        config = Config.from_dict(tables, source)
+        for one in free:
+            reader.check_range(one, config)
+        if reader.flag(table, "wander"):
+            free.append(FreeParameter(WANDER, *WANDER_RANGE, is_logarithmic=True, is_nuisance=True))
         plan = cls(
             config,
-            prior,
+            Prior(tuple(free)),
             reader.quantity(table, "noise", "N", "0.1 uN"),
             reader.quantity(table, "after", "s", "2 s") or 0.0,
             reader.whole(table, "simulations", cls.simulations, MIN_SIMULATIONS),
             reader.whole(table, "seed", cls.seed, 0),
+            reader.whole(table, "simulated_contacts", cls.simulated_contacts, MIN_CONTACTS),
+            known is not None and known.traces > 1,
+            tuple(assumed),
         )
         if reader.problems:
             raise ConfigError(reader.problems)
         return plan
+
+    @property
+    def coarse_count(self) -> int | None:
+        """Number of contacts of most simulations; None if all have that of the interface."""
+        contacts = self.config.contacts
+        if "contacts.count" in self.prior.keys or self.config.interaction is not None:
+            return None
+        return self.simulated_contacts if contacts.count >= 2 * self.simulated_contacts else None
+
+
+def _place(tables: dict[str, Any], one: FreeParameter) -> None:
+    """Give a free key a value in its range, where it has none."""
+    *outer, last = one.key.split(".")
+    table: Any = tables
+    for name in outer:
+        inner = table.get(name, {})
+        if not isinstance(inner, Mapping):
+            return
+        table[name] = dict(inner)
+        table = table[name]
+    excluded = {"damping": "damping_ratio", "damping_ratio": "damping"}.get(last)
+    if last not in table and excluded not in table:
+        middle = math.sqrt(one.low * one.high) if one.is_logarithmic else (one.low + one.high) / 2
+        table[last] = round(middle) if one.is_whole else middle
+
+
+@dataclass(frozen=True)
+class Known:
+    """What traces say about their apparatus.
+
+    Attributes
+    ----------
+    velocity
+        Velocity of the drive [m/s]; NaN if unknown.
+    stiffness
+        Stiffness of the spring [N/m]; NaN if unknown.
+    period
+        Period of the setup as estimated from the slips [s]; infinite if unknown.
+    duration, interval
+        Length and sampling of the trace [s].
+    traces
+        Number of traces.
+    """
+
+    velocity: float
+    stiffness: float
+    period: float
+    duration: float
+    interval: float
+    traces: int = 1
+
+    def complete(self, tables: dict[str, Any], free: list[FreeParameter]) -> list[str]:
+        """Add missing keys of the apparatus to a configuration; returns what is assumed.
+
+        A mass that is neither given nor free is fitted, around that of the period of the slips.
+        """
+        names = {one.key for one in free}
+        drive = tables.setdefault("drive", {})
+        slider = tables.setdefault("slider", {})
+        tables.setdefault("run", {})
+        if not drive and math.isfinite(self.velocity):
+            drive["velocity"] = self.velocity
+        if "velocity" in drive and not {"duration", "drive_displacement"} & set(tables["run"]):
+            tables["run"] = {**tables["run"], "duration": self.duration}
+        kind = slider.get("kind", "rigid")
+        if (
+            "stiffness" not in slider
+            and "slider.stiffness" not in names
+            and kind in HAS_SPRING
+            and math.isfinite(self.stiffness)
+        ):
+            slider["stiffness"] = self.stiffness
+        if "mass" in slider or "slider.mass" in names or kind not in HAS_MASS:
+            return []
+        try:
+            stiffness = to_si(slider.get("stiffness", self.stiffness), "N/m", "97 N/m")
+        except ValueError:
+            # Reported with the other errors of the configuration.
+            return []
+        if not math.isfinite(self.period * stiffness):
+            return []
+        mass = stiffness * (self.period / (2 * math.pi)) ** 2
+        free.append(
+            FreeParameter("slider.mass", mass / MASS_FACTOR, mass * MASS_FACTOR, True, "kg")
+        )
+        return [
+            f"the mass is not given: slider.mass is fitted between {mass / MASS_FACTOR:.2g} and "
+            f"{mass * MASS_FACTOR:.2g} kg, from the duration of the slips"
+        ]
 
 
 class _Reader:
@@ -138,7 +279,14 @@ class _Reader:
             self.wrong(key, str(error), value)
             return None
 
-    def free(self, table: object, config: Config) -> Iterable[FreeParameter]:
+    def flag(self, table: Mapping[str, Any], name: str) -> bool:
+        value = table.get(name, False)
+        if not isinstance(value, bool):
+            self.wrong(f"fit.{name}", "must be true or false", value)
+            return False
+        return value
+
+    def free(self, table: object) -> Iterable[FreeParameter]:
         """The free parameters."""
         if not isinstance(table, Mapping) or not table:
             self.wrong(
@@ -158,7 +306,6 @@ class _Reader:
                 continue
             one = self._range(full_key, key, ranges, kind)
             if one is not None:
-                self._try(full_key, one, config)
                 yield one
 
     def _range(
@@ -196,8 +343,9 @@ class _Reader:
             return None
         return FreeParameter(key, low, high, prior == "logarithmic", unit, kind.is_whole)
 
-    def _try(self, full_key: str, one: FreeParameter, config: Config) -> None:
+    def check_range(self, one: FreeParameter, config: Config) -> None:
         """Check that both ends of a range are valid."""
+        full_key = f"fit.free.{one.key}"
         for name, value in (("from", one.low), ("to", one.high)):
             try:
                 config.replace({one.key: int(value) if one.is_whole else value})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +12,20 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.configuration.units import cf_units
-from mesoslip.inference.checks import DETERMINED, UNDETERMINED, shrinkage, warnings
-from mesoslip.inference.fit import FitResult
+from mesoslip.inference.checks import (
+    DETERMINED,
+    UNDETERMINED,
+    needed_groups,
+    shrinkage,
+    warnings,
+)
+from mesoslip.inference.features import Feature
+from mesoslip.inference.fit import FitResult, Prediction
+from mesoslip.inference.prior import WANDER
 from mesoslip.inference.sampler import r_hat
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
+from mesoslip.quantities import with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,6 +57,8 @@ class Row:
         One of `VERDICTS`.
     most_informative
         The group of summaries with the most information on it; "none" if it is not determined.
+    follows_from
+        That group and others with nearly as much information; "none" if it is not determined.
     """
 
     key: str
@@ -58,6 +69,7 @@ class Row:
     shrinkage: float
     verdict: str
     most_informative: str
+    follows_from: str = ""
 
     @property
     def digits(self) -> int:
@@ -75,7 +87,7 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     Groups ``posterior`` (dimensions chain, draw), ``prior``, ``observed_data``,
     ``posterior_predictive``, named as in ArviZ; ``observed_slips``, ``predicted_slips`` (slip);
     ``summaries`` (summary) of the trace and the predictions; ``parameters`` (parameter), the
-    table.
+    table. Groups of further traces end in ``_2``, ``_3``.
     """
     import xarray as xr
 
@@ -99,46 +111,122 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
 
     rng = np.random.default_rng([plan.seed, 2])
     from_prior = prior.values(rng.random((1, 1000, len(prior))))
-    kept = fitted.time[:: fitted.stride] + plan.after
-    force = {"units": "N", "long_name": "force of the drive on the slider"}
-    time = ("time", fitted.time + plan.after, {"units": "s", "long_name": "time"})
-    predictions = len(fitted.predicted_force)
-    notes = list(warnings(prior, estimate.draws, fitted.agreement, r_hat(estimate.chains)))
+    needs = needed_groups(prior, fitted.information)
+    notes = warnings(prior, estimate.draws, fitted.agreement, r_hat(estimate.chains), needs)
+    first = fitted.predictions[0].experiment
     attributes: dict[str, Any] = {
         "seed": plan.seed,
         "complete": "true",
         "comment": "",
-        "noise": fitted.simulator.noise,
-        "setup_period": fitted.simulator.summarizer.period,
+        "noise": first.noise.deviation,
+        "setup_period": first.summarizer.period,
         "simulation_count": fitted.simulations,
         "local_simulation_count": len(estimate.parameters),
         "agreement_probability": fitted.agreement.probability,
+        "disagreeing": "\n".join(fitted.agreement.disagreeing),
         "coverage_50": estimate.coverage[0],
         "coverage_90": estimate.coverage[1],
+        "wander_length": first.wander_length,
+        "traces": "\n".join(one.experiment.name for one in fitted.predictions),
         "warnings": "\n".join(notes),
+        "notes": "\n".join(_notes(fitted)),
     }
-    return xr.DataTree.from_dict(
-        {
-            "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
-            "/posterior": group(values, chains),
-            "/prior": group(from_prior, {"chain": np.arange(1), "draw": np.arange(1000)}),
-            "/observed_data": xr.Dataset(
-                {"spring_force": (("time",), fitted.force, force)}, {"time": time}
-            ),
-            "/posterior_predictive": xr.Dataset(
-                {"spring_force": (("chain", "draw", "time"), fitted.predicted_force[None], force)},
-                {
-                    "chain": np.arange(1),
-                    "draw": np.arange(predictions),
-                    "time": ("time", kept, time[2]),
-                },
-            ),
-            "/observed_slips": _slips([fitted.observed_slips], plan.after),
-            "/predicted_slips": _slips(fitted.predicted_slips, plan.after),
-            "/summaries": _summaries(fitted),
-            "/parameters": _parameters(fitted),
-        }
-    )
+    groups = {
+        "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
+        "/posterior": group(values, chains),
+        "/prior": group(from_prior, {"chain": np.arange(1), "draw": np.arange(1000)}),
+        "/summaries": summaries_group(
+            fitted.simulator.features,
+            fitted.observed,
+            fitted.predicted,
+            fitted.agreement.scores,
+            fitted.left_out,
+        ),
+        "/parameters": _parameters(fitted, needs),
+    }
+    for number, one in enumerate(fitted.predictions):
+        groups |= trace_groups(one, plan.after, number)
+    return xr.DataTree.from_dict(groups)
+
+
+def suffix(number: int) -> str:
+    """Suffix of the groups of a trace: none for the first one."""
+    return f"_{number + 1}" if number else ""
+
+
+def trace_groups(prediction: Prediction, start: float, number: int) -> dict[str, xr.Dataset]:
+    """Groups of one trace and its predictions.
+
+    Parameters
+    ----------
+    prediction
+        The trace and its predictions.
+    start
+        Time of its first sample [s].
+    number
+        Number of the trace, which is part of the names of the groups.
+    """
+    import xarray as xr
+
+    experiment = prediction.experiment
+    times = experiment.summarizer.time + start
+    force = {"units": "N", "long_name": "force of the drive on the slider"}
+    time = ("time", times, {"units": "s", "long_name": "time"})
+    kept = ("time", times[:: prediction.stride], time[2])
+    count = len(prediction.force)
+    after = suffix(number)
+    attributes = {"title": experiment.name, "noise": experiment.noise.deviation}
+    return {
+        f"/observed_data{after}": xr.Dataset(
+            {"spring_force": (("time",), experiment.force, force)}, {"time": time}, attributes
+        ),
+        f"/posterior_predictive{after}": xr.Dataset(
+            {"spring_force": (("chain", "draw", "time"), prediction.force[None], force)},
+            {"chain": np.arange(1), "draw": np.arange(count), "time": kept},
+        ),
+        f"/observed_slips{after}": _slips([prediction.observed_slips], start),
+        f"/predicted_slips{after}": _slips(prediction.slips, start),
+    }
+
+
+def _notes(fitted: FitResult) -> Iterator[str]:
+    """Sentences on what was assumed, taken off and left out."""
+    yield from fitted.plan.assumed
+    for prediction in fitted.predictions:
+        one = prediction.experiment
+        name = f"{one.name}: " if one.name else ""
+        yield from (f"{name}{taken}" for taken in one.taken_off)
+        if one.sampling.lead:
+            lead = with_unit(one.sampling.lead * one.sampling.interval, "s", 2)
+            yield (
+                f"{name}the trace begins under force: simulations start {lead} before it, and its "
+                "start is not used"
+            )
+        if one.sampling.block > 1:
+            yield f"{name}means of {one.sampling.block} samples are used"
+        if not one.sampling.is_even:
+            yield f"{name}samples at unequal distances are interpolated, of simulations too"
+    if fitted.simulator.coarse_count:
+        yield (
+            f"most simulations have {fitted.simulator.coarse_count} contacts; mean and scatter of "
+            f"their summaries are corrected by simulations with {fitted.plan.config.contacts.count}"
+        )
+    features = [
+        one
+        for one, is_out in zip(fitted.simulator.features, fitted.left_out, strict=True)
+        if is_out
+    ]
+    if features:
+        named = [one.label or one.meaning for one in features]
+        several = len(fitted.predictions) > 1
+        if several:
+            titles = [one.experiment.name for one in fitted.predictions]
+            named = [
+                f"{name} of {titles[one.trace]}" for name, one in zip(named, features, strict=True)
+            ]
+        yield f"left out, as noise dominates: {', '.join(dict.fromkeys(named))}"
+    if WANDER not in fitted.plan.prior.keys:
+        yield "the strength is taken to be the same along the track (fit.wander = false)"
 
 
 def _slips(found: Sequence[FoundSlips], start: float) -> xr.Dataset:
@@ -155,19 +243,39 @@ def _slips(found: Sequence[FoundSlips], start: float) -> xr.Dataset:
     return xr.Dataset(data)
 
 
-def _summaries(fitted: FitResult) -> xr.Dataset:
+def summaries_group(
+    features: Sequence[Feature],
+    observed: Array,
+    predicted: Array,
+    scores: Array,
+    left_out: NDArray[np.bool_],
+) -> xr.Dataset:
+    """The summaries of traces and of their predictions.
+
+    Parameters
+    ----------
+    features
+        The summaries.
+    observed
+        Those of the traces.
+    predicted
+        Those of predicted traces, shape (traces, summaries).
+    scores
+        Deviations of the traces from the predictions, in spreads of these.
+    left_out
+        Whether each is left out, as noise dominates it.
+    """
     import xarray as xr
 
-    features = fitted.simulator.summarizer.features
     low, middle, high = np.full((3, len(features)), np.nan)
-    defined = np.isfinite(fitted.predicted).any(axis=0)
+    defined = np.isfinite(predicted).any(axis=0)
     low[defined], middle[defined], high[defined] = np.nanpercentile(
-        fitted.predicted[:, defined], [5, 50, 95], axis=0
+        predicted[:, defined], [5, 50, 95], axis=0
     )
     one = {"units": "1"}
     return xr.Dataset(
         {
-            "observed": ("summary", fitted.observed, one | {"long_name": "summary of the trace"}),
+            "observed": ("summary", observed, one | {"long_name": "summary of the trace"}),
             "predicted_05": (
                 "summary",
                 low,
@@ -181,17 +289,38 @@ def _summaries(fitted: FitResult) -> xr.Dataset:
             ),
             "score": (
                 "summary",
-                fitted.agreement.scores,
+                scores,
                 one | {"long_name": "deviation of the trace, in spreads of the predictions"},
+            ),
+            "drawn": (
+                ("prediction", "summary"),
+                predicted,
+                one | {"long_name": "summaries of predicted traces"},
+            ),
+            "left_out": (
+                "summary",
+                left_out.astype(np.int8),
+                one | {"long_name": "1 for summaries that are left out, as noise dominates them"},
+            ),
+            "trace": (
+                "summary",
+                [feature.trace for feature in features],
+                one | {"long_name": "number of the trace"},
             ),
             "group": ("summary", [feature.group for feature in features]),
             "meaning": ("summary", [feature.meaning for feature in features]),
+            "label": ("summary", [feature.label for feature in features]),
+            "factor": (
+                "summary",
+                [feature.factor for feature in features],
+                one | {"long_name": "factor of the quantity, in SI"},
+            ),
         },
         {"summary": [feature.name for feature in features]},
     )
 
 
-def _parameters(fitted: FitResult) -> xr.Dataset:
+def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> xr.Dataset:
     import xarray as xr
 
     prior, draws = fitted.plan.prior, fitted.estimate.draws
@@ -201,6 +330,7 @@ def _parameters(fitted: FitResult) -> xr.Dataset:
         {
             "value": (("parameter", "percentile"), percentiles),
             "units": ("parameter", [one.unit for one in prior.free]),
+            "follows_from": ("parameter", ["\n".join(needs[one.key]) for one in prior.free]),
             "low": ("parameter", [one.low for one in prior.free]),
             "high": ("parameter", [one.high for one in prior.free]),
             "is_logarithmic": ("parameter", [int(one.is_logarithmic) for one in prior.free]),
@@ -238,6 +368,9 @@ def table(tree: xr.DataTree) -> list[Row]:
                 part,
                 verdict,
                 str(data["feature_group"].values[best]) if part >= UNDETERMINED else "none",
+                ", ".join(str(one["follows_from"].item()).split("\n"))
+                if part >= UNDETERMINED
+                else "none",
             )
         )
     return rows

@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Name of the amplitude of a slow variation of the strength along the track, relative to the maximum
+# force (`mesoslip.inference.wander`).
+WANDER = "fit.wander"
+
 
 @dataclass(frozen=True)
 class FreeParameter:
@@ -27,6 +31,8 @@ class FreeParameter:
         SI unit, such as "N/m"; "1" for plain numbers.
     is_whole
         Whether the parameter is a whole number.
+    is_nuisance
+        Whether it is no key of the configuration.
     """
 
     key: str
@@ -35,6 +41,7 @@ class FreeParameter:
     is_logarithmic: bool = False
     unit: str = "1"
     is_whole: bool = False
+    is_nuisance: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,4 +84,13 @@ class Prior:
         return {
             one.key: int(value) if one.is_whole else float(value)
             for one, value in zip(self.free, values, strict=True)
+            if not one.is_nuisance
+        }
+
+    def nuisances(self, values: Array) -> dict[str, float]:
+        """Values of the parameters that are no keys of the configuration."""
+        return {
+            one.key: float(value)
+            for one, value in zip(self.free, values, strict=True)
+            if one.is_nuisance
         }

@@ -43,6 +43,9 @@ STARTS = 40
 MIN_VALID = 40
 # Factor by which the limit of a region with fewer simulations is increased.
 GROWTH = 1.5
+# Simulations with all contacts, where the others have fewer: fraction of all, and minimum number.
+EXACT = 0.05
+MIN_EXACT = 60
 # Minimum width of the region on the unit cube.
 MIN_WIDTH = 1e-6
 
@@ -153,12 +156,15 @@ def estimate_posterior(
         simulations.add(points)
         count += 1
     # In two rounds, the second from the improved posterior.
+    exact = max(MIN_EXACT, round(EXACT * total)) // 2 if simulations.has_coarse else 0
     for part in (0.5, 1.0):
-        left = total - len(simulations)
+        left = total - len(simulations) - round(exact / part)
         points = around(estimate.draws, max(1, round(part * left)), rng)
         if len(points) > 2 * size:
             region = Region.around(points)
         simulations.add(points)
+        if exact:
+            simulations.add(around(estimate.draws, exact, rng), exact=True)
         estimate = fit_region(simulations, observed, region, rng)
     return fit_region(simulations, observed, region, rng, chain_count=CHAINS, draws=FINE)
 
@@ -194,6 +200,9 @@ def fit_region(
         If too few simulations resemble the trace.
     """
     parameters, summaries = simulations.parameters, simulations.summaries
+    is_coarse = simulations.is_coarse if simulations.has_coarse else np.full(len(parameters), True)
+    exact = parameters[~is_coarse], summaries[~is_coarse]
+    parameters, summaries = parameters[is_coarse], summaries[is_coarse]
     valid, parameters, summaries, region = _inside(parameters, summaries, observed, region)
     if valid.sum() < MIN_VALID:
         raise RunError(
@@ -206,6 +215,9 @@ def fit_region(
     projection, statistics = project(summaries[:count], parameters[:count], observed)
     surrogate = learn(statistics, parameters[:count], parameters)
     target = projection(observed)
+    deviations = surrogate.standardized(statistics, parameters[:count])[0]
+    if len(exact[0]):
+        surrogate = surrogate.corrected(*_near(*exact, projection, region))
 
     def log_density(points: Array) -> Array:
         value = surrogate.log_likelihood(target, points)
@@ -217,7 +229,6 @@ def fit_region(
     start = parameters[:count][np.argsort(away)[:STARTS]]
     chains = draw(log_density, start, rng, chains=chain_count, draws=draws)
     spread = chains.reshape(-1, chains.shape[-1]).std(axis=0)
-    deviations = surrogate.standardized(statistics, parameters[:count])[0]
     return Estimate(
         chains,
         projection,
@@ -247,6 +258,20 @@ def _inside(
         if region is None or inside.all() or valid.sum() >= MIN_VALID:
             return valid, parameters[inside], summaries[inside], region
         region = replace(region, limit=GROWTH * region.limit)
+
+
+def _near(
+    parameters: Array, summaries: Array, projection: Projection, region: Region | None
+) -> tuple[Array, Array]:
+    """Statistics and parameters of simulations in a region; of the nearest ones if it has few."""
+    valid = np.all(np.isfinite(summaries[:, projection.used]), axis=1)
+    parameters, summaries = parameters[valid], summaries[valid]
+    if region is not None:
+        distance = region.distance(parameters)
+        few = np.sort(distance)[: MIN_EXACT // 2]
+        inside = distance <= max(region.limit, few[-1] if few.size else np.inf)
+        parameters, summaries = parameters[inside], summaries[inside]
+    return projection(summaries), parameters
 
 
 def _coverage(distance: Array, size: int, freedom: float) -> tuple[float, float]:

@@ -3,69 +3,80 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.configuration.config import Config
-from mesoslip.errors import ConfigError, RunError
 from mesoslip.execution.executors import ExecutorLike, as_executor, completed
 from mesoslip.execution.pool import Function, Result
 from mesoslip.execution.program import program
 from mesoslip.execution.stop import Stop, StoppedError, StopRequest
 from mesoslip.execution.store import Store
+from mesoslip.inference.experiment import Experiment
+from mesoslip.inference.features import Feature
 from mesoslip.inference.prior import Prior
-from mesoslip.inference.summaries import Summarizer
-from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import TRACE_COLUMNS
 
 Array = NDArray[np.float64]
 
-# Maximum number of breaks in a simulation, far more than a trace can have.
-MAX_BREAKS = 3e7
-
-# The number of a simulation, and its parameters on the unit cube.
-Piece = tuple[int, Array]
+# The number of a simulation, its parameters on the unit cube, and whether it has few contacts.
+Piece = tuple[int, Array, bool]
 
 
 @dataclass(frozen=True)
 class Simulator:
-    """Simulates the experiment, with noise, and reduces the trace to its summaries.
+    """Simulates experiments with one interface, with noise, and reduces them to summaries.
 
     Attributes
     ----------
-    config
-        Configuration of the known parameters.
+    experiments
+        The apparatus with their traces.
     prior
         Priors of the free parameters.
-    summarizer
-        Reduces a trace to its summaries.
-    noise
-        Standard deviation of the noise of the force [N].
-    skipped
-        Number of samples discarded at the start.
     seed
         Seed of the fit.
+    coarse_count
+        Number of contacts of a simulation with few of them; None if there are none.
     """
 
-    config: Config
+    experiments: tuple[Experiment, ...]
     prior: Prior
-    summarizer: Summarizer
-    noise: float
-    skipped: int
     seed: int
+    coarse_count: int | None = None
 
-    def force(self, piece: Piece, stop: StopRequest) -> Array | None:
-        """A noisy trace of the force [N]; None if it cannot be simulated.
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """The summaries of all traces."""
+        if len(self.experiments) == 1:
+            return self.experiments[0].summarizer.features
+        return tuple(
+            replace(
+                one,
+                name=f"{number + 1}.{one.name}",
+                group=f"{one.group} of {experiment.name}",
+                trace=number,
+            )
+            for number, experiment in enumerate(self.experiments)
+            for one in experiment.summarizer.features
+        )
+
+    @property
+    def observed(self) -> Array:
+        """Summaries of the measured traces."""
+        return np.concatenate([one.summarizer(one.force) for one in self.experiments])
+
+    def forces(self, piece: Piece, stop: StopRequest) -> list[Array] | None:
+        """Noisy traces of the force [N], one an experiment; None if they cannot be simulated.
 
         Parameters
         ----------
         piece
-            The number of the simulation, which determines its random numbers, and its parameters.
+            The number of the simulation, which determines its random numbers, its parameters, and
+            whether it has few contacts.
         stop
             A request to stop.
 
@@ -74,39 +85,44 @@ class Simulator:
         StoppedError
             If it is stopped.
         """
-        number, unit = piece
-        words = np.random.SeedSequence((self.seed, number)).generate_state(3, np.uint64)
-        changes = self.prior.changes(self.prior.values(unit))
-        try:
-            config = self.config.replace({**changes, "run.seed": int(words[0] >> np.uint64(2))})
-            run = Realization(config, 0, estimates_errors=False)
-            while not run.finished and run.breaks < MAX_BREAKS:
-                if stop.is_set():
-                    raise StoppedError("the fit was stopped")
-                run.advance()
-        except (ConfigError, RunError):
-            return None
-        force: Array = run.trace[self.skipped :, TRACE_COLUMNS.index("spring_force")]
-        run.close()
-        count = len(self.summarizer.time)
-        if not run.finished or run.breaks >= MAX_BREAKS or len(force) < count:
-            return None
-        noise = np.random.default_rng(words[1:]).standard_normal(count)
-        return force[:count] + self.noise * noise
+        number, unit, is_coarse = piece
+        values = self.prior.values(unit)
+        changes, nuisances = self.prior.changes(values), self.prior.nuisances(values)
+        if is_coarse:
+            changes["contacts.count"] = self.coarse_count
+        found = []
+        for index, one in enumerate(self.experiments):
+            seeds = (self.seed, number, index) if index else (self.seed, number)
+            words = np.random.SeedSequence(seeds).generate_state(3, np.uint64)
+            force = one.simulated(changes, nuisances, words, stop)
+            if force is None:
+                return None
+            found.append(force)
+        return found
 
     def summaries(self, piece: Piece, stop: StopRequest) -> Array:
-        """Summaries of a simulation; all NaN if it cannot be simulated. See `force`."""
-        force = self.force(piece, stop)
-        if force is None:
-            return np.full(len(self.summarizer.names), np.nan)
-        return self.summarizer(force)
+        """Summaries of a simulation; all NaN if it cannot be simulated. See `forces`."""
+        forces = self.forces(piece, stop)
+        if forces is None:
+            return np.full(len(self.features), np.nan)
+        return self.summarized(forces)
+
+    def summarized(self, forces: Sequence[Array]) -> Array:
+        """Summaries of traces [N], one an experiment."""
+        pairs = zip(self.experiments, forces, strict=True)
+        return np.concatenate([one.summarizer(force) for one, force in pairs])
 
     def fingerprint(self, observed: Array) -> str:
         """A hash of everything that determines the simulations of a fit."""
-        known = (self.config.to_toml(), self.prior, self.noise, self.skipped, self.seed)
-        times = self.summarizer.time
-        state = np.concatenate([np.nan_to_num(observed), times[[0, -1]], [len(times)]])
-        return hashlib.sha256(repr((program(), *known)).encode() + state.tobytes()).hexdigest()
+        known: list[object] = [self.prior, self.seed, self.coarse_count]
+        state = [np.nan_to_num(observed)]
+        for one in self.experiments:
+            known += [one.config.to_toml(), one.noise, one.wander_length, one.summarizer.period]
+            sampling = one.sampling
+            known += [sampling.start, sampling.block, sampling.lead]
+            state += [sampling.times, one.force]
+        text = repr((program(), *known)).encode()
+        return hashlib.sha256(text + np.concatenate(state).tobytes()).hexdigest()
 
 
 class Simulations:
@@ -117,8 +133,8 @@ class Simulations:
 
     Parameters
     ----------
-    simulator, observed
-        The simulator, and the summaries of the trace.
+    simulator
+        The simulator.
     expected
         Number of simulations of the whole fit.
     store
@@ -134,6 +150,8 @@ class Simulations:
     ----------
     parameters, summaries
         Of all simulations so far, shapes (simulations, parameters), (simulations, summaries).
+    is_coarse
+        Whether each simulation has few contacts.
     """
 
     def __init__(
@@ -155,6 +173,16 @@ class Simulations:
         self._stop = Stop(stop)
         self._parameters: list[Array] = []
         self._summaries: list[Array] = []
+        self._is_coarse: list[bool] = []
+
+    @property
+    def has_coarse(self) -> bool:
+        """Whether simulations may have few contacts."""
+        return self.simulator.coarse_count is not None
+
+    @property
+    def is_coarse(self) -> NDArray[np.bool_]:
+        return np.array(self._is_coarse, dtype=bool)
 
     @property
     def parameters(self) -> Array:
@@ -162,28 +190,38 @@ class Simulations:
 
     @property
     def summaries(self) -> Array:
-        return np.array(self._summaries).reshape(-1, len(self.simulator.summarizer.names))
+        return np.array(self._summaries).reshape(-1, len(self.simulator.features))
 
     def __len__(self) -> int:
         return len(self._parameters)
 
-    def add(self, points: Array) -> None:
+    def add(self, points: Array, *, exact: bool = False) -> None:
         """Simulate at points of the unit cube, shape (points, parameters).
+
+        Parameters
+        ----------
+        points
+            The points.
+        exact
+            Whether the simulations have all contacts.
 
         Raises
         ------
         StoppedError
             If the fit is stopped; what was simulated is kept.
         """
-        start = len(self)
+        start, is_coarse = len(self), self.has_coarse and not exact
         found = {}
         for number, point in enumerate(points, start):
             summaries = self._read(number, point)
             if summaries is not None:
                 found[number] = summaries
-        missing = ((one, points[one - start]) for one in range(start, start + len(points)))
-        pieces = [piece for piece in missing if piece[0] not in found]
-        for (number, point), future in self._completed(self.simulator.summaries, pieces):
+        pieces = [
+            (one, points[one - start], is_coarse)
+            for one in range(start, start + len(points))
+            if one not in found
+        ]
+        for (number, point, _), future in self._completed(self.simulator.summaries, pieces):
             found[number] = future.result()
             if self._store is not None:
                 body = {"parameters": _texts(point), "summaries": _texts(found[number])}
@@ -191,20 +229,24 @@ class Simulations:
             self._progress(min(0.999, (start + len(found)) / self._expected))
         self._parameters += list(points)
         self._summaries += [found[number] for number in range(start, start + len(points))]
+        self._is_coarse += [is_coarse] * len(points)
 
-    def forces(self, points: Array) -> Iterator[Array]:
+    def forces(self, points: Array) -> Iterator[list[Array]]:
         """Noisy traces at points of the unit cube, with numbers after those of all others.
+
+        All contacts are simulated.
 
         Raises
         ------
         StoppedError
             If the fit is stopped.
         """
-        pieces = enumerate(points, self._expected + len(self))
-        for _, future in self._completed(self.simulator.force, pieces, in_order=True):
-            force = future.result()
-            if force is not None:
-                yield force
+        first = self._expected + len(self)
+        pieces = [(number, point, False) for number, point in enumerate(points, first)]
+        for _, future in self._completed(self.simulator.forces, pieces, in_order=True):
+            forces = future.result()
+            if forces is not None:
+                yield forces
 
     def _completed(
         self,

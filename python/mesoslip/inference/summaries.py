@@ -8,42 +8,40 @@ equation by N^(-1/2) only, and are summarized point by point, along the waveform
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
+from mesoslip.inference.features import (
+    BANDS,
+    CREEP_LAGS,
+    LAGS,
+    QUANTILES,
+    WAVEFORM,
+    Feature,
+    features,
+)
+from mesoslip.quantities import with_unit
 
 Array = NDArray[np.float64]
 
-# Points of the waveform of a slip, in periods of the setup since the force fell by half.
-WAVEFORM = np.arange(-10, 51) / 20
 # Range of the force for the slope of the loading, over the first peak.
 LOADING = (0.1, 0.6)
-# Times of the comparison with linear loading, over the time of the first peak.
-LAGS = (0.8, 0.9, 0.95, 0.97, 0.985)
-# Quantiles of the force [%].
-QUANTILES = (1, 5, 25, 50, 75, 95, 99)
+# Parts of the time between slips in which the force rises linearly, and minimum samples of it.
+LINEAR_PART = (0.15, 0.6)
+MIN_LOADING_SAMPLES = 12
 # Frequency bands, from a fraction of the frequency of the setup to the Nyquist frequency, and
 # length of the segments of the spectrum in periods of the setup.
-BANDS = 12
 MIN_FREQUENCY = 0.1
 SEGMENT_PERIODS = 40
 # Minimum number of slips for their statistics.
 MIN_SLIPS = 3
 # Minimum arguments of logarithms.
 TINY = 1e-12
-
-
-@dataclass(frozen=True)
-class Feature:
-    """A summary: its name, its group, and its meaning."""
-
-    name: str
-    group: str
-    meaning: str
 
 
 @dataclass(frozen=True)
@@ -76,61 +74,31 @@ class Summarizer:
     @cached_property
     def features(self) -> tuple[Feature, ...]:
         """The summaries in their order."""
-        found = [
-            Feature("slip_count", "slips", "logarithm of the number of slips"),
-            Feature("mean_force", "force", "mean force after the first slip"),
-            Feature("force_deviation", "force", "logarithm of the standard deviation of the force"),
-            *(
-                Feature(f"force_quantile_{one}", "force", f"{one} % quantile of the force")
-                for one in QUANTILES
-            ),
-            *(
-                Feature(f"spectrum_{one}", "ringing", f"logarithm of the power in band {one}")
-                for one in range(BANDS)
-            ),
-        ]
-        if self.has_start:
-            found += [
-                Feature("loading_slope", "first loading", "logarithm of the slope of the loading"),
-                Feature("loading_start", "first loading", "force at which the loading starts"),
-                Feature("first_peak", "first peak", "force at the first peak"),
-                Feature("first_peak_time", "first peak", "logarithm of the time of the first peak"),
-                *(
-                    Feature(f"softening_{one:g}", "first peak", "force relative to linear loading")
-                    for one in LAGS
-                ),
-                Feature("first_drop", "first slip", "logarithm of the first force drop"),
-                Feature(
-                    "first_rate", "first slip", "logarithm of the maximum rate of the first slip"
-                ),
-                *(
-                    Feature(
-                        f"first_waveform_{one:+.2f}", "first slip", "force along the first slip"
-                    )
-                    for one in WAVEFORM
-                ),
-            ]
-        for name, meaning in (
-            ("peak", "force at the start of slips"),
-            ("bottom", "force at the end of slips"),
-            ("drop", "logarithm of force drops"),
-            ("duration", "logarithm of durations"),
-            ("rate", "logarithm of the maximum rate of fall"),
-            ("waiting_time", "logarithm of waiting times"),
-        ):
-            found += [
-                Feature(f"mean_{name}", "slips", f"mean of the {meaning}"),
-                Feature(f"median_{name}", "slips", f"median of the {meaning}"),
-                Feature(f"spread_{name}", "slips", f"logarithm of the spread of the {meaning}"),
-            ]
-        found += [
-            Feature("return_map", "slips", "correlation of each force drop with the next"),
-            *(
-                Feature(f"waveform_{one:+.2f}", "slips", "mean force along slips")
-                for one in WAVEFORM
-            ),
-        ]
-        return tuple(found)
+        return tuple(self._labelled())
+
+    def _labelled(self) -> Iterator[Feature]:
+        """The summaries, with the frequencies of the spectrum."""
+        edges = self._edges
+        for one in features(self.scale, has_start=self.has_start):
+            if one.kind != "log power":
+                yield one
+                continue
+            low, high = edges[int(one.name.rpartition("_")[2]) :][:2]
+            band = f"at {with_unit(low, 'Hz', 2)} to {with_unit(high, 'Hz', 2)}"
+            yield replace(
+                one,
+                meaning=f"logarithm of the power {band}",
+                label=f"amplitude {band}",
+                high="the force oscillates too strongly",
+                low="the force oscillates too weakly",
+                factor=one.factor * math.sqrt(high - low),
+            )
+
+    @cached_property
+    def _edges(self) -> Array:
+        """Edges of the frequency bands [1/s]."""
+        highest = 0.5 / self._interval * (1 + 1e-9)
+        return np.geomspace(MIN_FREQUENCY / self.period, highest, BANDS + 1)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -210,7 +178,7 @@ class Summarizer:
         frequency, power = welch(
             force, fs=1 / self._interval, nperseg=max(64, min(length, force.size))
         )
-        edges = np.geomspace(MIN_FREQUENCY / self.period, frequency[-1] * (1 + 1e-9), BANDS + 1)
+        edges = self._edges
         for band in range(BANDS):
             inside = (frequency >= edges[band]) & (frequency < edges[band + 1])
             if inside.any():
@@ -239,16 +207,52 @@ class Summarizer:
             values[f"median_{name}"] = float(np.median(column))
             # A sampled duration may have no spread.
             values[f"spread_{name}"] = math.log(float(np.std(column)) + 1e-3)
+        changes = float(np.std(np.diff(before[later]))) / math.sqrt(2)
+        values["wander"] = math.log((float(np.std(before[later])) + TINY) / (changes + TINY))
         one, other = drop[later][:-1], drop[later][1:]
         if np.std(one) > 0 and np.std(other) > 0:
             values["return_map"] = float(np.corrcoef(one, other)[0, 1])
         else:
             values["return_map"] = 0.0
+        values |= self._loading(force, found, drop, later.start)
         ends = zip(found.first[later], found.last[later], strict=True)
         waveforms = [self._waveform(force, int(first), int(last)) for first, last in ends]
         mean = np.mean(waveforms, axis=0)
         return values | {
             f"waveform_{at:+.2f}": value for at, value in zip(WAVEFORM, mean, strict=True)
+        }
+
+    def _loading(
+        self, force: Array, found: FoundSlips, drop: Array, start: int
+    ) -> dict[str, float]:
+        """Slope of the loading between slips, and creep before slips, from their medians."""
+        slopes, creep = [], []
+        for number in range(max(start, 1), len(found)):
+            first, last = int(found.last[number - 1]), int(found.first[number])
+            # After the ringing, where there is time for that.
+            settled = min(first + round(2 * self.period / self._interval), (first + last) // 2)
+            ends = [settled + part * (last - settled) for part in LINEAR_PART]
+            low, high = math.ceil(ends[0]), math.floor(ends[1])
+            if high - low < MIN_LOADING_SAMPLES:
+                continue
+            span = slice(low, high)
+            slope, level = np.polyfit(self.time[span] - self.time[low], force[span], 1)
+            slopes.append(slope)
+            size = math.exp(drop[number])
+            half = max(1, (last - settled) // 40)
+            below = []
+            for lag in CREEP_LAGS:
+                at = round(settled + lag * (last - settled))
+                near = slice(at - half, at + half + 1)
+                line = level + slope * (self.time[near] - self.time[low])
+                below.append(float(np.mean(line - force[near])) / size)
+            creep.append(below)
+        if len(slopes) < MIN_SLIPS:
+            return {}
+        values = {"stick_slope": math.log(max(float(np.median(slopes)), TINY))}
+        medians = np.median(creep, axis=0)
+        return values | {
+            f"creep_{lag:g}": float(one) for lag, one in zip(CREEP_LAGS, medians, strict=True)
         }
 
     def _waveform(self, force: Array, first: int, last: int) -> Array:

@@ -41,3 +41,12 @@ def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
     """
     data = tree.children[name].to_dataset()
     return data[list(data.data_vars)]
+
+
+def trace_suffixes(posterior: xr.DataTree) -> list[str]:
+    """Suffixes of the groups of each trace of a fit: "" of the first, "_2" of the second."""
+    found, number = [""], 2
+    while f"observed_data_{number}" in posterior.children:
+        found.append(f"_{number}")
+        number += 1
+    return found

@@ -87,6 +87,13 @@ def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
         yield as_run(output), "the output"
 
 
+def trace_name(output: OutputLike, tree: xr.DataTree) -> str:
+    """A short name of an output with a trace: that of its file, or of the measured file."""
+    if isinstance(output, str | os.PathLike):
+        return Path(output).stem
+    return str(tree.attrs.get("measured_file", tree.attrs.get("title", "trace")))
+
+
 def several(output: OutputLike | Sequence[OutputLike]) -> Sequence[OutputLike]:
     """Outputs, of which there may be one."""
     if isinstance(output, str | os.PathLike) or not isinstance(output, Sequence):

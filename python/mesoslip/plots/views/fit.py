@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from numpy.typing import NDArray
 
 from mesoslip.configuration.units import from_cf_units
+from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.style import Canvas, canvas, plain, styled
 from mesoslip.plots.views.base import Options, View
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 
 MEASURED = "black"
 PREDICTED = "tab:blue"
-# Symbols of keys.
+# Symbols of parameters.
 SYMBOLS = {
     "contacts.static_force": "$F_s$",
     "contacts.threshold.relative_width": r"$\Delta f_s/f_s$",
@@ -28,6 +29,7 @@ SYMBOLS = {
     "slider.stiffness": "$K$",
     "slider.mass": "$M$",
     "slider.damping_ratio": r"$\eta_S/\Omega_S$",
+    "fit.wander": "wander",
 }
 # Bins of the histograms of slips.
 BINS = 16
@@ -35,17 +37,22 @@ BINS = 16
 MAX_POINTS = 1500
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, _: Options, figure: Canvas | None = None) -> Canvas:
     """Pairs of parameters, the measured and predicted traces, and distributions of their slips."""
     with styled():
         names = list(tree["posterior"].data_vars)
-        size = max(2, len(names))
-        figure = canvas(figure, (7.0, 2.6 + 1.25 * size))
-        whole = figure.add_gridspec(2, 1, height_ratios=[1.25 * size, 2.6])
+        size, traces = max(2, len(names)), trace_suffixes(tree)
+        heights = [1.25 * size, *(2.6 for _ in traces)]
+        figure = canvas(figure, (7.0, sum(heights)))
+        whole = figure.add_gridspec(1 + len(traces), 1, height_ratios=heights)
         _pairs(figure, whole[0], tree)
-        below = whole[1].subgridspec(2, 3, height_ratios=[1.2, 1])
-        draw_trace(figure.add_subplot(below[0, :]), tree, options)
-        _slips(figure, below, tree)
+        for number, after in enumerate(traces, 1):
+            below = whole[number].subgridspec(2, 3, height_ratios=[1.2, 1])
+            axes = figure.add_subplot(below[0, :])
+            _draw_one(axes, tree, after)
+            if len(traces) > 1:
+                axes.set_title(plain(tree[f"observed_data{after}"].attrs["title"]), loc="left")
+            _slips(figure, below, tree, after)
         figure.suptitle(plain(tree.attrs.get("title", "")), x=0.01, ha="left", fontsize=8)
     return figure
 
@@ -79,28 +86,43 @@ def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
                 inside = np.mean((known >= low) & (known <= high)) / (high - low)
                 axes.axhline(inside, color="0.5", linestyle=":", linewidth=0.8)
                 axes.axvspan(*np.percentile(values, [5, 95]), color="0.9", zorder=0)
-                axes.set_yticks([])
             else:
                 axes.plot(values[thin], draws[below][thin], ".", color=PREDICTED, markersize=1.2)
                 axes.set_ylim(*np.percentile(draws[below], [0.1, 99.9]))
             axes.set_xlim(low, high)
             axes.tick_params(labelsize=6)
-            axes.xaxis.set_major_locator(MaxNLocator(3))
+            # Whole numbers on ticks, not differences from an offset.
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_major_formatter(_formatter())
+                axis.set_major_locator(MaxNLocator(3, prune="both"))
+            if row == column:
+                axes.set_yticks([])
             if row == len(names) - 1:
                 axes.set_xlabel(_label(beside, scales[beside]), fontsize=7)
             else:
                 axes.set_xticklabels([])
             if column == 0 and row > 0:
                 axes.set_ylabel(_label(below, scales[below]), fontsize=7)
-                axes.yaxis.set_major_locator(MaxNLocator(3))
             elif row != column:
                 axes.set_yticklabels([])
 
 
+def _formatter() -> ScalarFormatter:
+    """Ticks without an offset."""
+    formatter = ScalarFormatter(useOffset=False)
+    formatter.set_powerlimits((-3, 5))
+    return formatter
+
+
 def draw_trace(axes: Axes, tree: xr.DataTree, _: Options) -> None:
-    """Draw the measured trace over the band of predicted ones."""
-    observed = tree["observed_data"].to_dataset()["spring_force"]
-    predicted = tree["posterior_predictive"].to_dataset()["spring_force"]
+    """Draw the measured trace over the band of predicted ones; of several traces the first."""
+    _draw_one(axes, tree, "")
+
+
+def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
+    """Draw one of the measured traces, whose groups have names with a suffix."""
+    observed = tree[f"observed_data{after}"].to_dataset()["spring_force"]
+    predicted = tree[f"posterior_predictive{after}"].to_dataset()["spring_force"]
     scale = scale_for(max_size(observed.values, predicted.values), "N")
     traces, times = predicted.values[0] / scale.size, predicted["time"].values
     band = np.percentile(traces, [5, 95], axis=0)
@@ -118,9 +140,9 @@ def draw_trace(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     axes.legend(loc="upper right", ncols=3)
 
 
-def _slips(figure: Canvas, grid: object, tree: xr.DataTree) -> None:
+def _slips(figure: Canvas, grid: object, tree: xr.DataTree, after: str) -> None:
     """Draw distributions of the slips after the first one of each trace."""
-    groups = [tree[name].to_dataset() for name in ("observed_slips", "predicted_slips")]
+    groups = [tree[f"{name}{after}"].to_dataset() for name in ("observed_slips", "predicted_slips")]
     parts = [_later(group) for group in groups]
     quantities = (("force before slips", "N"), ("force drop", "N"), ("waiting time", "s"))
     for column, (quantity, unit) in enumerate(quantities):
@@ -147,7 +169,7 @@ def _slips(figure: Canvas, grid: object, tree: xr.DataTree) -> None:
                     )
         axes.set_yticks([])
         axes.set_xlabel(scale.label(quantity))
-        if column == 0:
+        if column == 0 and both.size:
             axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
             axes.legend(loc="upper left", ncols=2)
 

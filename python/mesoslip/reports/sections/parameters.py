@@ -15,7 +15,7 @@ HEAD = (
     "50 % interval",
     "90 % interval",
     "verdict",
-    "most informative feature",
+    "follows from",
 )
 
 
@@ -31,8 +31,13 @@ def parameters(subjects: Sequence[Subject]) -> Section:
         blocks.append(Table(HEAD, rows, note))
         warnings = str(subject.tree.attrs["warnings"]).split("\n")
         blocks += [Text(f"Warning: {one}.", warns=True) for one in warnings if one]
+        notes = str(subject.tree.attrs["notes"]).split("\n")
+        blocks += [Text(f"{one[0].upper()}{one[1:]}.") for one in notes if one]
         caption = "Parameters, and predicted traces beside the measured one"
         blocks.append(picture_of(subjects, subject, caption))
+        if subject.tree.attrs["disagreeing"]:
+            caption = "Where the traces disagree with the predictions"
+            blocks.append(picture_of(subjects, subject, caption, "misfit"))
     return Section("Parameters", tuple(blocks))
 
 
@@ -42,4 +47,4 @@ def _row(parameter: posterior.Row) -> tuple[str, ...]:
     low, lower, median, upper, high = (shown.text(one) for one in parameter.percentiles)
     intervals = (f"{lower} to {upper}", f"{low} to {high}")
     key = shown.head(parameter.key)
-    return (key, median, *intervals, parameter.verdict, parameter.most_informative)
+    return (key, median, *intervals, parameter.verdict, parameter.follows_from)

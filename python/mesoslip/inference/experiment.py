@@ -1,0 +1,378 @@
+"""A measured trace, its apparatus, and simulations that are sampled and disturbed as it was."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE, first_velocity
+from mesoslip.analysis.sampled_slips import estimated_period
+from mesoslip.configuration.config import Config
+from mesoslip.errors import ConfigError, FileError, Problem, RunError
+from mesoslip.execution.stop import StoppedError, StopRequest
+from mesoslip.inference.noise import Noise, cleaned
+from mesoslip.inference.plan import Plan
+from mesoslip.inference.prior import WANDER
+from mesoslip.inference.summaries import Summarizer
+from mesoslip.inference.wander import measured_length, wandering
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.tables import TRACE_COLUMNS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+# Numbers that determine random numbers.
+Words = NDArray[np.unsignedinteger[Any]]
+
+# Minimum noise over the maximum force. It is added to measured and simulated traces with less, as
+# experiments resolve no smaller differences.
+MIN_NOISE = 5e-4
+# Minimum number of samples of a trace.
+MIN_SAMPLES = 200
+# Maximum relative difference between a trace and its configuration.
+MAX_DIFFERENCE = 0.01
+# Samples in a period of the setup to which faster samples are averaged.
+SAMPLES_PER_PERIOD = 24
+# Initial force over the maximum one above which a measured trace does not begin with the first
+# loading, and loadings to the maximum force that a simulation is ahead of it.
+LOADED = 0.1
+LEAD_LOADINGS = 2.0
+# Maximum number of breaks in a simulation, far more than a trace can have.
+MAX_BREAKS = 3e7
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Sampling of a trace, from the start of the drive.
+
+    Attributes
+    ----------
+    times
+        Times of the samples [s], increasing, the first one 0.
+    start
+        Time from which samples are used [s].
+    block
+        Number of samples of which the mean is used.
+    lead
+        Number of samples that a simulation starts before the first sample.
+    """
+
+    times: Array
+    start: float = 0.0
+    block: int = 1
+    lead: int = 0
+
+    @cached_property
+    def interval(self) -> float:
+        """Median distance of samples [s]."""
+        return float(np.median(np.diff(self.times)))
+
+    @cached_property
+    def is_even(self) -> bool:
+        """Whether samples have equal distances."""
+        steps = np.diff(self.times)
+        return bool(np.all(np.abs(steps - self.interval) <= INTERVAL_TOLERANCE * self.interval))
+
+    @cached_property
+    def _even(self) -> Array:
+        """Times at equal distances [s]."""
+        if self.is_even:
+            return self.times
+        count = math.floor(self.times[-1] / self.interval) + 1
+        return np.asarray(self.interval * np.arange(count))
+
+    @cached_property
+    def _skipped(self) -> int:
+        return round(self.start / self.interval)
+
+    @cached_property
+    def time(self) -> Array:
+        """Times of the samples that are used, counted from the first one [s]."""
+        even = self._even[self._skipped :]
+        count = len(even) // self.block
+        return np.asarray(even[: count * self.block : self.block] - even[0]) if count else even[:0]
+
+    def reduced(self, force: Array) -> Array:
+        """Samples at equal distances, averaged over blocks, without those before the start.
+
+        Unequal distances are interpolated linearly, of measured and simulated traces alike.
+        """
+        if not self.is_even:
+            force = np.interp(self._even, self.times, force)
+        kept = force[self._skipped :]
+        count = len(kept) // self.block
+        if self.block == 1:
+            return kept
+        mean: Array = kept[: count * self.block].reshape(count, self.block).mean(axis=1)
+        return mean
+
+    def sampled(self, force: Array) -> Array:
+        """Samples of a simulated trace at equal distances, at the times of this sampling."""
+        force = force[self.lead :]
+        if self.is_even:
+            return force[: len(self.times)]
+        return np.interp(self.times, self.interval * np.arange(len(force)), force)
+
+    @property
+    def simulated_count(self) -> int:
+        """Number of samples of a simulated trace."""
+        count = len(self.times) if self.is_even else math.ceil(self.times[-1] / self.interval) + 1
+        return self.lead + count
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An apparatus with a measured trace.
+
+    Attributes
+    ----------
+    name
+        Name of the trace.
+    config
+        Configuration of the known parameters of this apparatus.
+    sampling
+        Sampling of the trace.
+    noise
+        Noise of its force.
+    summarizer
+        Reduces a trace to its summaries.
+    wander_length
+        Correlation length of the strength along the track [m].
+    force
+        The measured force as it is compared, shape (samples,) [N].
+    taken_off
+        What was taken off the trace, a sentence each.
+    """
+
+    name: str
+    config: Config
+    sampling: Sampling
+    noise: Noise
+    summarizer: Summarizer
+    wander_length: float
+    force: Array
+    taken_off: tuple[str, ...] = ()
+
+    def simulated(
+        self,
+        changes: dict[str, Any],
+        nuisances: dict[str, float],
+        words: Words,
+        stop: StopRequest,
+    ) -> Array | None:
+        """A noisy trace of the force [N], as `force`; None if it cannot be simulated.
+
+        Parameters
+        ----------
+        changes
+            Values of the free keys.
+        nuisances
+            Values of parameters that are no keys.
+        words
+            Three numbers that determine the random numbers.
+        stop
+            A request to stop.
+
+        Raises
+        ------
+        StoppedError
+            If it is stopped.
+        """
+        try:
+            config = self.config.replace({**changes, "run.seed": int(words[0]) >> 2})
+            run = Realization(config, 0, estimates_errors=False)
+            while not run.finished and run.breaks < MAX_BREAKS:
+                if stop.is_set():
+                    raise StoppedError("the fit was stopped")
+                run.advance()
+        except (ConfigError, RunError):
+            return None
+        trace: Array = run.trace[:]
+        run.close()
+        if not run.finished or run.breaks >= MAX_BREAKS:
+            return None
+        if len(trace) < self.sampling.simulated_count:
+            return None
+        force = self.sampling.sampled(trace[:, TRACE_COLUMNS.index("spring_force")])
+        rng = np.random.default_rng(words[1:])
+        noisy = self.noise.added(force, self.sampling.interval, rng)
+        if WANDER in nuisances:
+            drive = self.sampling.sampled(trace[:, TRACE_COLUMNS.index("drive_displacement")])
+            noisy = noisy + nuisances[WANDER] * self.summarizer.scale * wandering(
+                drive, self.wander_length, rng, starts_at_zero=self.summarizer.has_start
+            )
+        return self.sampling.reduced(noisy)
+
+    def noisier(self, rng: np.random.Generator) -> Array:
+        """The measured trace with as much noise again [N]."""
+        extra = self.noise.added(np.zeros(len(self.sampling.times)), self.sampling.interval, rng)
+        return self.force + self.sampling.reduced(extra)
+
+
+def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> Experiment:
+    """An experiment from its output.
+
+    Parameters
+    ----------
+    tree
+        The output; its first realization is used.
+    plan
+        The known parameters.
+    name
+        Name of the trace.
+    number
+        Number of the trace in the fit.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the trace cannot be fitted, or the configuration contradicts it.
+    """
+    if "spring_force" not in tree.data_vars:
+        if "friction_coefficient" in tree.data_vars:
+            raise FileError(
+                f"{_named(name)}has friction coefficients, and a fit needs forces: repeat mesoslip "
+                "trace with the normal force (--normal-force)"
+            )
+        raise FileError(f"{_named(name)}the output has no trace of the spring force")
+    known = _checked(tree, plan)
+    velocity = first_velocity(known) or 1.0
+    root = tree.to_dataset()
+    time = root["time"].values.astype(float)
+    force = np.atleast_2d(root["spring_force"].values)[0].astype(float)
+    is_known = np.isfinite(force)
+    time, force = time[is_known], force[is_known]
+    if len(time) < 2:
+        raise FileError(f"{_named(name)}the trace has {len(time)} samples")
+    sampling = Sampling(time - time[0], plan.after)
+    interval = sampling.interval
+    left = len(sampling.time)
+    if left < MIN_SAMPLES:
+        raise FileError(
+            f"{_named(name)}the trace has {left} samples"
+            + (f" after {plan.after:g} s" if plan.after else "")
+            + f"; a fit needs at least {MIN_SAMPLES}"
+        )
+    scale = float(np.max(np.abs(force)))
+    if scale == 0:
+        raise FileError(f"{_named(name)}the force of the trace is 0 throughout")
+    is_measured = tree.attrs.get("origin") == "measured"
+    force, noise, taken_off = cleaned(
+        sampling.times, force, deviation=plan.noise, is_measured=is_measured
+    )
+    scale = float(np.max(np.abs(force)))
+    noise, more = noise.with_at_least(MIN_NOISE * scale)
+    if more > 0:
+        words = [plan.seed, 1, number] if number else [plan.seed, 1]
+        force = force + more * np.random.default_rng(words).standard_normal(len(force))
+    is_midway = is_measured and not plan.after and _is_loaded(force, math.copysign(scale, velocity))
+    lead = 0
+    if is_midway and not known.drive.parts:
+        lead = math.ceil(_lead_time(known, scale, sampling.times[-1]) / interval)
+    config = _configured(known, replace(sampling, lead=lead), name)
+    whole = Sampling(sampling.times)
+    period = _period(plan, config, whole.time, whole.reduced(force), noise.deviation)
+    block = max(1, math.floor(period / interval / SAMPLES_PER_PERIOD))
+    block = min(block, max(1, left // MIN_SAMPLES))
+    sampling = replace(sampling, block=block, lead=lead)
+    reduced = sampling.reduced(force)
+    summarizer = Summarizer(
+        sampling.time,
+        noise.averaged(block, interval),
+        period,
+        scale,
+        math.copysign(1.0, velocity),
+        plan.after < interval / 2 and not is_midway,
+    )
+    length = math.nan
+    if WANDER in plan.prior.keys:
+        length = measured_length(summarizer, reduced, abs(velocity))
+    return Experiment(name, config, sampling, noise, summarizer, length, reduced, taken_off)
+
+
+def _is_loaded(force: Array, scale: float) -> bool:
+    """Whether a trace begins under force, not with the first loading of the interface."""
+    first = force[: max(3, len(force) // 1000)]
+    return float(np.median(first)) / scale > LOADED
+
+
+def _lead_time(config: Config, scale: float, duration: float) -> float:
+    """Time in which a simulation forgets its start [s]."""
+    rate = config.spring_stiffness * abs(first_velocity(config))
+    return min(LEAD_LOADINGS * scale / rate, duration) if 0 < rate < math.inf else duration
+
+
+def _named(name: str) -> str:
+    return f"{name}: " if name else ""
+
+
+def _configured(config: Config, sampling: Sampling, name: str) -> Config:
+    """The configuration with the sampling of a trace.
+
+    Raises
+    ------
+    FileError
+        If the drive of the configuration is shorter than the trace.
+    """
+    count, interval = sampling.simulated_count, sampling.interval
+    if config.drive.parts and config.duration < (count - 1.5) * interval:
+        raise FileError(
+            f"{_named(name)}the trace has a duration of {(count - 1) * interval:g} s, the stages "
+            f"of [drive] only {config.duration:g} s: give stages for the whole trace"
+        )
+    changes: dict[str, Any] = {
+        "run": {"engine": "eq", "realizations": 1},
+        "output": {"interval": interval},
+    }
+    if not config.drive.parts:
+        # Longer by half an interval, so that rounding does not lose the last sample.
+        changes["run"]["duration"] = (count - 0.5) * interval
+    tables = config.to_dict()
+    tables["output"] = {}
+    return type(config).from_dict(tables).replace(changes)
+
+
+def _period(plan: Plan, config: Config, time: Array, force: Array, noise: float) -> float:
+    """The period of the setup for finding slips, the same for every trace [s]."""
+    known = 2 * config.slider.quiet_time
+    estimated = estimated_period(time, force, noise)
+    is_known = not {"slider.mass", "slider.stiffness"} & set(plan.prior.keys)
+    if known > 0 and (is_known or not math.isfinite(estimated)):
+        return known
+    return estimated if math.isfinite(estimated) else float(time[-1]) / 100
+
+
+def _checked(tree: xr.DataTree, plan: Plan) -> Config:
+    """The configuration of the apparatus of a trace.
+
+    Of several traces each has the drive and the spring that it was recorded with.
+
+    Raises
+    ------
+    ConfigError
+        If one trace and its configuration contradict each other.
+    """
+    traced = tomllib.loads(tree.attrs["configuration"])
+    free, problems, own = set(plan.prior.keys), [], {}
+    # Further keys of a simulated trace are not compared: an experiment has none.
+    for table, name in (("drive", "velocity"), ("slider", "stiffness")):
+        measured = traced.get(table, {}).get(name)
+        given = getattr(getattr(plan.config, table), name, None)
+        key = f"{table}.{name}"
+        if measured is None or given is None or key in free:
+            continue
+        if plan.has_several:
+            own[key] = measured
+        elif abs(measured - given) > MAX_DIFFERENCE * abs(measured):
+            message = f"is {measured:g} in the trace; change it, or make it free in [fit.free]"
+            problems.append(Problem("configuration", key, message, given))
+    if problems:
+        raise ConfigError(problems)
+    return plan.config.replace(own) if own else plan.config

@@ -1,0 +1,168 @@
+"""Noise of a measured force, and random noise of the same kind for simulations."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.noise import estimate_noise, noise_level
+
+Array = NDArray[np.float64]
+
+# Relative uncertainty of an estimated noise.
+UNCERTAINTY = 0.1
+# Orders of differences for the noise, and quantile at which they are clipped.
+ORDERS = range(1, 8)
+CLIPPED = 0.999
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise that is added to simulated traces.
+
+    Attributes
+    ----------
+    white
+        Standard deviation of its white part [N].
+    coloured
+        Standard deviation of its correlated part, an autoregressive process of order 1 [N].
+    correlation_time
+        Correlation time of that part [s].
+    step
+        Digital step of the recorder [N]; 0 without one.
+    uncertainty
+        Relative standard deviation of the amplitude, which differs between simulations.
+    """
+
+    white: float
+    coloured: float = 0.0
+    correlation_time: float = 0.0
+    step: float = 0.0
+    uncertainty: float = 0.0
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of all parts [N]."""
+        return math.sqrt(self.white**2 + self.coloured**2 + self.step**2 / 12)
+
+    def added(self, force: Array, interval: float, rng: np.random.Generator) -> Array:
+        """A trace with noise.
+
+        Parameters
+        ----------
+        force
+            Samples [N], shape (samples,).
+        interval
+            Mean distance of the samples [s].
+        rng
+            Random numbers.
+        """
+        amplitude = 1.0
+        if self.uncertainty > 0:
+            amplitude = math.exp(self.uncertainty * rng.standard_normal())
+        noisy = force + amplitude * self.white * rng.standard_normal(len(force))
+        if self.coloured > 0:
+            noisy += amplitude * self.coloured * self._process(len(force), interval, rng)
+        if self.step > 0:
+            noisy = self.step * np.round(noisy / self.step)
+        return noisy
+
+    def _process(self, count: int, interval: float, rng: np.random.Generator) -> Array:
+        """An autoregressive process of order 1 and variance 1."""
+        from scipy.signal import lfilter
+
+        if self.correlation_time <= 0:
+            return rng.standard_normal(count)
+        kept = math.exp(-interval / self.correlation_time)
+        drawn = rng.standard_normal(count)
+        drawn[1:] *= math.sqrt(1 - kept**2)
+        process: Array = lfilter([1.0], [1.0, -kept], drawn)
+        return process
+
+    def with_at_least(self, deviation: float) -> tuple[Noise, float]:
+        """Noise of at least a standard deviation [N], and that of the white noise to be added."""
+        missing = deviation**2 - self.deviation**2
+        if missing <= 0:
+            return self, 0.0
+        more = math.sqrt(missing)
+        return replace(self, white=math.hypot(self.white, more)), more
+
+    def averaged(self, block: int, interval: float) -> float:
+        """Standard deviation of the mean of neighbouring samples [N].
+
+        Parameters
+        ----------
+        block
+            Number of samples of a mean.
+        interval
+            Their distance [s].
+        """
+        quick = (self.white**2 + self.step**2 / 12) / block
+        slow = 0.0
+        if self.coloured > 0:
+            lags = np.arange(1, block) * interval
+            kept = np.exp(-lags / max(self.correlation_time, 1e-300))
+            weights = 1 - np.arange(1, block) / block
+            slow = self.coloured**2 * (1 + 2 * float(np.sum(weights * kept))) / block
+        return math.sqrt(quick + slow)
+
+
+def cleaned(
+    times: Array, force: Array, *, deviation: float | None, is_measured: bool
+) -> tuple[Array, Noise, tuple[str, ...]]:
+    """A trace without impulses and hum, and the noise that is left.
+
+    Parameters
+    ----------
+    times
+        Times of the samples [s], shape (samples,).
+    force
+        Force [N], shape (samples,).
+    deviation
+        Standard deviation of white noise, if it is given [N].
+    is_measured
+        Whether the trace was measured; of a simulated one nothing is taken off, and its noise is
+        white.
+
+    Returns
+    -------
+    force, noise, sentences
+        The trace, its noise, and what was taken off.
+    """
+    uncertainty = 0.0 if deviation is not None else UNCERTAINTY
+    if not is_measured:
+        white = noise_level(force) if deviation is None else deviation
+        return force, Noise(white, uncertainty=uncertainty), ()
+    found = estimate_noise(times, force)
+    clean = found.clean(times, force)
+    if deviation is not None:
+        noise = Noise(deviation)
+    else:
+        # As their mean square counts in the summaries, also of noise that is not normal.
+        white = max(found.deviation, _differences(clean))
+        noise = Noise(
+            math.sqrt(max(white**2 - found.digital_step**2 / 12, 0.0)),
+            found.correlated_deviation,
+            found.correlation_time,
+            found.digital_step,
+            uncertainty,
+        )
+    taken = tuple(one for one in found.sentences() if "taken off" in one)
+    return clean, noise, taken
+
+
+def _differences(force: Array) -> float:
+    """Standard deviation of noise that is not normal, from differences of the trace [N].
+
+    As `noise_level`, but with the mean square of the differences, as the power of the noise counts.
+    """
+    found = []
+    for order in ORDERS:
+        norm = math.sqrt(math.comb(2 * order, order))
+        sizes = np.abs(np.diff(force, order)) / norm
+        limit = np.quantile(sizes, CLIPPED)
+        found.append(float(np.sqrt(np.mean(np.minimum(sizes, limit) ** 2))))
+    return min(found)

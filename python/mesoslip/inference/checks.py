@@ -130,8 +130,14 @@ def compare(
     count = len(predicted)
     ranks = (count - np.argsort(np.argsort(own, axis=0), axis=0)) / count
     parts = (1 + np.sum(own >= trace, axis=0)) / (1 + count)
-    min_ranks = ranks.min(axis=1, initial=1.0)
-    probability = (1 + np.sum(min_ranks <= parts.min(initial=1.0))) / (1 + count)
+    # Beyond all others the distance counts too: with many groups some prediction is always the
+    # farthest one of a group.
+    others = np.sort(own, axis=0)[-2:]
+    limit = np.where(own >= others[-1], others[0], others[-1])
+    unusual = _unusual(own, limit) - np.log(ranks)
+    own_unusual = _unusual(trace, others[-1]) - np.log(parts)
+    is_more = unusual.max(axis=1, initial=0.0) >= own_unusual.max(initial=0.0)
+    probability = (1 + np.sum(is_more)) / (1 + count)
     scores[missing], scores[extra] = -np.inf, np.inf
     found = {groups[index]: float(parts[index]) for index in np.argsort(parts)}
     for lost in np.flatnonzero(missing | extra).tolist():
@@ -150,6 +156,11 @@ def compare(
         ranked,
         tuple(sentences(features, disagreeing, scores, observed, predicted)),
     )
+
+
+def _unusual(distance: Array, limit: Array) -> Array:
+    """How far distances are beyond the farthest of the others, as a logarithm of at least 0."""
+    return np.asarray(np.log(np.maximum(distance, 1e-300) / np.maximum(limit, 1e-300)).clip(0))
 
 
 def shrinkage(draws: Array) -> Array:

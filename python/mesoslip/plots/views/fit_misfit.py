@@ -156,8 +156,7 @@ def draw_scores(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     ticks = (-30, -10, -3, 0, 3, 10, 30)
     axes.set_xticks(ticks, [str(one) for one in ticks])
     axes.set_xlabel(
-        "measured minus predicted, in spreads of the predictions (blue: 90 % of them; orange: "
-        "groups that disagree)"
+        "measured - predicted (spreads)\nblue: 90 % of predictions\norange: groups that disagree"
     )
 
 

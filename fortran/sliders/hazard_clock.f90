@@ -19,15 +19,15 @@ module mesoslip_sliders_hazard_clock
    !> Relative change of a time after which one more step changes nothing: convergence is cubic
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
-   !> A step is short if the terms of the exponent, from the first to the fifth, change it by no
-   !> more than this, and others not at all: what a series of the eighth order leaves out of its
-   !> exponential function is below 1e-14 of it
-   integer, parameter :: short_terms = 5, short_order = 8
-   real(wp), parameter :: max_short(short_terms) = [0.1_wp, 1.0e-4_wp, 1.0e-6_wp, 1.0e-8_wp, &
-      & 1.0e-10_wp]
+   !> A step is short if the terms of the exponent, from the first to the fourth, change it by no
+   !> more than this, and others by nothing: what a series of the sixth order leaves out of its
+   !> exponential function is below 1e-15 of it
+   integer, parameter :: short_terms = 4, short_order = 6
+   real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
    real(wp), parameter :: no_change = 1.0e-16_wp
-   !> Bounds on the integral over a short step, relative to its length
-   real(wp), parameter :: min_growth = 0.9_wp, max_growth = 1.11_wp
+   !> Bounds on the mean of the exponential function over a short step
+   real(wp), parameter :: min_growth = 0.97_wp, max_growth = 1.03_wp
+
    !> Change of an exponent below which three terms of a series do
    real(wp), parameter :: small = 1.0e-4_wp
 
@@ -51,9 +51,6 @@ module mesoslip_sliders_hazard_clock
       integer :: terms
       !> Coefficients of the exponent over the time [1/s], and of its rate
       real(wp) :: mean(0:max_terms - 1), rate(0:max_terms - 1)
-      !> Whether the step is short, and then coefficients of the exponential function
-      logical :: is_short
-      real(wp) :: growth(0:short_order)
    end type exponent_type
 
 contains
@@ -71,12 +68,14 @@ contains
       logical, intent(out) :: is_ended
 
       integer :: number, ended_by
+      logical :: is_short
       real(wp) :: time
 
-      ended_by = 0
+      call try_short_step(clock, series, terms, step, ended_by, is_short)
+      is_ended = ended_by > 0
+      if (is_ended) clock(ended_by)%is_due = .true.
+      if (is_short) return
       do number = 1, clocks
-         clock(number)%elapsed = 0.0_wp
-         clock(number)%is_due = .false.
          if (.not. clock(number)%is_used) cycle
          time = time_to_reading(clock(number), series, terms, step)
          if (time <= step) then
@@ -86,7 +85,6 @@ contains
       end do
       do number = 1, clocks
          if (number == ended_by) then
-            clock(number)%elapsed = clock(number)%left
             clock(number)%is_due = .true.
          else if (clock(number)%is_used) then
             clock(number)%elapsed = clock(number)%rate &
@@ -121,11 +119,7 @@ contains
          time = steady_time(clock%slope * series(0), wanted)
          return
       end if
-      call expand_exponent(clock%slope, series, terms, step, exponent)
-      if (exponent%is_short) then
-         if (wanted <= step * max_growth) time = short_time(exponent, step, wanted)
-         return
-      end if
+      call expand_exponent(clock%slope, series, terms, exponent)
       parts = parts_of(exponent, step)
       length = step / parts
       do number = 1, parts
@@ -160,11 +154,7 @@ contains
          reading = step * mean_growth(slope * series(0) * step)
          return
       end if
-      call expand_exponent(slope, series, terms, step, exponent)
-      if (exponent%is_short) then
-         reading = short_integral(exponent%growth, step)
-         return
-      end if
+      call expand_exponent(slope, series, terms, exponent)
       parts = parts_of(exponent, step)
       length = step / parts
       reading = 0.0_wp
@@ -175,83 +165,137 @@ contains
       end do
    end function reading_after
 
-   !> The exponent during a step, and its exponential function if the step is short.
-   pure subroutine expand_exponent(slope, series, terms, step, exponent)
-      real(wp), intent(in) :: slope, series(0:), step
+   !> The exponent during a step.
+   pure subroutine expand_exponent(slope, series, terms, exponent)
+      real(wp), intent(in) :: slope, series(0:)
       integer, intent(in) :: terms
       type(exponent_type), intent(out) :: exponent
 
-      integer :: term, order
-      real(wp) :: change, power, part(short_terms)
+      integer :: term
 
       exponent%terms = terms
       do term = 0, terms - 1
          exponent%rate(term) = slope * series(term)
          exponent%mean(term) = exponent%rate(term) * inverse(term + 1)
       end do
-      part = 0.0_wp
-      change = 0.0_wp
-      do term = terms, short_terms + 1, -1
-         change = (change + abs(exponent%mean(term - 1))) * step
-      end do
-      power = 1.0_wp
-      exponent%is_short = .true.
-      do term = 1, min(terms, short_terms)
-         power = power * step
-         part(term) = exponent%rate(term - 1)
-         if (abs(exponent%mean(term - 1)) * power > max_short(term)) exponent%is_short = .false.
-      end do
-      if (.not. change * power <= no_change) exponent%is_short = .false.
-      if (.not. exponent%is_short) return
-      ! Of g = exp(e): n g_n is the sum over j of j e_j g_(n-j).
-      exponent%growth(0) = 1.0_wp
-      do order = 1, short_order
-         change = 0.0_wp
-         do term = 1, min(order, short_terms)
-            change = change + part(term) * exponent%growth(order - term)
-         end do
-         exponent%growth(order) = change * inverse(order)
-      end do
    end subroutine expand_exponent
 
-   !> Integral of the exponential function over a short step.
+   !> Try a short step: shorten it to the first time at which a clock comes to its reading, and let
+   !> clocks go on.
+   pure subroutine try_short_step(clock, series, terms, step, ended_by, is_short)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: terms
+      real(wp), intent(inout) :: step
+      !> The clock that ends the step, or 0
+      integer, intent(out) :: ended_by
+      !> Whether the step is short; if not, nothing has changed
+      logical, intent(out) :: is_short
+
+      real(wp) :: change, length, part, time
+      real(wp) :: exponent(short_terms), growth(0:short_order, clocks)
+      integer :: term, number
+
+      ended_by = 0
+      is_short = .true.
+      exponent = 0.0_wp
+      ! Both clocks have one slope but for its sign.
+      length = clock(1)%slope
+      do term = 1, min(terms, short_terms)
+         length = length * step
+         exponent(term) = series(term - 1) * inverse(term) * length
+         if (.not. abs(exponent(term)) <= max_short(term)) is_short = .false.
+      end do
+      if (.not. is_short) return
+      change = 0.0_wp
+      do term = terms, short_terms + 1, -1
+         change = (change + abs(series(term - 1)) * inverse(term)) * step
+      end do
+      is_short = change * abs(length) <= no_change
+      if (.not. is_short) return
+
+      length = step
+      time = 1.0_wp
+      do number = 1, clocks
+         if (.not. clock(number)%is_used) cycle
+         growth(:, number) = expand_growth(sign(1.0_wp, clock(number)%slope * clock(1)%slope) &
+            & * exponent)
+         part = short_time(growth(:, number), clock(number)%left, clock(number)%rate * length, time)
+         if (part > time) cycle
+         time = part
+         ended_by = number
+      end do
+      do number = 1, clocks
+         if (clock(number)%is_used) clock(number)%elapsed = clock(number)%rate * length &
+            & * short_integral(growth(:, number), time)
+      end do
+      if (ended_by > 0) step = time * length
+   end subroutine try_short_step
+
+   !> Coefficients of the exponential function, from those of the exponent: of g = exp(e), n g_n is
+   !> the sum over j of j e_j g_(n-j).
+   pure function expand_growth(e) result(g)
+      real(wp), intent(in) :: e(short_terms)
+      real(wp) :: g(0:short_order)
+
+      real(wp) :: e_2, e_3, e_4
+
+      e_2 = 2.0_wp * e(2)
+      e_3 = 3.0_wp * e(3)
+      e_4 = 4.0_wp * e(4)
+      g(0) = 1.0_wp
+      g(1) = e(1)
+      g(2) = inverse(2) * (e(1) * g(1) + e_2)
+      g(3) = inverse(3) * (e(1) * g(2) + e_2 * g(1) + e_3)
+      g(4) = inverse(4) * ((e(1) * g(3) + e_2 * g(2)) + (e_3 * g(1) + e_4))
+      g(5) = inverse(5) * ((e(1) * g(4) + e_2 * g(3)) + (e_3 * g(2) + e_4 * g(1)))
+      g(6) = inverse(6) * ((e(1) * g(5) + e_2 * g(4)) + (e_3 * g(3) + e_4 * g(2)))
+   end function expand_growth
+
+   !> Integral of the exponential function over a part of a short step, in units of the step.
    pure function short_integral(growth, time) result(integral)
       !> Its coefficients
       real(wp), intent(in) :: growth(0:short_order)
       real(wp), intent(in) :: time
       real(wp) :: integral
 
-      integer :: order
-
-      integral = 0.0_wp
-      do order = short_order, 0, -1
-         integral = integral * time + growth(order) * inverse(order + 1)
-      end do
-      integral = integral * time
+      associate (g => growth)
+         integral = time * (g(0) + time * (inverse(2) * g(1) + time * (inverse(3) * g(2) &
+            & + time * (inverse(4) * g(3) + time * (inverse(5) * g(4) + time * (inverse(6) * g(5) &
+            & + time * inverse(7) * g(6)))))))
+      end associate
    end function short_integral
 
-   !> Time at which an integral is reached in a short step; huge if it is not.
-   pure function short_time(exponent, step, wanted) result(time)
-      type(exponent_type), intent(in) :: exponent
-      real(wp), intent(in) :: step, wanted
+   !> Time at which a clock comes to its reading in a short step, in units of the step; huge if it
+   !> is later than a time.
+   pure function short_time(growth, left, whole, latest) result(time)
+      real(wp), intent(in) :: growth(0:short_order)
+      !> What is left, and what the clock would go on by in the step at its first rate
+      real(wp), intent(in) :: left, whole
+      real(wp), intent(in) :: latest
       real(wp) :: time
 
-      real(wp) :: change, pace
+      real(wp) :: wanted, change, pace
       integer :: iteration
 
       time = huge(1.0_wp)
-      if (wanted > step * min_growth) then
-         if (wanted > short_integral(exponent%growth, step)) return
+      if (left > max_growth * latest * whole) return
+      wanted = left / whole
+      if (wanted > min_growth * latest) then
+         if (wanted > short_integral(growth, latest)) return
       end if
-      pace = exponent%rate(0) * wanted
-      time = wanted * (1.0_wp - pace * (0.5_wp - pace * (inverse(3) - 0.25_wp * pace)))
+      pace = growth(1) * wanted
+      time = wanted * (1.0_wp - pace * (0.5_wp - inverse(3) * pace))
       do iteration = 1, max_iterations
-         change = (short_integral(exponent%growth, time) - wanted) &
-            & / horner(exponent%growth, short_order + 1, time)
-         time = time - change * (1.0_wp + 0.5_wp * change * exponent%rate(0))
+         associate (g => growth)
+            change = (short_integral(g, time) - wanted) / (g(0) + time * (g(1) + time * (g(2) &
+               & + time * (g(3) + time * g(4)))))
+         end associate
+         time = time - change
+         ! Newton's method squares the error; the slope is right to 1e-9.
          if (abs(change) <= converged * time) exit
       end do
-      time = min(time, step)
+      time = min(time, latest)
    end function short_time
 
    !> Parts of a step in each of which the exponent changes so little that a rule is exact.

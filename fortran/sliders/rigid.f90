@@ -138,7 +138,7 @@ contains
          system%driving = constant%driving - self%law%rate * system%inverse_mass
          system%drive_gap = uniform_gap(self)
          early = rates(self, system, system%drive_gap)
-         if (.not. self%has_clocks) call try_short_step(self, system, window, early, is_done)
+         call try_short_step(self, system, window, early, is_done)
       end if
       if (.not. is_done) call take_long_step(self, system, window, early)
    end subroutine step_on

@@ -140,7 +140,9 @@ contains
 
       y = growth * wanted
       time = wanted
-      if (abs(y) > 1.0e-3_wp) then
+      if (abs(y) < 0.1_wp) then
+         time = wanted * (1.0_wp - y * (0.5_wp - y / 3.0_wp))
+      else
          time = huge(1.0_wp)
          if (y > -1.0_wp) time = log(1.0_wp + y) / growth
       end if

@@ -8,6 +8,7 @@
 module mesoslip_sliders_rigid_short_step
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_motion_series, only: horner, integral, inverse
    use mesoslip_sliders_rigid_state, only: arrive, few_terms, motion_rates_type, pull, &
       & rigid_state_type, system_type, uniform_gap
@@ -47,9 +48,10 @@ contains
       !> Whether the step was made; if not, the motion has not changed
       logical, intent(out) :: is_done
 
-      real(wp) :: target, distance, pace, rest, passage, longest, step, change, inverse_pace
+      real(wp) :: target, distance, pace, rest, passage, longest, step, change, inverse_pace, &
+         & end_time
       type(derivatives_type) :: derivatives
-      logical :: crosses, nears
+      logical :: crosses, nears, is_due
       integer :: term
 
       is_done = .false.
@@ -90,7 +92,15 @@ contains
       end if
 
       is_done = .true.
-      call move(self, system, window, early, derivatives, step, crosses, target)
+      end_time = window%end_time
+      if (self%has_clocks) then
+         call advance_clocks(self%clock, self%series, few_terms, step, is_due)
+         if (is_due) then
+            crosses = .false.
+            end_time = self%time + step
+         end if
+      end if
+      call move(self, system, end_time, early, derivatives, step, crosses, target)
    end subroutine try_short_step
 
    !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in,
@@ -171,10 +181,11 @@ contains
    end function nearer
 
    !> Move, and add work and losses to the energy balance.
-   subroutine move(self, system, window, early, derivatives, step, crosses, target)
+   subroutine move(self, system, end_time, early, derivatives, step, crosses, target)
       class(rigid_state_type), intent(inout) :: self
       type(system_type), intent(in) :: system
-      type(window_type), intent(in) :: window
+      !> Time at which it ends, if that is not at a break [s]
+      real(wp), intent(in) :: end_time
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
       type(derivatives_type), intent(in) :: derivatives
@@ -198,7 +209,7 @@ contains
                & + inverse(2) * step * (early%acceleration + inverse(3) * step * d%jerk) &
                & + (1.0_wp / 24.0_wp) * step * square * (d%snap + inverse(5) * step * d%crackle &
                & + (1.0_wp / 30.0_wp) * square * d%pop))
-            self%time = window%end_time
+            self%time = end_time
          end if
          self%velocity = early%velocity + (step * early%acceleration + inverse(2) * square &
             & * ((d%jerk + inverse(3) * step * d%snap) + inverse(12) * square &

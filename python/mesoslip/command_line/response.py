@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def response(
     outputs: Annotated[
-        list[Path], typer.Argument(help="Outputs of mesoslip run", metavar="OUT.nc...")
+        list[Path], typer.Argument(help="Outputs of mesoslip run or trace", metavar="OUT.nc...")
     ],
     table: Annotated[
         Path | None,
@@ -33,10 +33,24 @@ def response(
     free_stiffness: Annotated[
         bool, typer.Option("--free-stiffness", help="Fit the stiffness of the spring too")
     ] = False,
+    as_latex: Annotated[
+        bool, typer.Option("--latex", help="Print rate-and-state parameters as a LaTeX table")
+    ] = False,
+    as_markdown: Annotated[
+        bool, typer.Option("--markdown", help="Print rate-and-state parameters as a Markdown table")
+    ] = False,
 ) -> None:
     """Print steady forces, velocity steps, holds, and rate-and-state parameters."""
     from mesoslip.analysis import response as responses
-    from mesoslip.analysis.response import force_scale, rows_of, scalars_of, tables, write_csv
+    from mesoslip.analysis.response import (
+        force_scale,
+        latex,
+        markdown,
+        rows_of,
+        scalars_of,
+        tables,
+        write_csv,
+    )
     from mesoslip.output import targets
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
@@ -50,6 +64,12 @@ def response(
         scalars = {key: value for group in groups for key, value in scalars_of(tree, group).items()}
         names = {one: tree.attrs[one] for one in ("outputs", "normal_force") if one in tree.attrs}
         print_json(names | groups | scalars)
+        return
+    if as_latex or as_markdown:
+        # Without fits, the table of steady forces.
+        chosen = next(iter(reversed(tables(tree))), None)
+        if chosen is not None:
+            typer.echo((latex if as_latex else markdown)(chosen))
         return
     typer.echo(force_scale(tree))
     for one in tables(tree):

@@ -14,7 +14,7 @@ from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import curve, draw_curves
 from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.style import CONTACT, SPRING, legend_above
-from mesoslip.plots.trace import force_of, is_known
+from mesoslip.plots.trace import NAMES, driving_force_of, force_of, is_known
 
 
 def largest_slip(tree: xr.DataTree, extent: Extent = EVERYTHING) -> xr.Dataset | None:
@@ -72,8 +72,11 @@ def draw_slip(
     if force_of(tree) == "elastic_force":
         label = "mean elastic force"
         curves.append(curve(tree, "elastic_force", near, color="tab:green", label=label))
-    curves.append(curve(tree, "spring_force", near, **SPRING))
-    draw_curves(force, curves, "spring_force", horizontal, "force")
+    driving = driving_force_of(tree)
+    style = SPRING if driving == "spring_force" else SPRING | {"label": NAMES[driving]}
+    curves.append(curve(tree, driving, near, **style))
+    name = "force" if driving == "spring_force" else NAMES[driving]
+    draw_curves(force, curves, driving, horizontal, name)
     legend_above(force, columns=1, title=title)
     for axes, name in zip(below, names, strict=True):
         draw_curves(axes, [curve(tree, name, near, color="black")], name, horizontal)

@@ -11,13 +11,15 @@ from mesoslip.output.variables import TRACE
 
 NAMES = {
     "spring_force": "spring force",
+    "friction_coefficient": "friction coefficient",
     "elastic_force": "mean elastic force",
     "contact_force": "contact force",
     "velocity": "velocity",
     "detached_contacts": "detached contacts",
 }
 # Units of the trace as a configuration writes them.
-UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()} | {"time": "s"}
+UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()}
+UNITS |= {"time": "s", "friction_coefficient": "1"}
 
 
 def is_known(tree: xr.DataTree, name: str) -> bool:
@@ -30,4 +32,9 @@ def is_known(tree: xr.DataTree, name: str) -> bool:
 
 def force_of(tree: xr.DataTree) -> str:
     """The force that shows the motion: for an elastic slider the mean one in it."""
-    return "elastic_force" if "elastic_force" in tree.data_vars else "spring_force"
+    return "elastic_force" if "elastic_force" in tree.data_vars else driving_force_of(tree)
+
+
+def driving_force_of(tree: xr.DataTree) -> str:
+    """The force at the drive, or the friction coefficient of a measured trace without forces."""
+    return "spring_force" if "spring_force" in tree.data_vars else "friction_coefficient"

@@ -14,6 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from mesoslip.configuration.config import Config
+from mesoslip.errors import FileError
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import Canvas, styled
 
@@ -38,6 +39,14 @@ class Subject:
     def config(self) -> Config:
         """The configuration of the output."""
         return config_of(self.tree, self.name)
+
+    @property
+    def has_config(self) -> bool:
+        """Whether it has a whole configuration: a measured trace may have a part of one."""
+        try:
+            return bool(self.config)
+        except FileError:
+            return False
 
 
 @dataclass(frozen=True)

@@ -303,5 +303,5 @@ def _assessment(law: str, found: MeasuredFit, preferred: str) -> str:
         reasons.append(f"the misfit is {misfit} of the variation")
         notes.append(f"does not describe the record: {', '.join(reasons)}")
     if law == preferred:
-        notes.append("preferred")
+        notes.append("preferred among the laws whose parameters are determined")
     return "; ".join(notes)

@@ -13,14 +13,22 @@ from mesoslip.analysis.response.dataset import (
 from mesoslip.analysis.response.holds import healing_line
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.steady import steady_line
-from mesoslip.analysis.response.tables import ResponseTable, force_scale, tables
+from mesoslip.analysis.response.tables import (
+    ResponseTable,
+    force_scale,
+    latex,
+    markdown,
+    tables,
+)
 
 __all__ = [
     "Line",
     "ResponseTable",
     "force_scale",
     "healing_line",
+    "latex",
     "line",
+    "markdown",
     "response",
     "response_of",
     "rows_of",

@@ -13,85 +13,13 @@ from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit, record_of
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
+from mesoslip.plots.measured_response import draw_measured, draw_measured_record
+from mesoslip.plots.record import draw_record
 from mesoslip.plots.style import Canvas, canvas, plain, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
 Array = NDArray[np.float64]
-
-# Samples of the record at equal intervals of time, and as many at equal distances.
-MAX_DOTS = 20_000
-# Stages whose starts are marked, and stages with a label.
-MAX_MARKS = 200
-MAX_LABELS = 12
-# Minimum distance of two labels, as a part of the width.
-LABEL_WIDTH = 0.03
-
-
-def _draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
-    """Draw the force against the displacement of the load point."""
-    shown = _dots(experiment)
-    sign = next((one.direction for one in experiment.stages if one.direction), 1.0)
-    force = sign * experiment.force.mean(axis=0) / experiment.static_force
-    x = sign * experiment.drive
-    axes.plot(x[shown] / scale.size, force[shown], color="black", linewidth=0.6)
-    steady = next((one for one in experiment.stages if experiment.mean_of(one) is not None), None)
-    if steady is not None and len(experiment.stages) > 1:
-        # The range after steady sliding is reached: what comes before may be far larger.
-        mean = experiment.mean_of(steady)
-        assert mean is not None
-        later = force[experiment.samples(steady).start + mean.start :]
-        margin = 0.15 * max(float(np.ptp(later)), 1e-3)
-        axes.set_ylim(later.min() - 2 * margin, later.max() + margin)
-    axes.set_xlabel(scale.label("displacement of the load point"))
-    axes.set_ylabel("force over $F_s$")
-    for stage in experiment.stages[1 : MAX_MARKS + 1]:
-        start = x[experiment.start_sample(stage)] / scale.size
-        axes.axvline(start, color="tab:blue" if stage.is_hold else "0.8", linewidth=0.5, zorder=0)
-    _label_stages(axes, experiment, x, scale)
-
-
-def _dots(experiment: Experiment) -> NDArray[np.int64]:
-    """Samples of a line: equidistant ones in time, and as many along the drive."""
-    count = experiment.time.size
-    if count <= 2 * MAX_DOTS:
-        return np.arange(count)
-    path_length = np.append(0.0, np.cumsum(np.abs(np.diff(experiment.drive))))
-    even = np.linspace(0, count - 1, MAX_DOTS).astype(np.int64)
-    along = np.searchsorted(path_length, np.linspace(0, path_length[-1], MAX_DOTS)).astype(np.int64)
-    return np.union1d(even, np.minimum(along, count - 1))
-
-
-def _label_stages(axes: Axes, experiment: Experiment, x: Array, scale: Scale) -> None:
-    """Write the velocity of each stage, or the duration of a hold, above the record."""
-    if len(experiment.stages) > MAX_LABELS:
-        return
-    min_distance = LABEL_WIDTH * float(np.ptp(x))
-    last = -math.inf
-    for stage in experiment.stages:
-        if not (stage.is_hold or stage.is_steady):
-            continue
-        inside = experiment.samples(stage)
-        index = (
-            experiment.start_sample(stage) if stage.is_hold else (inside.start + inside.stop) // 2
-        )
-        position = x[min(index, x.size - 1)]
-        # Labels of short stages would lie over each other.
-        if abs(position - last) < min_distance:
-            continue
-        last = position
-        axes.annotate(
-            with_unit(stage.duration, "s")
-            if stage.is_hold
-            else with_unit(abs(stage.velocity), "m/s", 3),
-            (position / scale.size, 1.0),
-            xycoords=("data", "axes fraction"),
-            fontsize=6,
-            ha="center",
-            va="bottom",
-            color="tab:blue" if stage.is_hold else "0.4",
-            rotation=40 if len(experiment.stages) > 4 else 0,
-        )
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, scale: Scale) -> None:
@@ -114,7 +42,10 @@ def draw_force(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     fits better."""
     experiment = Experiment(tree)
     scale = scale_for(float(np.max(np.abs(experiment.drive))), "m")
-    _draw_record(axes, experiment, scale)
+    if experiment.is_measured:
+        draw_measured_record(axes, experiment, scale)
+        return
+    draw_record(axes, experiment, scale)
     record = record_of(experiment)
     if isinstance(record, str):
         return
@@ -186,8 +117,13 @@ def _scale(data: xr.Dataset, name: str) -> float:
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
-    """The record with the law that fits better; steady forces; healing in holds."""
+    """The record with the law that fits better; steady forces; healing in holds.
+
+    Of a measured trace: residuals, and a - b against velocity, instead of steady forces.
+    """
     experiment = Experiment(tree)
+    if experiment.is_measured:
+        return draw_measured(tree, experiment, figure)
     found = response_of([experiment], with_fit=False)
     steady, holds = found["steady"].to_dataset(), found["holds"].to_dataset()
     velocities = steady["velocity"].values[np.isfinite(steady["steady_force"].values)]

@@ -18,10 +18,11 @@ def changes(subjects: Sequence[Subject]) -> Section:
     for subject in subjects:
         if is_measured(subject.tree):
             blocks += _measured(subject)
-    if len(subjects) > 1:
+    if len(subjects) > 1 and all(one.has_config for one in subjects):
         blocks.append(_differences(subjects))
     for subject in subjects:
-        blocks += _from_base(subjects, subject)
+        if subject.has_config:
+            blocks += _from_base(subjects, subject)
     title = "Differences" if len(subjects) > 1 else "Changes from the base"
     return Section(title, tuple(blocks))
 
@@ -30,7 +31,8 @@ def _measured(subject: Subject) -> Iterator[Block]:
     """The origin of a measured trace."""
     attributes = subject.tree.attrs
     samples = subject.tree.sizes["time"]
-    noise = with_unit(attributes["noise"], "N", 3)
+    unit = "N" if "spring_force" in subject.tree.data_vars else "1"
+    noise = with_unit(attributes["noise"], unit, 3)
     yield Text(
         f"{subject.name}: measured ({attributes['measured_file']}, {samples} samples, noise "
         f"{noise}); its configuration has the known parameters of the experiment."

@@ -12,24 +12,30 @@ from mesoslip.reports.sections.base import named
 
 def configuration(subjects: Sequence[Subject]) -> Section:
     """All keys, with those of several outputs side by side."""
-    tables = [differences.flat(one.config) for one in subjects]
-    free = [_free_keys(one) for one in subjects]
-    keys = dict.fromkeys(key for table in tables for key in table)
-    rows = tuple(
-        (
-            key,
-            *(
-                ranges.get(key, differences.text_of(key, table.get(key)))
-                for table, ranges in zip(tables, free, strict=True)
-            ),
+    configured = [one for one in subjects if one.has_config]
+    blocks: list[Block] = []
+    if configured:
+        tables = [differences.flat(one.config) for one in configured]
+        free = [_free_keys(one) for one in configured]
+        keys = dict.fromkeys(key for table in tables for key in table)
+        rows = tuple(
+            (
+                key,
+                *(
+                    ranges.get(key, differences.text_of(key, table.get(key)))
+                    for table, ranges in zip(tables, free, strict=True)
+                ),
+            )
+            for key in keys
         )
-        for key in keys
-    )
-    names = [one.name for one in subjects] if len(subjects) > 1 else ["value"]
-    blocks: list[Block] = [Table(("key", *names), rows)]
+        names = [one.name for one in configured] if len(subjects) > 1 else ["value"]
+        blocks.append(Table(("key", *names), rows))
     for subject in subjects:
         title = named(subjects, subject, "as a file, in SI units")
         blocks.append(Source(title, subject.tree.attrs["configuration"]))
+        if subject.tree.attrs.get("trace"):
+            title = named(subjects, subject, "description of the measurement")
+            blocks.append(Source(title, subject.tree.attrs["trace"]))
     return Section("Configuration", tuple(blocks))
 
 

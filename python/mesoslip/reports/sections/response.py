@@ -15,13 +15,18 @@ def response(subjects: Sequence[Subject]) -> Section | None:
     """Steady forces, velocity steps, holds and rate-and-state parameters of a drive with stages."""
     experiments = []
     for subject in subjects:
-        if len({one.stage for one in subject.config.drive_parts}) < 2:
-            continue
         try:
-            experiments.append((subject, Experiment(subject.tree, subject.name)))
+            experiment = Experiment(subject.tree, subject.name)
         except FileError:
-            # Driven by a force, or ended before its first sample.
+            # Driven by a force, by what is unknown, or ended before its first sample.
             continue
+        stages = (
+            {one.stage for one in subject.config.drive_parts}
+            if subject.has_config
+            else experiment.stages
+        )
+        if len(stages) > 1:
+            experiments.append((subject, experiment))
     if not experiments:
         return None
     blocks: list[Block] = []

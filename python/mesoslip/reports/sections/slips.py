@@ -43,7 +43,11 @@ STATISTICS = {
 
 def slips(subjects: Sequence[Subject]) -> Section | None:
     """The catalogues of slips of runs with inertia."""
-    with_slips = [one for one in subjects if not one.config.slider.jumps]
+    with_slips = [
+        one
+        for one in subjects
+        if "slips" in one.tree.children and not (one.has_config and one.config.slider.jumps)
+    ]
     if not with_slips:
         return None
     blocks: list[Block] = []

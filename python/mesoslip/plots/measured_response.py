@@ -1,0 +1,198 @@
+"""The response of a measured trace: record with fit, residuals, a - b against velocity, healing."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.rate_and_state import (
+    MeasuredFit,
+    measured_fits,
+    preferred_law,
+    records_of,
+)
+from mesoslip.analysis.response import response_of, rows_of
+from mesoslip.errors import RunError
+from mesoslip.plots.record import draw_record, force_unit
+from mesoslip.plots.style import Canvas, canvas, plain, styled
+from mesoslip.quantities import Scale, scale_for, with_error
+
+Array = NDArray[np.float64]
+
+# Factor between the velocities of steps and the ends of their axis.
+MARGIN = 3.0
+
+
+def best_fit(experiment: Experiment) -> MeasuredFit | None:
+    """The law that the record prefers, or the best of one state; None without one."""
+    records = records_of(experiment)
+    if isinstance(records, str):
+        return None
+    try:
+        fits = measured_fits(experiment, records[0])
+    except RunError:
+        return None
+    preferred = preferred_law(fits)
+    if preferred:
+        return fits[preferred]
+    able = [one for one in fits.values() if one.model.states == 1]
+    return min(able, key=lambda one: one.information_criterion, default=None)
+
+
+def draw_measured_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
+    """Draw the record of a measured trace with the law that fits it best.
+
+    Parameters
+    ----------
+    axes
+        Where.
+    experiment
+        The trace.
+    scale
+        Unit of the displacement of the load point.
+    """
+    draw_record(axes, experiment, scale)
+    found = best_fit(experiment)
+    if found is not None:
+        _draw_fit(axes, experiment, found, scale)
+
+
+def _horizontal(experiment: Experiment, found: MeasuredFit) -> Array:
+    """Displacement of the load point at the points of a fit [m]."""
+    points = found.model.points
+    sign = experiment.stages[0].direction or 1.0
+    drive: Array = sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
+    return drive
+
+
+def _draw_fit(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
+    unit = force_unit(experiment)
+    force = (found.model.points.force - found.residual) / unit.size
+    label = f"{found.model.law} law"
+    if found.stands_out and not found.undetermined:
+        a, b = (
+            with_error(found.value(name) / unit.size, found.error(name) / unit.size)
+            for name in ("a", "b")
+        )
+        distance = with_error(found.value("slip_distance"), found.error("slip_distance"), "m")
+        label += f"\n$a$ = {a}\n$b$ = {b}\n$D_c$ = {distance}"
+    else:
+        label += ": not determined"
+    axes.plot(_horizontal(experiment, found) / scale.size, force, color="tab:red", label=label)
+    axes.legend(loc="upper right")
+
+
+def _draw_residuals(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
+    """Draw the residuals of the points over their noise."""
+    deviation = np.sqrt(np.sum(found.noise.factor**2, axis=1)) * found.model.scale
+    x = _horizontal(experiment, found) / scale.size
+    axes.plot(x, found.residual / deviation, ".", color="black", markersize=2)
+    axes.axhline(0, color="tab:red")
+    axes.set_ylabel("residual over noise")
+    axes.set_xlabel(scale.label("displacement of the load point"))
+
+
+def _draw_rates(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
+    """Draw a - b of each step against the velocity after it, with standard errors."""
+    steps = tree["steps"].to_dataset()
+    velocity = np.abs(steps["velocity_after"].values)
+    name = next(one for one in ("rate_dependence_coefficient", "rate_dependence") if one in steps)
+    value, error = steps[name].values / unit.size, steps[f"{name}_error"].values / unit.size
+    scale = scale_for(float(velocity.max()), "m/s")
+    axes.errorbar(
+        velocity / scale.size, value, error, fmt="o", color="black", markersize=3, label="means"
+    )
+    fits = [
+        row
+        for row in rows_of(tree, "rate_and_state")
+        if row["is_preferred"] and np.isfinite(row[_key(row)])
+    ]
+    stages = {number: one for one, number in enumerate(steps["stage_number"].values)}
+    shown = [row for row in fits if row["stage_number"] in stages]
+    if not shown and steps.sizes["step"] == 1:
+        shown = [row | {"stage_number": steps["stage_number"].values[0]} for row in fits]
+    for row in shown:
+        axes.errorbar(
+            1.03 * velocity[stages[row["stage_number"]]] / scale.size,
+            row[_key(row)] / unit.size,
+            row[_stem(row)] / unit.size,
+            fmt="s",
+            color="tab:red",
+            markersize=3,
+        )
+    if shown:
+        axes.plot([], [], "s", color="tab:red", markersize=3, label="law")
+        axes.legend()
+    axes.axhline(0, color="0.7", zorder=0)
+    axes.set_xscale("log")
+    axes.set_xlim(velocity.min() / scale.size / MARGIN, velocity.max() / scale.size * MARGIN)
+    axes.set_xlabel(scale.label("velocity after the step"))
+    axes.set_ylabel(f"$a - b$ ({unit.name})")
+
+
+def _key(row: dict[str, float]) -> str:
+    return "a_minus_b_coefficient" if "a_minus_b_coefficient" in row else "a_minus_b"
+
+
+def _stem(row: dict[str, float]) -> str:
+    """Name of the error of a - b."""
+    return "a_minus_b_coefficient_error" if "a_minus_b_coefficient" in row else "a_minus_b_error"
+
+
+def _draw_healing(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
+    """Draw the healing against the hold time."""
+    holds = tree["holds"].to_dataset()
+    name = next(one for one in ("healing_coefficient", "healing") if one in holds)
+    error = np.nan_to_num(holds[f"{name}_error"].values) / unit.size
+    axes.errorbar(
+        holds["hold_time"].values,
+        holds[name].values / unit.size,
+        error,
+        fmt="o",
+        color="black",
+        markersize=3,
+    )
+    axes.set_xscale("log")
+    axes.set_xlabel("hold time (s)")
+    axes.set_ylabel(f"healing ({unit.name})")
+
+
+def draw_measured(
+    tree: xr.DataTree, experiment: Experiment, figure: Canvas | None = None
+) -> Canvas:
+    """The record with the law that fits best, its residuals, a - b against velocity, and healing.
+
+    Parameters
+    ----------
+    tree, experiment
+        The trace.
+    figure
+        Figure to draw into; a new one by default.
+    """
+    found = best_fit(experiment)
+    response = response_of([experiment])
+    has_steps = response["steps"].sizes["step"] > 0
+    has_holds = response["holds"].sizes["hold"] > 0
+    unit = force_unit(experiment)
+    scale = scale_for(float(np.max(np.abs(experiment.drive))), "m")
+    with styled():
+        below = has_steps + has_holds
+        figure = canvas(figure, (6.5, 3.0 + 1.4 * (found is not None) + 2.2 * bool(below)))
+        heights = [2.2, *([1.0] if found is not None else []), *([1.8] if below else [])]
+        grid = figure.add_gridspec(len(heights), max(below, 1), height_ratios=heights)
+        record = figure.add_subplot(grid[0, :])
+        draw_record(record, experiment, scale)
+        record.set_title(plain(tree.attrs.get("title", "")), loc="left", pad=22)
+        if found is not None:
+            _draw_fit(record, experiment, found, scale)
+            residuals = figure.add_subplot(grid[1, :], sharex=record)
+            _draw_residuals(residuals, experiment, found, scale)
+            record.set_xlabel("")
+        if has_steps:
+            _draw_rates(figure.add_subplot(grid[-1, 0]), response, unit)
+        if has_holds:
+            _draw_healing(figure.add_subplot(grid[-1, below - 1]), response, unit)
+    return figure

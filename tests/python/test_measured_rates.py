@@ -1,0 +1,186 @@
+"""Rates and states of measured traces, against motions of another integrator (`spring_slider`)."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.rate_and_state import (
+    Loading,
+    RateAndState,
+    fit_laws,
+    measured_rows,
+    records_of,
+    spring_slider,
+)
+from mesoslip.analysis.rate_and_state.correlated import estimate
+from mesoslip.analysis.rate_and_state.search import Model
+from mesoslip.analysis.response import response, rows_of, tables
+from mesoslip.measured.load_point import drive_stages, stage_table
+from mesoslip.output import writing
+
+UM = 1e-6
+LAW = RateAndState(0.6, 3 * UM, 0.01, 0.012, 20 * UM, "slip")
+STEP = [Loading(60, 3 * UM, 3 * UM), Loading(60, 10 * UM, 10 * UM)]
+STIFFNESS = 1e-3 / UM
+
+
+def trace(law=LAW, stages=STEP, noise=3e-4, rate=10.0, *, trend=0.0, known=True, seed=0):
+    """A measured trace of friction coefficients."""
+    duration = sum(one.duration for one in stages)
+    # Two sampling rates in one file.
+    first = stages[0].duration - 5
+    time = np.concatenate([np.arange(0, first, 1 / rate), np.arange(first, duration, 0.2 / rate)])
+    force = spring_slider(law, stages, time, STIFFNESS).force
+    edges = np.cumsum([0, *(one.duration for one in stages)])
+    moved = np.cumsum([0, *(one.duration * one.start_velocity for one in stages)])
+    load = np.interp(time, edges, moved)
+    rng = np.random.default_rng(seed)
+    force = force + trend * load + noise * rng.standard_normal(time.size)
+    root = xr.Dataset(
+        {
+            "friction_coefficient": (("realization", "time"), force[None]),
+            "drive_displacement": (("realization", "time"), load[None]),
+        },
+        {"realization": [0], "time": time},
+        {
+            "origin": "measured",
+            "title": "a step",
+            "configuration": f"[slider]\nstiffness = {STIFFNESS}\n" if known else "",
+        },
+    )
+    group = stage_table(drive_stages(time, load))
+    return xr.DataTree.from_dict({"/": root, "/stages": group})
+
+
+def row_of(tree, law, **options):
+    rows = measured_rows(Experiment(tree), 0, laws=("ageing", "slip"), **options)
+    return next(one for one in rows if one["law"] == law)
+
+
+def check(row, law=LAW):
+    """Within three errors, which are small."""
+    for name, value in (("a", law.a), ("b", law.b), ("slip_distance", law.slip_distance)):
+        assert abs(row[name] - value) < 3 * row[f"{name}_error"]
+        assert row[f"{name}_error"] < 0.25 * value
+
+
+@pytest.mark.parametrize("evolution", ["ageing", "slip"])
+@pytest.mark.parametrize("slip_distance", [1 * UM, 60 * UM])
+def test_a_step_is_found_over_decades(evolution, slip_distance):
+    """With its law, which the record prefers."""
+    law = RateAndState(0.6, 3 * UM, 0.01, 0.009, slip_distance, evolution)
+    rows = measured_rows(Experiment(trace(law, trend=1e-6 / UM)), 0, laws=("ageing", "slip"))
+    row = next(one for one in rows if one["law"] == evolution)
+    check(row, law)
+    assert row["is_described"]
+    if slip_distance > 10 * UM:
+        assert row["is_preferred"]
+        other = next(one for one in rows if one["law"] != evolution)
+        assert other["information_criterion"] > row["information_criterion"] + 10
+
+
+def test_an_unknown_stiffness_is_fitted():
+    row = row_of(trace(known=False), "slip")
+    check(row)
+    assert abs(row["stiffness"] - STIFFNESS) < 3 * row["stiffness_error"]
+    assert 0 < row["stiffness_error"] < 0.2 * STIFFNESS
+
+
+def test_what_does_not_stand_out_gets_no_numbers():
+    """Much noise; and a law without evolution."""
+    for law, noise in ((LAW, 0.05), (RateAndState(0.6, 3 * UM, 0.01, 0, 20 * UM, "slip"), 3e-4)):
+        row = row_of(trace(law, noise=noise), "slip")
+        assert math.isnan(row["a"])
+        assert math.isnan(row["slip_distance"])
+        assert row["note"].startswith("not determined")
+        assert not row["is_described"]
+
+
+def test_a_hold_and_steps_together_and_by_themselves():
+    stages = [*STEP, Loading(40, 0, 0), Loading(40, 10 * UM, 10 * UM), Loading(60, UM, UM)]
+    tree = trace(stages=stages, noise=1e-4)
+    experiment = Experiment(tree)
+    assert [one.first_stage for one in records_of(experiment)] == [0, 0, 1, 3]
+    rows = measured_rows(experiment, 0, laws=("slip",))
+    assert [one["stage_number"] for one in rows] == [-1, 1, 2, 4]
+    for row in rows:
+        check(row)
+    # All of them together determine more.
+    assert rows[0]["slip_distance_error"] < min(one["slip_distance_error"] for one in rows[1:])
+
+
+def test_two_states_are_found_where_there_are_two():
+    """The motion of two states is that of one for equal distances."""
+    one = fit_laws(records_of(Experiment(trace(noise=1e-5)))[0], STIFFNESS, laws=("slip",))["slip"]
+    model = Model(one.model.points, "slip, two states", STIFFNESS, True)
+    known = dict(zip(one.model.names, one.at, strict=True))
+    known |= {"b": 0.3 * known["b"], "b2": 0.7 * known["b"]}
+    known["slip_distance2"] = known["slip_distance"]
+    both = np.array([known[name] for name in model.names])
+    np.testing.assert_allclose(model.residuals(both), one.model.residuals(one.at), atol=1e-6)
+
+
+def test_errors_know_of_correlated_noise():
+    """A mean of correlated noise: its error is that of the process."""
+    pulls, errors = [], []
+    time = np.arange(400.0)
+    column = np.ones((400, 1))
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        noise, decay = np.zeros(400), math.exp(-1 / 5)
+        noise[0] = rng.standard_normal()
+        for index in range(1, 400):
+            noise[index] = (
+                decay * noise[index - 1] + math.sqrt(1 - decay**2) * rng.standard_normal()
+            )
+        found = estimate(time, 0 * time, column[:, 0], 1.0, noise, column, 1e-6)
+        whitened = found.whitened(np.column_stack([column[:, 0], noise]))
+        precision = float(whitened[:, 0] @ whitened[:, 0])
+        pulls.append(float(whitened[:, 0] @ whitened[:, 1]) / math.sqrt(precision))
+        errors.append(1 / math.sqrt(precision))
+    assert np.median(errors) == pytest.approx(math.sqrt(2 * 5 / 400), rel=0.25)
+    assert 0.6 < np.std(pulls) < 1.5
+
+
+def test_the_response_of_a_trace_of_coefficients(tmp_path, command):
+    """Names, units and tables; commands on the file."""
+    tree = trace(trend=2e-6 / UM)
+    found = response(tree)
+    rows = rows_of(found, "rate_and_state")
+    assert {one["law"] for one in rows} >= {"ageing", "slip"}
+    assert found["rate_and_state"]["a_coefficient"].attrs["units"] == "1"
+    assert found["rate_and_state"]["stiffness"].attrs["units"] == "m-1"
+    assert "a" not in found["rate_and_state"].data_vars
+    # The trend is taken off: a - b of the steady friction is that of the law.
+    step = rows_of(found, "steps")[0]
+    difference = step["rate_dependence_coefficient"] - (LAW.a - LAW.b)
+    assert abs(difference) < 3 * step["rate_dependence_coefficient_error"] + 5e-5
+    assert {one.title for one in tables(found)} == {
+        "Steady sliding",
+        "Velocity steps",
+        "Rate and state",
+    }
+    path = tmp_path / "trace.nc"
+    writing.write(tree, path)
+    status, out, _ = command("response", path, "--json")
+    assert status == 0
+    slip = next(one for one in json.loads(out)["rate_and_state"] if one["law"] == "slip")
+    for name in ("a_coefficient", "b_coefficient", "slip_distance"):
+        assert slip[name] > 0
+        assert slip[f"{name}_error"] > 0
+    assert command("plot", path, "--view", "response", "-o", tmp_path / "a.png")[0] == 0
+    assert command("regime", path)[0] == 0
+    for option, start in (("--latex", "\\begin{tabular}"), ("--markdown", "| law |")):
+        status, out, _ = command("response", path, option)
+        assert status == 0
+        assert out.startswith(start)
+
+
+def test_what_has_no_step_says_so():
+    tree = trace(stages=[STEP[0], Loading(60, 3 * UM, 3 * UM)])
+    assert "no step and no hold" in measured_rows(Experiment(tree), 0)[0]["note"]

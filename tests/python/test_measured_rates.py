@@ -18,6 +18,7 @@ from mesoslip.analysis.rate_and_state import (
     spring_slider,
 )
 from mesoslip.analysis.rate_and_state.correlated import estimate
+from mesoslip.analysis.rate_and_state.points import averaged
 from mesoslip.analysis.rate_and_state.search import Model
 from mesoslip.analysis.response import response, rows_of, tables
 from mesoslip.measured.load_point import drive_stages, stage_table
@@ -82,6 +83,16 @@ def test_a_step_is_found_over_decades(evolution, slip_distance):
         assert row["is_preferred"]
         other = next(one for one in rows if one["law"] != evolution)
         assert other["information_criterion"] > row["information_criterion"] + 10
+
+
+def test_no_point_reaches_beyond_its_stage():
+    """Where the rate of sampling changes within a point, just before a step."""
+    time = np.concatenate([np.arange(0, 59.99, 0.1), np.arange(59.95, 120, 0.001)])
+    time = np.unique(time)
+    points = averaged(STEP, time, 0 * time, start=0.0, first_stage=0)
+    before = points.time <= STEP[0].duration
+    assert (points.time + points.spread)[before].max() <= STEP[0].duration
+    assert (points.time - points.spread)[~before].min() > STEP[0].duration
 
 
 def test_an_unknown_stiffness_is_fitted():

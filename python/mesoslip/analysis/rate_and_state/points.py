@@ -146,6 +146,10 @@ def averaged(
     mean = np.add.reduceat(time, bounds[:-1]) / count
     centred = time - np.repeat(mean, np.diff(bounds))
     spread = np.sqrt(np.add.reduceat(centred**2, bounds[:-1]) / count)
+    # Where the rate of sampling changes, the deviation may be larger than the distance to an end,
+    # beyond which the drive may change.
+    ends = time[bounds[1:] - 1] - mean, mean - time[bounds[:-1]]
+    spread = np.minimum(spread, np.maximum(np.minimum(*ends), 0.0))
     return Points(
         tuple(stages),
         mean,

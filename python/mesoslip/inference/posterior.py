@@ -126,11 +126,12 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
         "disagreeing": "\n".join(fitted.agreement.disagreeing),
         "coverage_50": estimate.coverage[0],
         "coverage_90": estimate.coverage[1],
-        "wander_length": first.wander_length,
         "traces": "\n".join(one.experiment.name for one in fitted.predictions),
         "warnings": "\n".join(notes),
         "notes": "\n".join(_notes(fitted)),
     }
+    if WANDER in prior.keys:
+        attributes["wander_length"] = first.wander_length
     groups = {
         "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
         "/posterior": group(values, chains),

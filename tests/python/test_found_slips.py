@@ -10,6 +10,7 @@ from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.rate_and_state.motion import Loading, RateAndState, spring_slider
 from mesoslip.analysis.sampled_slips import find_slips
 from mesoslip.analysis.stick_phases import stick_phases
+from scipy.signal import lfilter
 
 STATIC_FORCE = 18e-6
 
@@ -118,6 +119,36 @@ def test_noise_alone_and_its_colours_have_no_slips():
         np.convolve(rng.standard_normal(time.size + 9), np.full(10, 0.3), "valid"),
     ):
         assert len(find_slips(time, 100 + force)) == 0
+
+
+def test_smooth_sliding_with_slowly_varying_noise_has_hardly_any_slips():
+    """Noise correlated over more samples than the estimate of noise can see.
+
+    Few deep falls may all follow slow rises by chance.
+    """
+    rng = np.random.default_rng(0)
+    time = 1e-2 * np.arange(10_000)
+    with_slips = 0
+    for samples in (10, 50, 100, 200) * 5:
+        memory = np.exp(-1 / samples)
+        gain = np.sqrt(1 - memory**2)
+        varying = lfilter([gain], [1, -memory], rng.standard_normal(time.size + 2000))[2000:]
+        noise = 1e-3 * varying + 2e-4 * rng.standard_normal(time.size)
+        with_slips += len(find_slips(time, 0.6 + noise)) > 0
+    assert with_slips <= 3
+
+
+@pytest.mark.parametrize("evolution", [0.006, 0.015])
+def test_the_peak_after_a_velocity_step_is_no_slip(evolution):
+    """The force rises fast with the drive, and decays slowly, above and below its old value."""
+    law = RateAndState(0.6, 1e-6, 0.010, evolution, 3e-5)
+    stages = [Loading(10.0, 1e-6, 1e-6), Loading(60.0, 1e-5, 1e-5)]
+    time = np.linspace(0, 60, 6000)
+    force = spring_slider(law, stages, time, 5000.0).force
+    assert force.max() - force[-1] > 0.005
+    for level in (0.0, 1e-5, 2e-4):
+        noise = level * np.random.default_rng(1).standard_normal(time.size)
+        assert len(find_slips(time, force + noise)) == 0
 
 
 def test_two_sampling_rates_in_one_record():

@@ -279,7 +279,7 @@ def test_a_cell_that_counts_the_other_way(tmp_path, klein, command):
         assert "against the drive most of the time" in found[pair][1]
     table.write_text("time [s],force [uN]\n" + "".join(f"{t},1\n" for t in range(100)))
     printed = command("trace", table, "-o", tmp_path / "flat.nc")[2]
-    assert "no fall of the force exceeds the noise" in printed
+    assert "no slips stand out of the noise" in printed
     assert "inf" not in printed
     with pytest.raises(mesoslip.FileError, match="has a column of the time, and a sampling rate"):
         mesoslip.read_trace(table, rate=100.0)

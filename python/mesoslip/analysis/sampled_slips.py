@@ -12,7 +12,10 @@ The rule, explained in `docs/fit.md`:
 - A fall is a **slip** if it is deeper than twice what ringing regained before it. A rise within
   three quarters of a period is ringing if it is faster than loading. Of loading a quarter counts,
   so that a slip gives back half of it. Oscillations that only decay are ringing too.
-- A slip is steep: for its depth not much slower than the others.
+- A slip is steep: for its depth not much slower than the others, and not slower than the rise to
+  its maximum. After a velocity step the force rises fast and decays slowly.
+- Where slips are not much faster than the rises before them, as falls of correlated noise are, the
+  threshold is above the range of all the noise, and slips must be many and most of the deep falls.
 - It starts where the force is last near its maximum and ends at its minimum. A fall from the first
   sample on has no start and does not count.
 
@@ -25,7 +28,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +53,14 @@ EXTREME_NOISE = 4.0
 MIN_RATE = 0.015
 # Minimum rate of a fall over its depth, over that of the deep falls.
 MIN_STEEPNESS = 0.15
+# Upper part of a fall, over its depth, in which its duration is compared with that of the rise.
+UPPER = (0.5, 0.9)
+# Minimum duration of the rise over that of the fall, and that of rises which are loading in the
+# median over the slips of a trace.
+MIN_RISE, LOADING_RISE = 0.5, 8.0
+# Minimum share of slips among deep falls, and minimum number of slips, where rises are not much
+# slower than falls.
+MIN_SHARE, MIN_OSCILLATIONS = 0.5, 10
 # Minimum fall over the range of the force.
 MIN_HEIGHT = 0.002
 # Fraction of the depth of a fall at either end that is excluded from its duration.
@@ -175,11 +186,18 @@ def find_slips(
         min_fall = trace.floor
         if isinstance(noise, TraceNoise):
             counts = _count(search)
-            if counts.plateau is not None:
-                min_fall = counts.plateau[0]
+            plateau = counts.plateau
+            if plateau is not None:
+                tops, bottoms, _ = search.slips(plateau[0])
+                if _is_loaded(trace, tops, bottoms) or plateau[0] <= trace.floor <= plateau[1]:
+                    min_fall = plateau[0]
+                else:
+                    counts = replace(counts, plateau=None)
     tops, bottoms, rates = search.slips(min_fall)
+    if not (_is_loaded(trace, tops, bottoms) or search.is_oscillation(tops, bottoms)):
+        tops = tops[:0]
     if tops.size == 0:
-        return _none(trace.period, min_fall, counts)
+        return _none(math.inf if period is None else period, min_fall, counts)
     rows = [
         _ends(time, cleaned, top, bottom, sigma, trace.half_samples(top))
         for top, bottom in trace.on_samples(cleaned, tops, bottoms)
@@ -399,11 +417,20 @@ class _Search:
         excess = np.minimum(drop, EXTREME_NOISE * trace.noise)
         found = drop - excess > MIN_FALL_RATIO * np.maximum(regained - excess, 0.0)
         found &= rates > self._min_rate
+        found[found] = _rise_ratios(trace, tops[found], bottoms[found]) >= MIN_RISE
         if found.any():
             steepness = rates / drop
             deep = drop >= drop[found].max() / 2
             found &= steepness >= MIN_STEEPNESS * float(np.median(steepness[deep]))
         return tops[found], bottoms[found], rates[found]
+
+    def is_oscillation(self, tops: Samples, bottoms: Samples) -> bool:
+        """Whether slips are many, and most of the falls at least half as deep as their median."""
+        if tops.size < MIN_OSCILLATIONS:
+            return False
+        force = self._trace.force
+        all_tops, _ = self._trace.extremes.falls(float(np.median(force[tops] - force[bottoms])) / 2)
+        return tops.size >= MIN_SHARE * all_tops.size
 
     def _joined(self, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples]:
         """Falls with those that belong to them."""
@@ -457,6 +484,34 @@ def _rising_rate(trace: _Trace, tops: Samples, bottoms: Samples) -> float:
     order = np.argsort(rate)
     middle = np.searchsorted(np.cumsum(duration[order]), 0.5 * duration.sum())
     return float(rate[order][middle])
+
+
+def _rise_ratios(trace: _Trace, tops: Samples, bottoms: Samples) -> Array:
+    """Duration of the rise to the maximum of each fall over that of the fall, at most twice
+    `LOADING_RISE`, both in the upper part of the fall."""
+    force, time, most = trace.force, trace.time, 2 * LOADING_RISE
+    ratios = np.full(len(tops), most)
+    for number, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
+        low, high = (force[bottom] + part * (force[top] - force[bottom]) for part in UPPER)
+        after = top + int(np.argmax(force[top : bottom + 1] <= low))
+        before = after - 1 - int(np.argmax(force[top:after][::-1] >= high))
+        fall = time[after] - time[before]
+        first = int(np.searchsorted(time, time[top] - 2 * most * fall))
+        is_low = np.flatnonzero(force[first:top] <= low)
+        if is_low.size:
+            start = first + int(is_low[-1])
+            end = start + int(np.argmax(force[start : top + 1] >= high))
+            ratios[number] = min(most, (time[end] - time[start]) / fall)
+    return ratios
+
+
+def _is_loaded(trace: _Trace, tops: Samples, bottoms: Samples) -> bool:
+    """Whether the rises before slips are slow, as those of loading: the median of deep ones."""
+    if tops.size == 0:
+        return False
+    drop = trace.force[tops] - trace.force[bottoms]
+    deep = drop >= drop.max() / 2
+    return float(np.median(_rise_ratios(trace, tops[deep], bottoms[deep]))) >= LOADING_RISE
 
 
 def _decaying(start: Array, end: Array, drop: Array, period: float) -> NDArray[np.bool_]:

@@ -316,7 +316,7 @@ def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
             "give a velocity of the opposite sign, here or in the configuration"
         )
     if not math.isfinite(period):
-        yield "no fall of the force exceeds the noise: no slips, and no period of the setup"
+        yield "no slips stand out of the noise, so the period of the setup is unknown"
 
 
 def _as_measured(config: Config, record: Record, title: str) -> Config:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 
 import matplotlib as mpl
@@ -16,8 +17,10 @@ from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.output.writing import write
 from mesoslip.plots import lines
 from mesoslip.plots.extent import MAX_PARTS, Extent
+from mesoslip.plots.style import curve_style, styled
 from mesoslip.plots.views import VIEWS, names_of_views
 from mesoslip.plots.views.layers import layer_motion
+from mesoslip.plots.views.sweep import CHOICE_COLORS
 
 
 @pytest.fixture(scope="module")
@@ -425,3 +428,121 @@ def test_the_command_takes_windows_with_units(tmp_path, command):
     status, _, errors = command("plot", output, "-o", picture, "--from", "1 s", "--to", "2 s")
     assert status == 2
     assert "the run goes from 0 s to 0.1 s" in errors
+
+
+def luminance(color):
+    """CIE lightness of a colour, 0 to 100."""
+    linear = [
+        one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4
+        for one in mpl.colors.to_rgb(color)
+    ]
+    return 116 * np.cbrt(np.dot([0.2126, 0.7152, 0.0722], linear)) - 16
+
+
+def test_curves_survive_print_in_grey():
+    """Four colours that differ in lightness, then the same with dashes."""
+    with styled():
+        styles = [curve_style(number) for number in range(8)]
+    for four in (styles[:4], styles[4:]):
+        grey = np.sort([max(luminance(one["color"]), 0) for one in four])
+        assert np.diff(grey).min() > 19
+    assert len({(one["color"], one["linestyle"]) for one in styles}) == 8
+    regimes = np.sort([luminance(one) for one in CHOICE_COLORS[:4]])
+    assert np.diff(regimes).min() > 11
+
+
+@pytest.mark.parametrize("name", ["plain", "several", "layered", "quasistatic", "macroscopic"])
+def test_nothing_collides_in_a_column_of_a_journal(runs, name):
+    figure = mesoslip.plot(runs[name], width=0.086, font_size=8, letters=True)
+    assert figure.get_figwidth() * 25.4 == pytest.approx(86)
+    assert overlapping(figure) == []
+
+
+def test_fonts_are_embedded_as_truetype(runs, tmp_path):
+    for ending, wanted, refused in (
+        ("pdf", b"/FontFile2", b"/Type3"),
+        ("eps", b"/FontType 42", b"/FontType 3 "),
+    ):
+        path = tmp_path / f"run.{ending}"
+        # Not even a style may ask for fonts of Type 3.
+        style = tmp_path / "own.mplstyle"
+        style.write_text("pdf.fonttype: 3\nps.fonttype: 3\npdf.compression: 0\n")
+        mesoslip.plot(runs["plain"], path, style=style)
+        assert wanted in path.read_bytes()
+        assert refused not in path.read_bytes()
+
+
+def test_titles_letters_and_styles(runs, tmp_path):
+    figure = mesoslip.plot(runs["several"], title="Mine for $5", letters=True)
+    assert figure.get_suptitle() == r"Mine for \$5"
+    assert figure.axes[0].get_title(loc="left").startswith("black: realization 0")
+    letters = [axes.texts[-1].get_text() for axes in figure.axes]
+    assert letters == [f"({one})" for one in "abcdef"]
+    assert overlapping(figure) == []
+    assert not mesoslip.plot(runs["plain"], title="").axes[0].get_title(loc="left")
+    path = tmp_path / "own.mplstyle"
+    path.write_text("font.size: 11\naxes.prop_cycle: cycler('color', ['123456', '654321'])\n")
+    figure = mesoslip.plot([runs["plain"], runs["slow"]], style=path)
+    assert [one.get_color() for one in figure.axes[0].lines] == ["#123456", "#654321"]
+    assert figure.axes[0].xaxis.label.get_fontsize() == 11
+    figure = mesoslip.plot(runs["plain"], style=path, font_size=6)
+    assert figure.axes[0].yaxis.label.get_fontsize() == 6
+    for text, message in (
+        ("font.siez: 8\n", "no style of matplotlib: Bad key font.siez"),
+        ("font.size: large-ish\n", "no style of matplotlib: .*large-ish"),
+        ("font.size 8\n", "no style of matplotlib: Missing colon"),
+    ):
+        path.write_text(text)
+        with pytest.raises(mesoslip.FileError, match=message):
+            mesoslip.plot(runs["plain"], style=path)
+    with pytest.raises(mesoslip.FileError, match=r"none.mplstyle: cannot be read"):
+        mesoslip.plot(runs["plain"], style=tmp_path / "none.mplstyle")
+    for options in ({"width": 8.6}, {"font_size": 0}, {"width": 0.08, "figure": Figure()}):
+        with pytest.raises(mesoslip.ConfigError, match=next(iter(options))):
+            mesoslip.plot(runs["plain"], **options)
+
+
+def test_the_command_prints(runs, tmp_path, command):
+    output = tmp_path / "run.v1.nc"
+    write(runs["plain"], output)
+    status, _, printed = command("plot", output, "--width", "8.6 cm", "--format", "pdf")
+    assert (status, printed) == (0, f"{tmp_path / 'run.v1.pdf'}\n")
+    size = re.search(rb"/MediaBox \[ 0 0 ([0-9.]+) ", (tmp_path / "run.v1.pdf").read_bytes())
+    assert float(size[1]) == pytest.approx(8.6 / 2.54 * 72)
+    assert command("plot", output, "-o", tmp_path / "a", "--format", "svg")[0] == 0
+    assert (tmp_path / "a.svg").exists()
+    status, _, errors = command("plot", output, "-o", tmp_path / "a.png", "--format", "pdf")
+    assert status == 2
+    assert "--format" in errors
+    assert command("plot", output, "--width", "3 N")[0] == 2
+
+
+def test_a_slip_without_finer_samples_is_drawn_as_recorded(runs):
+    """Lines where samples resolve the motion; else dots, the ends of the slip, and the key."""
+    for interval, resolves_motion in (("0.5 ms", True), ("4 ms", False)):
+        config = ROOT / "runs" / "klein.toml"
+        tree = mesoslip.run(
+            mesoslip.Config.load(
+                config,
+                [
+                    *("run.duration=2.2 s", "contacts.count=200"),
+                    *(f"output.interval={interval}", "output.slip_interval=none"),
+                ],
+            )
+        )
+        force, velocity, detached = mesoslip.plot(tree).axes[1::2]
+        contact, spring, *recorded = force.lines
+        assert contact.get_linestyle() == detached.lines[0].get_linestyle() == "None"
+        assert (spring.get_linestyle() == "--") == resolves_motion
+        assert (velocity.lines[0].get_linestyle() == "-") == resolves_motion
+        assert "output.slip_interval" in force.get_legend().get_title().get_text()
+        assert bool(recorded) != resolves_motion
+        if recorded:
+            slip = mesoslip.slips(tree).isel(slip=0)
+            ends = [slip[one].item() * 1e6 for one in ("force_before", "force_after")]
+            np.testing.assert_allclose(recorded[0].get_ydata(), ends)
+            peak = velocity.lines[1].get_ydata()
+            np.testing.assert_allclose(peak, slip["peak_velocity"].item() * 1e6)
+    fine = mesoslip.plot(runs["plain"]).axes[1]
+    assert fine.get_legend().get_title().get_text() == "largest slip (shaded at left)"
+    assert fine.lines[0].get_linestyle() == "-"

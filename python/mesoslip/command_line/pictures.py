@@ -10,8 +10,10 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from mesoslip.command_line.options import OutputsArgument, time_of
+from mesoslip.command_line.options import OutputsArgument, quantity_or_none, time_of
 
+# Endings of pictures and movies.
+FORMATS = (".png", ".pdf", ".svg", ".eps", ".ps", ".jpg", ".tif", ".webp", ".gif", ".mp4")
 VIEW_HELP = "What to draw; each kind of output has a default"
 
 
@@ -86,6 +88,39 @@ def plot(
             "--x", help="Abscissa: time, or the displacement of the slider or of the drive"
         ),
     ] = None,
+    file_format: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            help="Format, such as png, pdf, svg or eps; by default that of the ending of FIG",
+            metavar="FORMAT",
+        ),
+    ] = None,
+    width: Annotated[
+        str | None,
+        typer.Option(
+            help="Width in print, such as '8.6 cm', a column of many journals", metavar="LENGTH"
+        ),
+    ] = None,
+    font_size: Annotated[
+        float | None, typer.Option(help="Size of the font in points; by default 8", metavar="PT")
+    ] = None,
+    title: Annotated[
+        str | None,
+        typer.Option(
+            help="Title instead of those of the outputs; '' for none, as above a caption",
+            metavar="TEXT",
+        ),
+    ] = None,
+    letters: Annotated[
+        bool, typer.Option("--letters", help="Letter the panels (a), (b), and so on")
+    ] = False,
+    style: Annotated[
+        Path | None,
+        typer.Option(
+            help="Style file of matplotlib (.mplstyle), laid over that of mesoslip", metavar="FILE"
+        ),
+    ] = None,
 ) -> None:
     """Draw an output, or several in one picture."""
     from mesoslip.configuration.reading import is_file
@@ -93,7 +128,7 @@ def plot(
     from mesoslip.plots import plot as plots
 
     first = outputs[0]
-    path = figure or first.parent / f"{first.stem or 'output'}.png"
+    path = _path(figure, first, file_format)
     there = [one for one in outputs if is_file(one)]
     if there:
         targets.check_writable(path, there)
@@ -106,5 +141,32 @@ def plot(
         x=None if x is None else x.value,
         start=-math.inf if start is None else time_of(start, "--from"),
         end=math.inf if end is None else time_of(end, "--to"),
+        width=quantity_or_none(width, "--width", "m", "8.6 cm", positive=True),
+        font_size=font_size,
+        title=title,
+        letters=letters,
+        style=style,
     )
     typer.echo(str(path), err=True)
+
+
+def _path(picture: Path | None, output: Path, file_format: str | None) -> Path:
+    """The file of a picture: by default beside the output, a .png unless there is a format.
+
+    Raises
+    ------
+    ConfigError
+        If the format is not that of the file.
+    """
+    from mesoslip.errors import ConfigError, Problem
+
+    ending = f".{(file_format or 'png').lower().removeprefix('.')}"
+    if picture is None:
+        return output.parent / f"{output.stem or 'output'}{ending}"
+    known = picture.suffix.lower() in FORMATS
+    if file_format is None or picture.suffix.lower() == ending:
+        return picture
+    if known:
+        text = f"is not the format of {picture.name}"
+        raise ConfigError([Problem("", "--format", text, file_format)])
+    return picture.with_name(f"{picture.name}{ending}")

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.slips import slips
-from mesoslip.output.samples import times_of
+from mesoslip.output.access import config_of, is_measured
+from mesoslip.output.samples import samples, times_of
 from mesoslip.plots.axis import time_since
-from mesoslip.plots.curves import curve, draw_curves
+from mesoslip.plots.curves import Curve, curve, draw_curves
 from mesoslip.plots.extent import EVERYTHING, Extent
-from mesoslip.plots.style import CONTACT, SPRING, legend_above
+from mesoslip.plots.style import BLUE, CONTACT, RED, SPRING, legend_above
 from mesoslip.plots.trace import NAMES, driving_force_of, force_of, is_known
 
 
@@ -65,18 +68,101 @@ def draw_slip(
     low, high = slip_window(slip)
     near = Extent(extent.first, max(low, times[0]), min(high, times[-1]), parts=extent.parts)
     horizontal = time_since((near.start, near.end))
-    force, *below = panels
+    sampling = Sampling.of(tree, slip, extent.first)
+    name, (force, *below) = driving_force_of(tree), panels
     curves = []
     if is_known(tree, "contact_force"):
-        curves.append(curve(tree, "contact_force", near, **CONTACT))
+        curves.append(sampling.curve(tree, "contact_force", near, **CONTACT))
     if force_of(tree) == "elastic_force":
-        label = "mean elastic force"
-        curves.append(curve(tree, "elastic_force", near, color="tab:green", label=label))
-    driving = driving_force_of(tree)
-    style = SPRING if driving == "spring_force" else SPRING | {"label": NAMES[driving]}
-    curves.append(curve(tree, driving, near, **style))
-    name = "force" if driving == "spring_force" else NAMES[driving]
-    draw_curves(force, curves, driving, horizontal, name)
-    legend_above(force, columns=1, title=title)
-    for axes, name in zip(below, names, strict=True):
-        draw_curves(axes, [curve(tree, name, near, color="black")], name, horizontal)
+        style = {"color": BLUE, "label": "mean elastic force"}
+        curves.append(sampling.curve(tree, "elastic_force", near, **style))
+    is_force = name == "spring_force"
+    style = SPRING if is_force else SPRING | {"label": NAMES[name]}
+    curves.append(sampling.curve(tree, name, near, **style))
+    if not sampling.resolves(name):
+        curves.append(_recorded_slip(slip))
+    draw_curves(force, curves, name, horizontal, "force" if is_force else NAMES[name])
+    note = sampling.note(tree, (name, *names))
+    legend_above(force, title="\n".join(one for one in (title, note) if one))
+    for axes, one in zip(below, names, strict=True):
+        shown = [sampling.curve(tree, one, near, color="black")]
+        if one == "velocity" and not sampling.resolves(one):
+            shown.append(_recorded_peak(slip))
+        draw_curves(axes, shown, one, horizontal)
+        if len(shown) > 1:
+            axes.legend(loc="upper right")
+
+
+TIMES, FORCES = ("start_time", "end_time"), ("force_before", "force_after")
+# Samples in a slip, in a delay, and in a period of the ringing on the pinned contacts, with which
+# lines between them are the motion.
+MIN_SAMPLES = {"slip": 12, "delay": 2, "period": 6}
+# Variables that change with every contact.
+OF_CONTACTS = frozenset({"contact_force", "detached_contacts"})
+
+
+class Sampling(NamedTuple):
+    """How finely a slip was recorded.
+
+    Attributes
+    ----------
+    size
+        Samples in the slip.
+    interval
+        Their mean distance [s].
+    max_interval, max_contact_interval
+        Distances that resolve the motion, and the contacts [s].
+    """
+
+    size: int
+    interval: float
+    max_interval: float
+    max_contact_interval: float
+
+    @classmethod
+    def of(cls, tree: xr.DataTree, slip: xr.Dataset, realization: int) -> Sampling:
+        """The sampling of a slip."""
+        start, end = slip["start_time"].item(), slip["end_time"].item()
+        parts = [one.inside((start, end)) for one in samples(tree, realization)]
+        count = sum(after - first for first, after in parts)
+        limit = fine = (end - start) / MIN_SAMPLES["slip"]
+        if not is_measured(tree):
+            config = config_of(tree)
+            mass = getattr(config.slider, "mass", math.inf)
+            period = 2 * math.pi * math.sqrt(mass / config.contacts.stiffness)
+            fine = min(fine, period / MIN_SAMPLES["period"])
+            if config.contacts.delay > 0:
+                fine = min(fine, config.contacts.delay / MIN_SAMPLES["delay"])
+        return cls(count, (end - start) / max(count, 1), limit, fine)
+
+    def resolves(self, name: str) -> bool:
+        """Whether lines between samples of a variable are its motion."""
+        limit = self.max_contact_interval if name in OF_CONTACTS else self.max_interval
+        return self.interval <= limit * (1 + 1e-6)
+
+    def curve(self, tree: xr.DataTree, name: str, extent: Extent, **style: Any) -> Curve:
+        """The curve of a variable, or its samples if they do not resolve it."""
+        if not self.resolves(name):
+            style |= {"linestyle": "", "marker": ".", "markersize": 2.5}
+        return curve(tree, name, extent, **style)
+
+    def note(self, tree: xr.DataTree, names: Sequence[str]) -> str:
+        """What is not resolved, and the key that helps; empty if all is."""
+        if all(self.resolves(one) for one in (*names, *OF_CONTACTS) if is_known(tree, one)):
+            return ""
+        text = f"dots: samples, {self.size} in the slip"
+        return text if is_measured(tree) else f"{text};\nfiner: output.slip_interval"
+
+
+def _recorded_slip(slip: xr.Dataset) -> Curve:
+    """The spring force at both ends of a slip, as the catalogue has it."""
+    times, forces = (np.array([slip[one].item() for one in pair]) for pair in (TIMES, FORCES))
+    style = {"color": SPRING["color"], "linewidth": 0.7, "label": "from start to end"}
+    return Curve(times, forces, style)
+
+
+def _recorded_peak(slip: xr.Dataset) -> Curve:
+    """The peak velocity of a slip, as the catalogue has it."""
+    times = np.array([slip[one].item() for one in TIMES])
+    peak = np.full(2, slip["peak_velocity"].item())
+    return Curve(times, peak, {"color": RED, "linestyle": "--", "label": "peak"})

@@ -86,7 +86,7 @@ def draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
     )
     axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label="force over threshold")
     time = with_unit(snapshot["snapshot_time"].item(), "s", 6)
-    axes.set_title(f"snapshot at {time}; grey: detached", loc="left")
+    axes.set_title(f"snapshot at {time}\ngrey: detached", loc="left")
 
 
 def draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:

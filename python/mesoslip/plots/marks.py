@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from mesoslip.output.access import group_of
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent
+from mesoslip.plots.style import BLUE, RED, YELLOW
 from mesoslip.plots.trace import UNITS
 from mesoslip.quantities import scale_for
 
@@ -49,13 +50,13 @@ def draw_marks(
             slips["force_before"].values,
             "v",
             "start of a slip",
-            "tab:red",
+            RED,
         ),
-        (slips["end_time"].values, slips["force_after"].values, "^", "end of a slip", "tab:blue"),
+        (slips["end_time"].values, slips["force_after"].values, "^", "end of a slip", BLUE),
     ]
     if "noise" in tree.children and "impulse_time" in tree["noise"]:
         at = group_of(tree, "noise")["impulse_time"].values
-        marks.append((at, np.interp(at, time, force), "x", "impulse, taken off", "tab:orange"))
+        marks.append((at, np.interp(at, time, force), "x", "impulse, taken off", YELLOW))
     found = False
     for at, level, marker, label, color in marks:
         shown = (at >= window[0]) & (at <= window[1])

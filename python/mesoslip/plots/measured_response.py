@@ -16,8 +16,9 @@ from mesoslip.analysis.rate_and_state import (
 )
 from mesoslip.analysis.response import response_of, rows_of
 from mesoslip.errors import RunError
-from mesoslip.plots.record import draw_record, force_unit
-from mesoslip.plots.style import Canvas, canvas, plain, styled
+from mesoslip.plots.printing import is_narrow
+from mesoslip.plots.record import draw_record, force_unit, title_record
+from mesoslip.plots.style import RED, Canvas, canvas, styled
 from mesoslip.quantities import Scale, scale_for, with_error
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Sca
         label += f"\n$a$ = {a}\n$b$ = {b}\n$D_c$ = {distance}"
     else:
         label += ": not determined"
-    axes.plot(_horizontal(experiment, found) / scale.size, force, color="tab:red", label=label)
+    axes.plot(_horizontal(experiment, found) / scale.size, force, color=RED, label=label)
     axes.legend(loc="upper right")
 
 
@@ -90,7 +91,7 @@ def _draw_residuals(axes: Axes, experiment: Experiment, found: MeasuredFit, scal
     deviation = np.sqrt(np.sum(found.noise.factor**2, axis=1)) * found.model.scale
     x = _horizontal(experiment, found) / scale.size
     axes.plot(x, found.residual / deviation, ".", color="black", markersize=2)
-    axes.axhline(0, color="tab:red")
+    axes.axhline(0, color=RED)
     axes.set_ylabel("residual over noise")
     axes.set_xlabel(scale.label("displacement of the load point"))
 
@@ -120,11 +121,11 @@ def _draw_rates(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
             row[_key(row)] / unit.size,
             row[_stem(row)] / unit.size,
             fmt="s",
-            color="tab:red",
+            color=RED,
             markersize=3,
         )
     if shown:
-        axes.plot([], [], "s", color="tab:red", markersize=3, label="law")
+        axes.plot([], [], "s", color=RED, markersize=3, label="law")
         axes.legend()
     axes.axhline(0, color="0.7", zorder=0)
     axes.set_xscale("log")
@@ -180,19 +181,22 @@ def draw_measured(
     scale = scale_for(float(np.max(np.abs(experiment.drive))), "m")
     with styled():
         below = has_steps + has_holds
-        figure = canvas(figure, (6.5, 3.0 + 1.4 * (found is not None) + 2.2 * bool(below)))
-        heights = [2.2, *([1.0] if found is not None else []), *([1.8] if below else [])]
-        grid = figure.add_gridspec(len(heights), max(below, 1), height_ratios=heights)
+        rows = below if is_narrow(figure) else min(below, 1)
+        columns = 1 if rows > 1 else max(below, 1)
+        size = (3.4 if rows > 1 else 6.5, 3.0 + 1.4 * (found is not None) + 2.2 * rows)
+        figure = canvas(figure, size)
+        heights = [2.2, *([1.0] if found is not None else []), *([1.8] * rows)]
+        grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
         record = figure.add_subplot(grid[0, :])
         draw_record(record, experiment, scale)
-        record.set_title(plain(tree.attrs.get("title", "")), loc="left", pad=22)
+        title_record(record, tree)
         if found is not None:
             _draw_fit(record, experiment, found, scale)
             residuals = figure.add_subplot(grid[1, :], sharex=record)
             _draw_residuals(residuals, experiment, found, scale)
             record.set_xlabel("")
         if has_steps:
-            _draw_rates(figure.add_subplot(grid[-1, 0]), response, unit)
+            _draw_rates(figure.add_subplot(grid[-max(rows, 1), 0]), response, unit)
         if has_holds:
-            _draw_healing(figure.add_subplot(grid[-1, below - 1]), response, unit)
+            _draw_healing(figure.add_subplot(grid[-1, columns - 1]), response, unit)
     return figure

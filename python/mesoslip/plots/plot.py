@@ -14,7 +14,8 @@ from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots.animation import animate
 from mesoslip.plots.draw import draw
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.style import save
+from mesoslip.plots.printing import Print, finish, printed
+from mesoslip.plots.style import save, styled
 from mesoslip.plots.views.base import Options
 
 if TYPE_CHECKING:
@@ -34,6 +35,11 @@ def plot(
     x: str | None = None,
     figure: Figure | SubFigure | None = None,
     ax: Axes | None = None,
+    width: float | None = None,
+    font_size: float | None = None,
+    title: str | None = None,
+    letters: bool = False,
+    style: PathLike | None = None,
 ) -> Figure | SubFigure:
     """Draw an output of any command, or several of one command over each other.
 
@@ -68,6 +74,17 @@ def plot(
         Figure, or part of one, to draw into; a new one by default.
     ax
         Axes for the most informative panel, and for nothing else.
+    width
+        Width [m] of a new figure for print, such as 0.086 for a column of a journal; panels that
+        stood beside each other are below each other if it is narrow.
+    font_size
+        Size of the font [pt]; 8 by default.
+    title
+        Title of the picture instead of those of the outputs; "" for none.
+    letters
+        Whether panels have the letters (a), (b), and so on.
+    style
+        Style file of matplotlib (``.mplstyle``), laid over that of mesoslip.
 
     Returns
     -------
@@ -86,9 +103,18 @@ def plot(
     if not outputs:
         raise FileError("there is no output to draw")
     extent = Extent(
-        _whole("realization", realization), _seconds("start", start), _seconds("end", end), x
+        _whole("realization", realization), _number("start", start), _number("end", end), x
     )
     options = Options(extent, _whole("snapshot", snapshot))
+    how = Print(
+        None if width is None else _number("width", width, "meters"),
+        None if font_size is None else _number("font_size", font_size, "points"),
+        title,
+        letters,
+        None if style is None else as_path(style),
+    )
+    if width is not None and (figure is not None or ax is not None):
+        raise ConfigError([Problem("", "width", "is for a new figure", width)])
     for key, value, method in (("figure", figure, "add_subplot"), ("ax", ax, "plot")):
         if value is not None and not hasattr(value, method):
             kind = "a figure" if key == "figure" else "axes"
@@ -98,18 +124,21 @@ def plot(
     if is_animation and (view not in {None, "lattice"} or len(outputs) > 1):
         reason = "of one output" if len(outputs) > 1 else f"not the view {view!r}"
         raise FileError(f"{path}: a .gif is an animation of the lattice, {reason}")
-    with ExitStack() as stack:
+    with ExitStack() as stack, printed(how):
         trees, names = opened(outputs, stack)
         if path is not None and is_animation:
             return animate(trees[0], path, snapshot)
         drawn = draw(trees, names, view, options, figure=figure, axes=ax)
+        if ax is None:
+            with styled():
+                finish(drawn)
         if path is not None:
             save(drawn, path)
     return drawn
 
 
-def _seconds(key: str, value: object) -> float:
-    """A time [s], as a number or an array of one number.
+def _number(key: str, value: object, unit: str = "seconds") -> float:
+    """A quantity in SI, as a number or an array of one number.
 
     Raises
     ------
@@ -121,7 +150,7 @@ def _seconds(key: str, value: object) -> float:
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
-        raise ConfigError([Problem("", key, "must be a number of seconds", value)]) from None
+        raise ConfigError([Problem("", key, f"must be a number of {unit}", value)]) from None
 
 
 def _whole(key: str, value: object) -> int | None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
+from mesoslip.plots.style import BLUE, titles
 from mesoslip.quantities import Scale, scale_for, with_unit
 
 Array = NDArray[np.float64]
@@ -18,6 +20,8 @@ MAX_DOTS = 20_000
 # Stages whose starts are marked, and stages with a label.
 MAX_MARKS = 200
 MAX_LABELS = 12
+# Distance of the title from the record, with the labels of stages between them [pt].
+LABEL_ROOM = 22
 # Minimum distance of two labels, as a part of the width.
 LABEL_WIDTH = 0.03
 
@@ -62,8 +66,14 @@ def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
     axes.set_ylabel(unit.name)
     for stage in experiment.stages[1 : MAX_MARKS + 1]:
         start = x[experiment.start_sample(stage)] / scale.size
-        axes.axvline(start, color="tab:blue" if stage.is_hold else "0.8", linewidth=0.5, zorder=0)
+        axes.axvline(start, color=BLUE if stage.is_hold else "0.8", linewidth=0.5, zorder=0)
     _label_stages(axes, experiment, x, scale)
+
+
+def title_record(axes: Axes, tree: xr.DataTree, about: str = "") -> None:
+    """Write the title of an output above the labels of its stages, and a line about them."""
+    titles(axes, tree, about)
+    axes.set_title(axes.get_title(loc="left"), loc="left", pad=LABEL_ROOM)
 
 
 def _dots(experiment: Experiment) -> NDArray[np.int64]:
@@ -101,9 +111,9 @@ def _label_stages(axes: Axes, experiment: Experiment, x: Array, scale: Scale) ->
             else with_unit(abs(stage.velocity), "m/s", 3),
             (position / scale.size, 1.0),
             xycoords=("data", "axes fraction"),
-            fontsize=6,
+            fontsize="x-small",
             ha="center",
             va="bottom",
-            color="tab:blue" if stage.is_hold else "0.4",
+            color=BLUE if stage.is_hold else "0.4",
             rotation=40 if len(experiment.stages) > 4 else 0,
         )

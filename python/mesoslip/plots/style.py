@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 import threading
 from collections.abc import Iterator
@@ -17,34 +18,22 @@ from matplotlib.figure import Figure, SubFigure
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.output.targets import written_whole
+from mesoslip.plots.printing import current, is_narrow, size_of
 
 # A whole figure, or a part of one.
 Canvas = Figure | SubFigure
 
-STYLE: Any = {
-    "font.size": 8,
-    "axes.titlesize": 8,
-    "axes.labelsize": 8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "legend.fontsize": 7,
-    "lines.linewidth": 0.9,
-    "figure.dpi": 200,
-    "savefig.dpi": 200,
-    "figure.constrained_layout.use": True,
-}
-
+# Paul Tol's high-contrast colours, which differ in lightness too (`mesoslip.mplstyle`).
+RED, YELLOW, BLUE = "#bb5566", "#ddaa33", "#004488"
 # As in the source: the spring force in red and dashed, the contact force in black.
-SPRING: dict[str, Any] = {"color": "tab:red", "linestyle": "--", "label": "spring force $F_d$"}
+SPRING: dict[str, Any] = {"color": RED, "linestyle": "--", "label": "spring force $F_d$"}
 CONTACT: dict[str, Any] = {"color": "black", "label": "contact force $F$"}
 # Realizations behind the first one.
 OTHERS: dict[str, Any] = {"color": "0.75", "linewidth": 0.5, "zorder": 1}
-# Outputs over each other; all can be distinguished without seeing red.
-COLORS = ("black", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "0.6")
-
-# Characters in a line of a title over an inch of axes.
+# Characters in an inch of a line of the size 8.
 CHARACTERS_PER_INCH = 16
+# Width of the ticks and labels beside axes [inch].
+BESIDE_AXES = 0.6
 # Changed keys that a caption names.
 MAX_KEYS = 6
 
@@ -88,21 +77,44 @@ def titles(
     beside_legend
         Whether a line is left for a legend between title and axes.
     """
+    width = _width(axes)
+    texts = [*headings(tree), about]
+    lines = [filled(text, width, max_lines=2) for text in texts if text]
+    lines += [mathematical] if mathematical else []
+    lines += [""] * _legend_rows(axes) if beside_legend else []
+    axes.set_title("\n".join(lines), loc="left")
+
+
+def headings(tree: xr.DataTree) -> list[str]:
+    """The title of an output and its changes from its base; none if the picture has a title."""
+    if current().title is not None:
+        return []
     title = tree.attrs.get("title", "")
     if tree.attrs.get("complete") == "false":
         title = f"{title} ({tree.attrs['comment']})"
-    bounds = axes.get_subplotspec()
-    figure = axes.figure
-    width = figure.bbox.width / figure.dpi * (0.85 if bounds is None else _part(bounds))
-    max_characters = max(30, int(CHARACTERS_PER_INCH * width))
-    lines = [
-        textwrap.fill(plain(text), max_characters, max_lines=2, placeholder=" …")
-        for text in (title, caption(tree), about)
-        if text
-    ]
-    lines += [mathematical] if mathematical else []
-    lines += [""] if beside_legend else []
-    axes.set_title("\n".join(lines), loc="left")
+    return [title, caption(tree)]
+
+
+def filled(text: str, width: float, max_lines: int | None = None) -> str:
+    """A text in lines of a width [inch]."""
+    return textwrap.fill(
+        plain(text), max(20, _characters(width)), max_lines=max_lines, placeholder=" …"
+    )
+
+
+def _characters(width: float) -> int:
+    """Characters in a line of a width [inch]."""
+    return int(CHARACTERS_PER_INCH * width * 8 / mpl.rcParams["font.size"])
+
+
+def _width(axes: Axes) -> float:
+    """Approximate width of axes [inch]."""
+    bounds, figure = axes.get_subplotspec(), axes.figure
+    whole = figure.bbox.width / figure.figure.dpi
+    if bounds is None:
+        return 0.85 * whole
+    part = _part(bounds)
+    return min(part * whole, part * whole / 0.9 - BESIDE_AXES)
 
 
 def _part(spec: Any) -> float:
@@ -114,26 +126,54 @@ def _part(spec: Any) -> float:
 
 
 def legend_above(axes: Axes, columns: int = 3, title: str | None = None) -> None:
-    """Put the legend above axes, where it hides no data."""
+    """Put the legend above axes, where it hides no data, in at most so many columns."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0, 1.0),
-        ncols=columns,
+        ncols=_legend_columns(axes, columns),
         borderaxespad=0.2,
         columnspacing=1.0,
         handlelength=1.6,
         title=title,
-        title_fontsize=7,
         alignment="left",
     )
+
+
+def _legend_columns(axes: Axes, columns: int = 3) -> int:
+    """Columns of a legend that fit above axes."""
+    # Formulas are shorter than their source; a line and its distance take five characters.
+    labels = axes.get_legend_handles_labels()[1]
+    lengths = [len(re.sub(r"\\[a-z]+|[${}_^]", "", one)) + 5 for one in labels]
+    room = 1.15 * _characters(_width(axes))
+    for count in range(min(columns, len(labels)), 1, -1):
+        rows = -(-len(labels) // count)
+        widths = [max(lengths[at : at + rows]) for at in range(0, len(lengths), rows)]
+        if sum(widths) <= room:
+            return count
+    return 1
+
+
+def _legend_rows(axes: Axes) -> int:
+    labels = axes.get_legend_handles_labels()[1]
+    return -(-len(labels) // _legend_columns(axes))
 
 
 def shared_legend(figure: Canvas, axes: Axes) -> None:
     """Put the legend of axes below a figure, a line for each entry."""
     handles, labels = axes.get_legend_handles_labels()
-    width = int(1.1 * CHARACTERS_PER_INCH * figure.bbox.width / figure.dpi)
-    labels = [textwrap.fill(label, width) for label in labels]
+    labels = [filled(label, 1.05 * figure.bbox.width / figure.figure.dpi - 0.3) for label in labels]
     figure.legend(handles, labels, loc="outside lower left", ncols=1)
+
+
+def curve_style(number: int) -> dict[str, Any]:
+    """Colour and dashes of one of several curves, as the style has them."""
+    styles = list(mpl.rcParams["axes.prop_cycle"])
+    return dict(styles[number % len(styles)])
+
+
+def curve_color(number: int) -> Any:
+    """Colour of one of several curves."""
+    return curve_style(number).get("color", "black")
 
 
 _LOCK = threading.RLock()
@@ -145,13 +185,24 @@ def styled() -> Iterator[None]:
 
     Matplotlib has one style for the whole process, so only one thread draws at a time.
     """
-    with _LOCK, mpl.rc_context(STYLE):
+    with _LOCK, mpl.rc_context(current().settings):
         yield
 
 
 def canvas(figure: Canvas | None, size: tuple[float, float]) -> Canvas:
-    """The given figure, or a new one of a size [inch] if it is None."""
-    return Figure(figsize=size) if figure is None else figure
+    """The given figure, or a new one if it is None, of the size of a view [inch] or for print."""
+    return Figure(figsize=size_of(size)) if figure is None else figure
+
+
+def side_by_side(
+    figure: Canvas | None, size: tuple[float, float], count: int = 2
+) -> tuple[Canvas, list[Axes]]:
+    """A figure of a size [inch] with panels beside each other, or below each other if narrow."""
+    if count > 1 and is_narrow(figure):
+        figure = canvas(figure, (3.4, 0.85 * count * size[1]))
+        return figure, list(figure.subplots(count, 1))
+    figure = canvas(figure, size)
+    return figure, list(figure.subplots(1, count, squeeze=False)[0])
 
 
 def save(figure: Canvas, path: Path) -> None:

@@ -9,7 +9,15 @@ from matplotlib.axes import Axes
 
 from mesoslip.analysis.avalanche_sizes import PowerLawFit, ccdf, fit_power_law
 from mesoslip.plots.sizes import draw_distribution, scaling_sizes
-from mesoslip.plots.style import COLORS, Canvas, canvas, shared_legend, styled, titles
+from mesoslip.plots.style import (
+    RED,
+    Canvas,
+    curve_color,
+    shared_legend,
+    side_by_side,
+    styled,
+    titles,
+)
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import percent, with_error
 
@@ -21,8 +29,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     """Density and complementary cumulative distribution of the sizes of avalanches."""
     sizes = scaling_sizes(tree)
     with styled():
-        figure = canvas(figure, (6.5, 3))
-        density, cumulative = figure.subplots(1, 2)
+        figure, (density, cumulative) = side_by_side(figure, (6.5, 3))
         draw_density(density, tree, options)
         cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-pre")
         _label_cumulative(cumulative)
@@ -37,7 +44,7 @@ def draw_density(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     draw_distribution(axes, sizes, fit)
     _label_density(axes)
     if fit is not None:
-        color = "tab:red" if fit.is_rejected else "black"
+        color = RED if fit.is_rejected else "black"
         axes.set_title(_describe(fit, fit.count / sizes.size), loc="left", color=color)
 
 
@@ -63,12 +70,11 @@ def compare(
     """Densities and complementary cumulative distributions of avalanches of several outputs."""
     all_sizes = [scaling_sizes(tree) for tree in trees]
     with styled():
-        figure = canvas(figure, (6.5, 3 + 0.16 * len(trees)))
-        density, cumulative = figure.subplots(1, 2)
+        size = (6.5, 3 + 0.16 * len(trees))
+        figure, (density, cumulative) = side_by_side(figure, size)
         compare_densities(density, trees, labels, options)
         for number, sizes in enumerate(all_sizes):
-            color = COLORS[number % len(COLORS)]
-            cumulative.loglog(*ccdf(sizes), color=color, drawstyle="steps-pre")
+            cumulative.loglog(*ccdf(sizes), color=curve_color(number), drawstyle="steps-pre")
         _label_cumulative(cumulative)
         shared_legend(figure, density)
     return figure
@@ -79,7 +85,7 @@ def compare_densities(
 ) -> None:
     """Draw the densities of the sizes of avalanches of several outputs over each other."""
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
-        color = COLORS[number % len(COLORS)]
+        color = curve_color(number)
         draw_distribution(axes, scaling_sizes(tree), color=color, label=label)
     _label_density(axes)
 

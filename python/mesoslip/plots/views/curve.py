@@ -10,7 +10,17 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of
-from mesoslip.plots.style import COLORS, Canvas, canvas, legend_above, styled, titles
+from mesoslip.plots.style import (
+    BLUE,
+    RED,
+    Canvas,
+    canvas,
+    curve_color,
+    curve_style,
+    legend_above,
+    styled,
+    titles,
+)
 from mesoslip.plots.views.base import Options, View, single_panel
 from mesoslip.quantities import Scale, scale_for, with_unit
 
@@ -36,7 +46,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
         if np.isfinite(spring):
             slope.axhline(
                 -spring / scale.size,
-                color="tab:red",
+                color=RED,
                 linestyle="--",
                 label="$-K$: unstable below this line",
             )
@@ -57,7 +67,7 @@ def draw_curve(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     steady = tree.attrs["F_steady"]
     axes.axhline(
         steady / force.size,
-        color="tab:blue",
+        color=BLUE,
         linestyle=":",
         label=f"steady sliding, {with_unit(steady, 'N')}",
     )
@@ -67,7 +77,7 @@ def draw_curve(axes: Axes, tree: xr.DataTree, _: Options) -> None:
             tree.attrs["X_c"] / x.size,
             tree.attrs["F_c"] / force.size,
             "o",
-            color="tab:red",
+            color=RED,
             markersize=4,
             label=f"instability at $X_c$ = {with_unit(tree.attrs['X_c'], 'm')}",
         )
@@ -88,17 +98,17 @@ def draw_curves(
     """Draw several force curves over each other, each with its point of instability."""
     x, force = _units(trees)
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
-        color = COLORS[number % len(COLORS)]
+        style = curve_style(number)
         data = tree.to_dataset()
         axes.plot(
             data["displacement"].values / x.size,
             data["contact_force"].values / force.size,
-            color=color,
+            **style,
             label=label,
         )
         if "X_c" in tree.attrs:
             point = tree.attrs["X_c"] / x.size, tree.attrs["F_c"] / force.size
-            axes.plot(*point, "o", color=color, markersize=4)
+            axes.plot(*point, "o", color=curve_color(number), markersize=4)
     axes.set_ylabel(force.label("force $F$"))
     axes.set_xlabel(x.label("displacement $X$; dots: $X_c$"))
     axes.set_xlim(left=0)
@@ -115,9 +125,7 @@ def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
 def _mark_instability(axes: Axes, tree: xr.DataTree, scale: Scale) -> None:
     """Mark X_c along the whole height of axes."""
     if "X_c" in tree.attrs:
-        axes.axvline(
-            tree.attrs["X_c"] / scale.size, color="tab:red", linewidth=0.7, alpha=0.6, zorder=0
-        )
+        axes.axvline(tree.attrs["X_c"] / scale.size, color=RED, linewidth=0.7, alpha=0.6, zorder=0)
 
 
 def compare(

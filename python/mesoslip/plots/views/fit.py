@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -11,14 +14,15 @@ from numpy.typing import NDArray
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
-from mesoslip.plots.style import Canvas, canvas, plain, styled
+from mesoslip.plots.printing import UNLETTERED, current, is_narrow
+from mesoslip.plots.style import BLUE, Canvas, canvas, plain, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
 
 Array = NDArray[np.float64]
 
 MEASURED = "black"
-PREDICTED = "tab:blue"
+PREDICTED = BLUE
 # Symbols of parameters.
 SYMBOLS = {
     "contacts.static_force": "$F_s$",
@@ -42,18 +46,22 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None = None) -> Canvas:
     with styled():
         names = list(tree["posterior"].data_vars)
         size, traces = max(2, len(names)), trace_suffixes(tree)
-        heights = [1.25 * size, *(2.6 for _ in traces)]
-        figure = canvas(figure, (7.0, sum(heights)))
+        is_stacked = is_narrow(figure)
+        heights = [1.25 * size, *(4.5 if is_stacked else 2.6 for _ in traces)]
+        figure = canvas(figure, (3.4 if is_stacked else 7.0, sum(heights)))
+        rows, columns = (4, 1) if is_stacked else (2, 3)
         whole = figure.add_gridspec(1 + len(traces), 1, height_ratios=heights)
         _pairs(figure, whole[0], tree)
         for number, after in enumerate(traces, 1):
-            below = whole[number].subgridspec(2, 3, height_ratios=[1.2, 1])
+            below = whole[number].subgridspec(rows, columns, height_ratios=[1.2] + [1] * (rows - 1))
             axes = figure.add_subplot(below[0, :])
             _draw_one(axes, tree, after)
             if len(traces) > 1:
                 axes.set_title(plain(tree[f"observed_data{after}"].attrs["title"]), loc="left")
-            _slips(figure, below, tree, after)
-        figure.suptitle(plain(tree.attrs.get("title", "")), x=0.01, ha="left", fontsize=8)
+            places = [below[place] for place in np.ndindex(rows, columns) if place[0]]
+            _slips(figure, places, tree, after)
+        if current().title is None:
+            figure.suptitle(plain(tree.attrs.get("title", "")), x=0.01, ha="left")
     return figure
 
 
@@ -78,6 +86,7 @@ def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
     for row, below in enumerate(names):
         for column, beside in enumerate(names[: row + 1]):
             axes = figure.add_subplot(grid[row, column])
+            axes.set_label(UNLETTERED if row or column else "")
             values = draws[beside]
             low, high = np.percentile(values, [0.1, 99.9])
             if row == column:
@@ -90,7 +99,7 @@ def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
                 axes.plot(values[thin], draws[below][thin], ".", color=PREDICTED, markersize=1.2)
                 axes.set_ylim(*np.percentile(draws[below], [0.1, 99.9]))
             axes.set_xlim(low, high)
-            axes.tick_params(labelsize=6)
+            axes.tick_params(labelsize="x-small")
             # Whole numbers on ticks, not differences from an offset.
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_formatter(_formatter())
@@ -98,11 +107,11 @@ def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
             if row == column:
                 axes.set_yticks([])
             if row == len(names) - 1:
-                axes.set_xlabel(_label(beside, scales[beside]), fontsize=7)
+                axes.set_xlabel(_label(beside, scales[beside]), fontsize="small")
             else:
                 axes.set_xticklabels([])
             if column == 0 and row > 0:
-                axes.set_ylabel(_label(below, scales[below]), fontsize=7)
+                axes.set_ylabel(_label(below, scales[below]), fontsize="small")
             elif row != column:
                 axes.set_yticklabels([])
 
@@ -140,13 +149,13 @@ def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
     axes.legend(loc="upper right", ncols=3)
 
 
-def _slips(figure: Canvas, grid: object, tree: xr.DataTree, after: str) -> None:
+def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str) -> None:
     """Draw distributions of the slips after the first one of each trace."""
     groups = [tree[f"{name}{after}"].to_dataset() for name in ("observed_slips", "predicted_slips")]
     parts = [_later(group) for group in groups]
     quantities = (("force before slips", "N"), ("force drop", "N"), ("waiting time", "s"))
     for column, (quantity, unit) in enumerate(quantities):
-        axes = figure.add_subplot(grid[1, column])  # type: ignore[index]
+        axes = figure.add_subplot(places[column])
         scale = scale_for(max_size(*(part[column] for part in parts)), unit)
         measured, predicted = (part[column] / scale.size for part in parts)
         both = np.concatenate([measured, predicted])

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
-from mesoslip.plots.style import Canvas, canvas, plain, styled
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, plain, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
 Array = NDArray[np.float64]
 
-MEASURED, PREDICTED, WORST = "black", "tab:blue", "#d55e00"
+MEASURED, PREDICTED, WORST = "black", BLUE, RED
 # Summaries that are listed, and deviation at which they end [spreads].
 LISTED = 14
 MAX_SCORE = 30.0

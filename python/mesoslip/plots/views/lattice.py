@@ -6,7 +6,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.plots.lattice import chosen_snapshot, draw_generations, draw_load
-from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.plots.style import Canvas, side_by_side, styled
 from mesoslip.plots.views.base import Options, View
 
 
@@ -15,8 +15,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     snapshot = chosen_snapshot(tree, options.snapshot)
     size = snapshot["avalanche_size"].item()
     with styled():
-        figure = canvas(figure, (6.5, 3.4) if size else (3.6, 3.4))
-        panels = figure.subplots(1, 2 if size else 1, squeeze=False)[0]
+        figure, panels = side_by_side(figure, (6.5, 3.4) if size else (3.6, 3.4), 2 if size else 1)
         draw_load(panels[0], snapshot)
         if size:
             draw_generations(panels[1], snapshot)

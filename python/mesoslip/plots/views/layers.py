@@ -17,7 +17,7 @@ from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import max_size
-from mesoslip.plots.style import SPRING, Canvas, canvas, legend_above, styled, titles
+from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -43,7 +43,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
         waves.set_xlabel("")
         curves = [
             curve(tree, "contact_force", near, color="black", label="contact force"),
-            curve(tree, "elastic_force", near, color="tab:green", label="mean elastic force"),
+            curve(tree, "elastic_force", near, color=BLUE, label="mean elastic force"),
             curve(tree, "spring_force", near, **SPRING | {"label": "force at the drive"}),
         ]
         draw_curves(force, curves, "spring_force", time_since(window), "force")
@@ -62,7 +62,7 @@ def draw_waves(axes: Axes, tree: xr.DataTree, options: Options) -> None:
         (times - window[0]) / horizontal.scale.size,
         np.arange(velocity.shape[1] + 1) + 0.5,
         velocity.T / scale.size,
-        cmap="RdBu_r",
+        cmap="cividis",
         norm=Normalize(-largest / scale.size, largest / scale.size),
         rasterized=True,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +11,16 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of
-from mesoslip.plots.style import COLORS, Canvas, canvas, legend_above, plain, styled, titles
+from mesoslip.plots.style import (
+    BLUE,
+    Canvas,
+    curve_color,
+    filled,
+    legend_above,
+    side_by_side,
+    styled,
+    titles,
+)
 from mesoslip.plots.views.base import Options, View, single_panel
 from mesoslip.quantities import scale_for
 
@@ -21,7 +29,7 @@ Array = NDArray[np.float64]
 # Styles of the equations for the onset of slip, as in the source.
 EQUATIONS: dict[str, dict[str, Any]] = {
     "sequential": {"color": "black", "label": "sequential breaking (S46)"},
-    "melting": {"color": "tab:blue", "label": "instant melting (S47)"},
+    "melting": {"color": BLUE, "label": "instant melting (S47)"},
 }
 
 
@@ -29,12 +37,11 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     """Change of the spring force after the onset of slip, beside it with logarithmic axes."""
     solutions = _solutions([tree])
     with styled():
-        figure = canvas(figure, (6.5, 3.2))
-        if not solutions:
-            draw_drop(figure.subplots(), tree, options)
-            return figure
-        linear, logarithmic = figure.subplots(1, 2)
+        figure, (linear, *others) = side_by_side(figure, (6.5, 3.2), 2 if solutions else 1)
         draw_drop(linear, tree, options)
+        if not solutions:
+            return figure
+        (logarithmic,) = others
         time = scale_for(max(one.times[-1] for one in solutions), "s")
         force = scale_for(max(np.abs(one.drop).max() for one in solutions), "N")
         for one in solutions:
@@ -57,7 +64,7 @@ def draw_drop(axes: Axes, tree: xr.DataTree, options: Options) -> None:
         legend_above(axes)
     else:
         axes.set_axis_off()
-        text = textwrap.fill(plain(tree.attrs["comment"]), 90)
+        text = filled(tree.attrs["comment"], 0.9 * axes.figure.bbox.width / axes.figure.figure.dpi)
         axes.text(0.5, 0.6, text, ha="center", va="center", transform=axes.transAxes)
 
 
@@ -71,7 +78,7 @@ def draw_drops(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], 
         is_sequential = one.equation == "sequential"
         if label:
             style = {
-                "color": COLORS[one.output % len(COLORS)],
+                "color": curve_color(one.output),
                 "linestyle": "-" if is_sequential else "--",
                 "label": f"{label}: {style['label']}",
             }

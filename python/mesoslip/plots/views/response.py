@@ -14,8 +14,9 @@ from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit,
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
-from mesoslip.plots.record import draw_record
-from mesoslip.plots.style import Canvas, canvas, plain, styled
+from mesoslip.plots.printing import is_narrow
+from mesoslip.plots.record import draw_record, title_record
+from mesoslip.plots.style import RED, Canvas, canvas, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
@@ -33,7 +34,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, sc
     # As the table does for a law that does not describe the record.
     misfit = found.relative_misfit(record)
     label += f" (misfit {percent(misfit)})" if misfit > MAX_MISFIT else ""
-    axes.plot(drive / scale.size, force, color="tab:red", label=label)
+    axes.plot(drive / scale.size, force, color=RED, label=label)
     axes.legend(loc="lower right")
 
 
@@ -80,7 +81,7 @@ def draw_steady(axes: Axes, data: xr.Dataset) -> None:
         ends = np.array([x.min(), x.max()])
         values = (found.level + found.slope * (ends + math.log(reference))) * scale
         slope = with_error(found.slope * scale, found.slope_error * scale)
-        axes.plot(ends, values, color="tab:red")
+        axes.plot(ends, values, color=RED)
         axes.set_title(f"$a - b$ = {slope}", loc="left")
     axes.set_xlabel(f"$\\ln(V/V_0)$, $V_0$ = {with_unit(reference, 'm/s', 3)}")
     axes.set_ylabel("steady force over $F_s$")
@@ -102,7 +103,7 @@ def draw_healing(axes: Axes, data: xr.Dataset) -> None:
     axes.set_xscale("log")
     if found is not None:
         ends = np.array([hold.min(), hold.max()])
-        axes.plot(ends, (found.level + found.slope * np.log10(ends)) * scale, color="tab:red")
+        axes.plot(ends, (found.level + found.slope * np.log10(ends)) * scale, color=RED)
         slope = with_error(found.slope * scale, found.slope_error * scale)
         axes.set_title(f"healing per decade of hold time = {slope}", loc="left")
     axes.set_xlabel("hold time (s)")
@@ -131,21 +132,19 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     draws_healing = bool(np.isfinite(holds["healing"].values).any())
     below = draws_steady + draws_healing
     with styled():
-        figure = canvas(figure, (6.5, 5.0 if below else 3.0))
-        if below:
-            panels = figure.add_gridspec(2, below)
-            record = figure.add_subplot(panels[0, :])
-        else:
-            record = figure.subplots()
+        is_stacked = is_narrow(figure) and below == 2
+        rows = 3 if is_stacked else 2 if below else 1
+        figure = canvas(figure, (3.4 if is_stacked else 6.5, 2.5 * rows if below else 3.0))
+        columns = 1 if is_stacked else max(below, 1)
+        panels = figure.add_gridspec(rows, columns)
+        record = figure.add_subplot(panels[0, :])
         draw_force(record, tree, options)
-        title = plain(tree.attrs.get("title", ""))
-        if any(stage.is_hold for stage in experiment.stages):
-            title += "\nblue: holds and their durations"
-        record.set_title(title, loc="left", pad=22)
+        has_holds = any(stage.is_hold for stage in experiment.stages)
+        title_record(record, tree, "blue: holds and their durations" if has_holds else "")
         if draws_steady:
             draw_steady(figure.add_subplot(panels[1, 0]), steady)
         if draws_healing:
-            draw_healing(figure.add_subplot(panels[1, below - 1]), holds)
+            draw_healing(figure.add_subplot(panels[rows - 1, columns - 1]), holds)
     return figure
 
 

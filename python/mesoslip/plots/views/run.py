@@ -7,6 +7,7 @@ from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
@@ -14,11 +15,14 @@ from mesoslip.plots.close_up import draw_slip, largest_slip
 from mesoslip.plots.curves import about_realizations, curve, draw_curves, others_behind
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.marks import draw_marks
+from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import (
-    COLORS,
+    BLUE,
     OTHERS,
+    YELLOW,
     Canvas,
     canvas,
+    curve_style,
     legend_above,
     shared_legend,
     styled,
@@ -35,34 +39,52 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     extent = options.extent
     slip, horizontal = largest_slip(tree, extent), horizontal_axis([tree], extent)
     below = _known_below([tree])
+    is_stacked = slip is not None and is_narrow(figure)
     with styled():
-        figure = canvas(figure, (6.5 if slip is None else 8.0, _height(below)))
-        columns = 1 if slip is None else 2
-        panels = figure.subplots(
-            1 + len(below),
-            columns,
-            sharex="col",
-            squeeze=False,
-            height_ratios=[1.7, *(1 for _ in below)],
-            width_ratios=[2.1, 1][:columns],
-        )
+        size = (6.5 if slip is None else 8.0, _height(below))
+        figure = canvas(figure, (3.4, 2.6 + 2.1 * len(below)) if is_stacked else size)
+        panels = _panels(figure, 1 + len(below), slip is not None, is_stacked)
         _draw_force(panels[0, 0], tree, extent, horizontal)
         for axes, name in zip(panels[1:, 0], below, strict=True):
             _draw_variable(axes, tree, name, extent, horizontal)
         if slip is not None:
             is_shaded = extent.horizontal[0] == "time"
-            title = "largest slip (shaded at left)" if is_shaded else "largest slip"
+            place = "above" if is_stacked else "at left"
+            title = f"largest slip (shaded {place})" if is_shaded else "largest slip"
             draw_slip(list(panels[:, 1]), tree, slip, below, extent, title)
             if is_shaded:
                 edges = [
                     slip[name].item() / horizontal.scale.size for name in ("start_time", "end_time")
                 ]
                 for axes in panels[:, 0]:
-                    axes.axvspan(*edges, color="tab:orange", alpha=0.25, linewidth=0.8, zorder=0)
+                    axes.axvspan(*edges, color=YELLOW, alpha=0.4, linewidth=0.8, zorder=0)
         for axes in panels[:-1].flat:
             axes.set_xlabel("")
         figure.align_ylabels(panels)
     return figure
+
+
+def _panels(figure: Canvas, rows: int, has_slip: bool, is_stacked: bool) -> NDArray[Any]:
+    """Panels of the run, and of its slip beside or below them; shape (rows, 1 or 2)."""
+    ratios = [1.7, *(1 for _ in range(rows - 1))]
+    if not is_stacked:
+        columns = 2 if has_slip else 1
+        panels: NDArray[Any] = figure.subplots(
+            rows,
+            columns,
+            sharex="col",
+            squeeze=False,
+            height_ratios=ratios,
+            width_ratios=[2.1, 1][:columns],
+        )
+        return panels
+    stacked = figure.subplots(2 * rows, 1, height_ratios=2 * ratios)
+    for first in (0, rows):
+        for axes in stacked[first : first + rows - 1]:
+            axes.sharex(stacked[first + rows - 1])
+            axes.tick_params(labelbottom=False)
+    panels = stacked.reshape(2, rows).T
+    return panels  # noqa: RET504 (numpy has no type for it)
 
 
 def draw_force(axes: Axes, tree: xr.DataTree, options: Options) -> None:
@@ -76,7 +98,7 @@ def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: Horiz
     curves = [curve(tree, name, other, **OTHERS) for other in others_behind(tree, extent)]
     front: dict[str, Any] = {"color": "black"}
     if is_elastic:
-        at_drive = {"color": "tab:blue", "alpha": 0.5, "label": "force at the drive"}
+        at_drive = {"color": BLUE, "alpha": 0.5, "label": "force at the drive"}
         curves.append(curve(tree, "spring_force", extent, **at_drive))
         front["label"] = "mean elastic force $K(X_d - X_1)$"
     curves.append(curve(tree, name, extent, **front))
@@ -155,7 +177,7 @@ def _compare(
             one,
             extent,
             label=label,
-            color=COLORS[number % len(COLORS)],
+            **curve_style(number),
             alpha=0.8,
             zorder=1.9 if is_measured(tree) else 2.0,
         )

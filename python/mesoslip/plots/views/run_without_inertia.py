@@ -14,7 +14,7 @@ from mesoslip.output.samples import times_of
 from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.style import Canvas, canvas, styled, titles
+from mesoslip.plots.style import RED, Canvas, canvas, styled, titles
 from mesoslip.plots.views import run
 from mesoslip.plots.views.base import EXTENT, Options, View
 
@@ -45,7 +45,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
         )
         sizes.set_ylabel("avalanche size")
         sizes.set_ylim(0.8, 1.25 * max(count, data["size"].values.max(initial=1)))
-        sizes.axhline(count, color="tab:red", linewidth=0.6)
+        sizes.axhline(count, color=RED, linewidth=0.6)
         title = f"red: number of contacts, {count}"
         sizes.set_title(title if x.size else f"no avalanche; {title}", loc="left")
         horizontal.prepare(sizes)

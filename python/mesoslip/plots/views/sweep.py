@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import BOUNDARIES, REGIME, draw_contours, draw_crossings
-from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.plots.printing import is_narrow
+from mesoslip.plots.style import BLUE, Canvas, canvas, styled
 from mesoslip.plots.sweep_axis import SweptKey, scale_of
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
@@ -25,8 +26,8 @@ MAX_PANELS = 6
 # Panels in a row, of an overview and of the maps of one measure.
 COLUMNS = 2
 MAP_COLUMNS = 3
-# Smooth, stick-slip, irregular, transient; further choices of measures to come.
-CHOICE_COLORS = ("#a6cee3", "#ee8877", "#e6d488", "#d9d9d9", "#7fbf7b", "#c2a5cf")
+# Smooth, stick-slip, irregular, transient, which differ in lightness; further choices.
+CHOICE_COLORS = ("#a3cbe5", "#cc6677", "#f5e9b0", "#a5a5a5", "#5aa382", "#84669e")
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
@@ -45,6 +46,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
         name = _known(data, options.measure)
         panels = [(part, name) for part in _parts(data)]
     columns = min(len(panels), COLUMNS if options.measure is None else MAP_COLUMNS)
+    columns = 1 if is_narrow(figure) else columns
     rows = -(-len(panels) // columns)
     with styled(), mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
         figure = canvas(figure, (max(4.4, 3.4 * columns), 2.5 * rows + 0.4))
@@ -134,7 +136,7 @@ def _value(coordinate: xr.DataArray) -> str:
 
 def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[str, ...]) -> None:
     values = measure.transpose(..., "realization").values
-    axes.plot(key.values, values, ".", color="tab:blue", markersize=3)
+    axes.plot(key.values, values, ".", color=BLUE, markersize=3)
     if choices:
         axes.set_yticks(range(len(choices)), choices)
         axes.set_ylim(-0.5, len(choices) - 0.5)

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from mesoslip.analysis import slips as catalogue
 from mesoslip.output.access import group_of
 from mesoslip.plots.lines import max_size
-from mesoslip.plots.style import COLORS
+from mesoslip.plots.style import curve_color
 from mesoslip.quantities import scale_for
 from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn
 from mesoslip.reports.sections.base import columns_in_one_unit, named, row_in_one_unit
@@ -119,7 +119,7 @@ def _histograms(subjects: Sequence[Subject]) -> Figure:
                 values / scale.size,
                 bins,
                 histtype="step" if len(subjects) > 1 else "stepfilled",
-                color=COLORS[number % len(COLORS)] if len(subjects) > 1 else "0.6",
+                color=curve_color(number) if len(subjects) > 1 else "0.6",
                 label=subject.name,
             )
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))

@@ -298,7 +298,8 @@ def test_every_file_of_the_package_is_listed():
     there = {
         path.relative_to(package).as_posix()
         for path in package.rglob("*")
-        if path.suffix in {".py", ".pyi", ".typed", ".html"} and "__pycache__" not in path.parts
+        if path.suffix in {".py", ".pyi", ".typed", ".html", ".mplstyle"}
+        and "__pycache__" not in path.parts
     }
     assert listed == there | {"py.typed"}
 

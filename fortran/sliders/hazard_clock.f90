@@ -13,9 +13,8 @@ module mesoslip_sliders_hazard_clock
 
    public :: advance_clocks, time_to_reading, reading_after
 
-   !> Maximum changes of the exponent in a part of a step for the rules of 3, 4 and 6 points: their
-   !> errors are 5e-7 z**6, 6e-10 z**8 and 2e-16 z**12.
-   real(wp), parameter :: max_change_3 = 0.025_wp, max_change_4 = 0.13_wp, max_change = 1.0_wp
+   !> Maximum change of the exponent in a part of a step, in which the rule is exact to rounding
+   real(wp), parameter :: max_change = 0.5_wp
    !> Relative change of a time after which one more step changes nothing: convergence is cubic
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
@@ -32,19 +31,17 @@ module mesoslip_sliders_hazard_clock
    real(wp), parameter :: small = 1.0e-4_wp
 
    !> Gauss-Legendre points and weights on [0, 1]
-   real(wp), parameter :: point_3(3) = [0.11270166537925831148_wp, 0.5_wp, &
-      & 0.88729833462074168852_wp]
-   real(wp), parameter :: weight_3(3) = [5.0_wp / 18.0_wp, 4.0_wp / 9.0_wp, 5.0_wp / 18.0_wp]
-   real(wp), parameter :: point_4(4) = [0.069431844202973712388_wp, 0.33000947820757186760_wp, &
-      & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
-   real(wp), parameter :: weight_4(4) = [0.17392742256872692869_wp, 0.32607257743127307131_wp, &
-      & 0.32607257743127307131_wp, 0.17392742256872692869_wp]
-   real(wp), parameter :: point_6(6) = [0.033765242898423986094_wp, 0.16939530676686774317_wp, &
-      & 0.38069040695840154568_wp, 0.61930959304159845432_wp, 0.83060469323313225683_wp, &
-      & 0.96623475710157601391_wp]
-   real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
-      & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
-      & 0.085662246189585172520_wp]
+   integer, parameter :: points = 10
+   real(wp), parameter :: point(points) = [0.01304673574141413996_wp, 0.06746831665550774463_wp, &
+      & 0.16029521585048779688_wp, &
+      & 0.28330230293537640460_wp, 0.42556283050918439456_wp, 0.57443716949081560544_wp, &
+      & 0.71669769706462359540_wp, 0.83970478414951220312_wp, 0.93253168334449225537_wp, &
+      & 0.98695326425858586004_wp]
+   real(wp), parameter :: weight(points) = [0.03333567215434406880_wp, 0.07472567457529029657_wp, &
+      & 0.10954318125799102200_wp, &
+      & 0.13463335965499817755_wp, 0.14776211235737643509_wp, 0.14776211235737643509_wp, &
+      & 0.13463335965499817755_wp, 0.10954318125799102200_wp, 0.07472567457529029657_wp, &
+      & 0.03333567215434406880_wp]
 
    !> The exponent of a clock during a step: time times a polynomial.
    type :: exponent_type
@@ -329,36 +326,18 @@ contains
       real(wp), intent(in) :: start, length
       real(wp) :: integral
 
-      real(wp) :: change
-
-      change = max_change
-      if (.not. start > 0.0_wp) change = max_change_until(exponent, length)
-      if (change <= max_change_3) then
-         integral = length * rule(exponent, start, length, point_3, weight_3)
-      else if (change <= max_change_4) then
-         integral = length * rule(exponent, start, length, point_4, weight_4)
-      else
-         integral = length * rule(exponent, start, length, point_6, weight_6)
-      end if
-   end function integral_from
-
-   !> Mean of the exponential function over a part of a step, by a rule.
-   pure function rule(exponent, start, length, point, weight) result(mean)
-      type(exponent_type), intent(in) :: exponent
-      real(wp), intent(in) :: start, length, point(:), weight(:)
-      real(wp) :: mean
-
       real(wp) :: before, time
       integer :: node
 
       before = start * horner(exponent%mean, exponent%terms, start)
-      mean = 0.0_wp
-      do node = 1, size(point)
+      integral = 0.0_wp
+      do node = 1, points
          time = start + point(node) * length
-         mean = mean + weight(node) * exp(time * horner(exponent%mean, exponent%terms, time) &
-            & - before)
+         integral = integral + weight(node) * exp(time * horner(exponent%mean, exponent%terms, &
+            & time) - before)
       end do
-   end function rule
+      integral = integral * length
+   end function integral_from
 
    !> Time within a part of a step at which an integral is reached, in a bracket.
    pure function time_within(exponent, start, length, wanted, whole) result(time)

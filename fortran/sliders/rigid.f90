@@ -15,6 +15,7 @@ module mesoslip_sliders_rigid
       & shift_slider, slider_type
    use mesoslip_sliders_motion_series, only: horner, integral
    use mesoslip_sliders_rigid_long_step, only: take_long_step
+   use mesoslip_sliders_rigid_settled_step, only: try_settled_step
    use mesoslip_sliders_rigid_short_step, only: try_short_step
    use mesoslip_sliders_rigid_state, only: constants, few_terms, long_terms, many_terms, &
       & motion_rates_type, rates, rigid_state_type, some_terms, system_type, uniform_gap
@@ -138,7 +139,8 @@ contains
          system%driving = constant%driving - self%law%rate * system%inverse_mass
          system%drive_gap = uniform_gap(self)
          early = rates(self, system, system%drive_gap)
-         call try_short_step(self, system, window, early, is_done)
+         if (self%has_clocks) call try_settled_step(self, system, window, early, is_done)
+         if (.not. is_done) call try_short_step(self, system, window, early, is_done)
       end if
       if (.not. is_done) call take_long_step(self, system, window, early)
    end subroutine step_on

@@ -18,6 +18,11 @@ Tables = dict[str, Any]
 MOST_BREAKS = 6e3
 MOST_PERIODS = 3e3
 
+# Part of the configurations with thermal activation, and how often contacts then break in a run
+# that bear no more than the back force.
+THERMAL = 0.25
+MOST_IDLE = 30.0
+
 MAX_WIDTH = {
     "gaussian": 1.0,
     "uniform": 0.577,
@@ -68,7 +73,37 @@ def draw(random: Random) -> Tables:
     duration = min(stretch * loading / speed * random.uniform(0.3, 5), most)
     _drive(random, tables, duration, speed)
     tables["output"] = _output(random, tables, duration)
+    if engine == "eq" and not interaction.get("strength") and random.random() < THERMAL:
+        contacts["coupling"] = "equal"
+        contacts["thermal"] = _thermal(random, contacts, speed / stretch, duration)
+        if not interaction and random.random() < 0.4:
+            contacts["ageing"] = _ageing(random, contacts, duration)
     return tables
+
+
+def _thermal(random: Random, contacts: Tables, rate: float, duration: float) -> Tables:
+    """Activation at rates around that of loading, by which no contact breaks all the time."""
+    ratio = decades(random, -3, 0)
+    exponent = (1 - contacts["back_force_ratio"]) / ratio
+    most = math.log(MOST_IDLE / duration) + exponent
+    logarithm = min(math.log(rate * decades(random, -4, 4)), most, math.log(1e24))
+    return {"rate": float(f"{math.exp(logarithm):.3g}"), "force_ratio": ratio}
+
+
+def _ageing(random: Random, contacts: Tables, duration: float) -> Tables:
+    time = duration * decades(random, -3, 1)
+    contacts["initial"] = "relaxed"
+    if random.random() < 0.5:
+        return {"law": "log", "time": time, "growth": decades(random, -3, -0.5)}
+    # Young contacts that can attach, and are narrow enough.
+    contacts["back_force_ratio"] = min(contacts["back_force_ratio"], 0.1)
+    width = contacts["threshold"]["relative_width"]
+    return {
+        "law": "relax",
+        "time": time,
+        "young_force_ratio": round(random.uniform(0.5, 1.4), 2),
+        "young_relative_width": width * random.uniform(0.3, 1.0),
+    }
 
 
 def _contacts(random: Random, engine: str) -> tuple[Tables, Tables]:

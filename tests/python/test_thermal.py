@@ -261,6 +261,25 @@ def test_a_hold_of_a_million_seconds():
     assert abs(float(tree["energy_residual"].values[0])) < 1e-12
 
 
+def test_a_long_hold_of_a_rigid_slider(klein):
+    """A slider that settles between two breaks goes from one to the next in one step."""
+    config = klein(
+        run__duration=None,
+        drive={"stage": [{"duration": 2.0, "velocity": 1e-7}, {"duration": 1e6, "velocity": 0.0}]},
+        contacts__count=20,
+        contacts__coupling="equal",
+        contacts__threshold__relative_width=0.1,
+        contacts__thermal={"rate": 1e3, "force_ratio": 0.05},
+        output__interval=1e3,
+    )
+    tree = mesoslip.run(config)
+    force = tree["spring_force"].values[0]
+    assert 0 < force[-1] < 0.7 * force[1]
+    assert int(tree["breaks"].values[0]) > 20
+    assert tree.attrs["advance_count"] < 1e7
+    assert abs(float(tree["energy_residual"].values[0])) < 1e-10
+
+
 @pytest.mark.parametrize(
     "changes",
     [

@@ -1,0 +1,73 @@
+!> Steps of a rigid slider that has settled to rest, or to uniform creep with its drive.
+!>
+!> Contacts that hold the slider, and a damper or their drag, bring it there. In a long hold a
+!> contact that breaks by thermal activation shakes it, and nothing happens for a long time then.
+module mesoslip_sliders_rigid_settled_step
+   use mesoslip_interface_law, only: window_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
+   use mesoslip_sliders_rigid_state, only: arrive, few_terms, motion_rates_type, pull, &
+      & rigid_state_type, system_type, uniform_gap
+   implicit none
+   private
+
+   public :: try_settled_step
+
+   !> Forces that differ by this part are equal up to rounding.
+   real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
+
+contains
+
+   !> Go on uniformly to the first end of a window or until a clock is due, if the motion differs
+   !> from that by rounding only.
+   subroutine try_settled_step(self, system, window, early, is_done)
+      !> The slider, its drive without acceleration
+      class(rigid_state_type), intent(inout) :: self
+      !> Its equation of motion
+      type(system_type), intent(in) :: system
+      !> Where the contact force holds
+      type(window_type), intent(in) :: window
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+      !> Whether the step was made; if not, the motion has not changed
+      logical, intent(out) :: is_done
+
+      real(wp) :: velocity, noise, step, target, end_time
+      logical :: crosses, is_due
+      type(motion_rates_type) :: late
+
+      is_done = .false.
+      if (.not. (self%law%stiffness > 0.0_wp .and. system%drag + self%damping > 0.0_wp)) return
+      velocity = system%driving / system%stiffness
+      noise = rounding * self%stiffness * abs(system%drive_gap) + rounding &
+         & * (abs(self%law%stiffness * self%displacement) + abs(self%law%offset))
+      step = window%end_time - self%time
+      is_done = step > 0.0_wp &
+         & .and. self%mass * max(abs(early%acceleration), abs(early%damper)) <= noise &
+         & .and. self%mass * sqrt(system%stiffness) * abs(early%velocity - velocity) <= noise
+      if (.not. is_done) return
+
+      end_time = window%end_time
+      target = merge(window%upper, window%lower, velocity > 0.0_wp)
+      crosses = abs(velocity) > 0.0_wp &
+         & .and. abs(velocity) * step >= abs(target - self%displacement)
+      if (crosses) step = abs(target - self%displacement) / abs(velocity)
+      self%terms = few_terms
+      self%series(:few_terms - 1) = 0.0_wp
+      self%series(0) = velocity
+      is_due = .false.
+      if (self%has_clocks) call advance_clocks(self%clock, self%series, 1, step, is_due)
+      crosses = crosses .and. .not. is_due
+      if (crosses .or. is_due) end_time = self%time + step
+
+      self%time = end_time
+      self%displacement = self%displacement + velocity * step
+      if (crosses) self%displacement = target
+      self%velocity = velocity
+      self%damper = 0.0_wp
+      call pull(self, system, step, 0.5_wp * velocity * step**2)
+      call arrive(self, system, early, uniform_gap(self), late)
+      call self%drag_loss%add(self%law%drag * velocity**2 * step)
+   end subroutine try_settled_step
+
+end module mesoslip_sliders_rigid_settled_step

@@ -132,34 +132,42 @@ subroutine onset(equation, coefficients, damping, drag, end_displacement, interv
 end subroutine onset
 
 !> Thresholds, densities or survival probabilities of a threshold law.
-subroutine evaluate_threshold_law(law, relative_width, minimum, what, length, argument, value, &
-   & acceptance, status, message)
+subroutine evaluate_threshold_law(length, names, values, words, minimum, what, points, argument, &
+   & value, acceptance, status, message)
    !f2py threadsafe
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_boundary_handles, only: report
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_contacts_threshold_laws, only: new_threshold_law
+   use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
+   use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
-   !> Name of the law
-   character(len=*), intent(in) :: law
-   real(8), intent(in) :: relative_width, minimum
+   !> What the law is made of: parameters by name, numbers or words
+   integer, intent(in) :: length
+   character(len=32), intent(in) :: names(length), words(length)
+   real(8), intent(in) :: values(length)
+   real(8), intent(in) :: minimum
    !> "quantile", of exceedance probabilities, "density" or "survival"
    character(len=*), intent(in) :: what
-   integer, intent(in) :: length
-   real(8), intent(in) :: argument(length)
-   real(8), intent(out) :: value(length)
+   integer, intent(in) :: points
+   real(8), intent(in) :: argument(points)
+   real(8), intent(out) :: value(points)
    !> Probability that a draw is not rejected
    real(8), intent(out) :: acceptance
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
    class(threshold_law_type), allocatable :: threshold_law
+   type(parameters_type) :: parameters
+   character(len=name_length) :: law
    type(error_type), allocatable :: error
 
    value = 0.0_wp
    acceptance = 0.0_wp
-   call new_threshold_law(threshold_law, law, relative_width, minimum, error)
+   call new_parameters(parameters, names, values, words)
+   call parameters%take("threshold_law", law, error)
+   call make_threshold_law(threshold_law, law, parameters, minimum, error)
+   call parameters%finish(error)
    if (.not. allocated(error)) then
       acceptance = threshold_law%acceptance
       select case (what)

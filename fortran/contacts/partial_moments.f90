@@ -34,12 +34,15 @@ module mesoslip_contacts_partial_moments
       real(wp), allocatable, private :: exponent(:)
       !> Moments above each knot and their slopes, shape (orders, 2, cells + 1)
       real(wp), allocatable, private :: table(:, :, :)
+      !> Of a law with a constant density in cells, for which there is no table: edges of the cells,
+      !> density in each, and moments above each edge, shape (orders, edges)
+      real(wp), allocatable, private :: edge(:), cell_density(:), above_edge(:, :)
    contains
       !> Moments above a threshold, to rounding
       procedure, non_overridable :: above
       !> Moments above a threshold by interpolation, to about 1e-12
       procedure, non_overridable :: interpolate
-      procedure, non_overridable, private :: coordinate, density
+      procedure, non_overridable, private :: coordinate, density, sum_cells, above_in_cells
    end type partial_moments_type
 
 contains
@@ -60,6 +63,10 @@ contains
       self%exponent = exponent
       self%min_threshold = law%quantile(1.0_wp - epsilon(1.0_wp))
       self%max_threshold = law%quantile(outside)
+      if (law%cells > 0) then
+         call self%sum_cells()
+         return
+      end if
       if (law%is_logarithmic) then
          self%coordinates = logarithmic
       else if (self%min_threshold < close) then
@@ -92,6 +99,80 @@ contains
          self%table(:, 2, cell) = -self%step * self%density(knot)
       end do
    end subroutine new_partial_moments
+
+   !> Sum up the moments of a law with a constant density in cells.
+   subroutine sum_cells(self)
+      class(partial_moments_type), intent(inout) :: self
+
+      integer :: cell, order
+
+      associate (all => self%law%cell_edges())
+         self%edge = [self%min_threshold, &
+            & pack(all, all > self%min_threshold .and. all < self%max_threshold), &
+            & self%max_threshold]
+      end associate
+      associate (cells => size(self%edge) - 1)
+         self%cell_density = self%law%density(0.5_wp * (self%edge(:cells) + self%edge(2:)))
+         allocate (self%above_edge(size(self%exponent), cells + 1), source=0.0_wp)
+         do cell = cells, 1, -1
+            self%above_edge(:, cell) = self%above_edge(:, cell + 1) + self%cell_density(cell) &
+               & * power_integral(self%exponent, self%edge(cell), self%edge(cell + 1))
+         end do
+      end associate
+      ! All of the law is 1, to the last digit, as for other laws.
+      do order = 1, size(self%exponent)
+         if (abs(self%exponent(order)) > 0.0_wp) cycle
+         self%scale = 1.0_wp / self%above_edge(order, 1)
+         self%cell_density = self%scale * self%cell_density
+         self%above_edge = self%scale * self%above_edge
+         self%above_edge(order, 1) = 1.0_wp
+         exit
+      end do
+   end subroutine sum_cells
+
+   !> Moments above a threshold of a law with a constant density in cells.
+   pure subroutine above_in_cells(self, threshold, moment)
+      class(partial_moments_type), intent(in) :: self
+      !> Less than the maximum one
+      real(wp), intent(in) :: threshold
+      real(wp), intent(out) :: moment(:)
+
+      integer :: cell, last, middle
+
+      if (threshold <= self%min_threshold) then
+         moment = self%above_edge(:, 1)
+         return
+      end if
+      cell = 1
+      last = size(self%edge)
+      do while (last - cell > 1)
+         middle = (cell + last) / 2
+         if (self%edge(middle) <= threshold) then
+            cell = middle
+         else
+            last = middle
+         end if
+      end do
+      moment = self%above_edge(:, last) + self%cell_density(cell) &
+         & * power_integral(self%exponent, threshold, self%edge(last))
+   end subroutine above_in_cells
+
+   !> Integral of a power between two positive limits.
+   elemental function power_integral(exponent, lower, upper) result(integral)
+      real(wp), intent(in) :: exponent, lower, upper
+      real(wp) :: integral
+
+      if (abs(exponent) > 0.0_wp) then
+         if (abs(exponent + 1.0_wp) > 0.0_wp) then
+            integral = (upper**(exponent + 1.0_wp) - lower**(exponent + 1.0_wp)) &
+               & / (exponent + 1.0_wp)
+         else
+            integral = log(upper / lower)
+         end if
+      else
+         integral = upper - lower
+      end if
+   end function power_integral
 
    !> Coordinate of a threshold in which the table is uniform.
    elemental function coordinate(self, threshold)
@@ -136,6 +217,10 @@ contains
          moment = 0.0_wp
          return
       end if
+      if (allocated(self%edge)) then
+         call self%above_in_cells(threshold, moment)
+         return
+      end if
       place = 0.0_wp
       if (threshold > self%min_threshold) place = (self%coordinate(threshold) - self%first) / self%step
       cell = min(int(place), cells - 1) + 1
@@ -160,10 +245,12 @@ contains
       real(wp) :: place
       integer :: cell
 
-      if (threshold <= self%min_threshold) then
+      if (threshold <= self%min_threshold .and. .not. allocated(self%edge)) then
          moment = self%table(:, 1, 1)
       else if (threshold >= self%max_threshold) then
          moment = 0.0_wp
+      else if (allocated(self%edge)) then
+         call self%above_in_cells(threshold, moment)
       else
          place = (self%coordinate(threshold) - self%first) / self%step
          cell = min(int(place), cells - 1)

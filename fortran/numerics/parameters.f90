@@ -1,7 +1,8 @@
 !> Named parameters, numbers or words, that a kind of slider or of contacts is made from.
 !>
 !> Whoever is made takes what it needs by name. A name that is missing, or that nobody has taken, is
-!> an error: so a misspelt or superfluous parameter is found at once.
+!> an error: so a misspelt or superfluous parameter is found at once. A list of numbers is a name
+!> that occurs several times.
 module mesoslip_numerics_parameters
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: wp
@@ -24,13 +25,13 @@ module mesoslip_numerics_parameters
       logical, allocatable :: is_taken(:)
    contains
       !> Take the parameter of a name: a number, a word, or a word that is one of some choices
-      generic :: take => take_real, take_integer, take_logical, take_word, take_choice
+      generic :: take => take_real, take_integer, take_logical, take_word, take_choice, take_list
       !> Add a word
       procedure, non_overridable :: add_word
       !> Make sure that each parameter was taken
       procedure, non_overridable :: finish
       procedure, non_overridable, private :: take_real, take_integer, take_logical, take_word, &
-         & take_choice, find
+         & take_choice, take_list, find
    end type parameters_type
 
 contains
@@ -162,6 +163,23 @@ contains
       if (allocated(error)) return
       call choose(name, self%word(place), choices, position, error)
    end subroutine take_choice
+
+   !> Take all numbers of a name, in their order.
+   subroutine take_list(self, name, values, error)
+      class(parameters_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: values(:)
+      type(error_type), allocatable, intent(inout) :: error
+
+      logical, allocatable :: is_meant(:)
+      integer :: place
+
+      call self%find(name, place, error)
+      if (allocated(error)) return
+      is_meant = self%name == name
+      values = pack(self%value, is_meant)
+      where (is_meant) self%is_taken = .true.
+   end subroutine take_list
 
    !> Make sure that each parameter was taken.
    subroutine finish(self, error)

@@ -34,12 +34,14 @@ def drain_rows(
     rows: int = ...,
 ) -> tuple[int, bytes]: ...
 def evaluate_threshold_law(
-    law: str,
-    relative_width: float,
+    names: NDArray[np.bytes_],
+    values: NDArray[np.float64],
+    words: NDArray[np.bytes_],
     minimum: float,
     what: str,
     argument: NDArray[np.float64],
     length: int = ...,
+    points: int = ...,
 ) -> tuple[NDArray[np.float64], float, int, bytes]: ...
 def fetch_state(
     handle: NDArray[np.int64], words: NDArray[np.int64], length: int = ...

@@ -86,7 +86,7 @@ contains
       call check_close(maxval(abs(quick - exact)), 0.0_wp, 1.0e-11_wp, "interpolated moments")
       exact = partial%above(0.0_wp)
       call check_close(exact(1), 1.0_wp, 1.0e-12_wp, "all thresholds are above 0")
-      exact = partial%above(partial%greatest)
+      exact = partial%above(partial%max_threshold)
       call check(all(exact <= 0.0_wp), "none is above the greatest")
    end subroutine moments
 

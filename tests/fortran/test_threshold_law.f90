@@ -4,9 +4,11 @@ program test_threshold_law
    use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal, coupling_scaled
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_contacts_threshold_laws, only: law_names, new_threshold_law
+   use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
+   use mesoslip_contacts_threshold_laws, only: law_names, make_threshold_law, new_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_contacts_threshold_laws_gaussian, only: inverse_normal
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use testing, only: check, check_close, finish
    implicit none
 
@@ -17,6 +19,7 @@ program test_threshold_law
    integer :: kind, width
 
    do kind = 1, size(law_names)
+      if (law_names(kind) == "table") cycle
       do width = 1, size(widths)
          call new_threshold_law(law, law_names(kind), widths(width), 0.0_wp, error)
          call check(.not. allocated(error), "a law: " // law_names(kind))
@@ -35,6 +38,7 @@ program test_threshold_law
    end do
 
    call several()
+   call table()
 
    call check_close(inverse_normal(0.975_wp), 1.959963984540054_wp, 1.0e-15_wp, "normal quantile")
    call check_close(inverse_normal(1.0e-20_wp), -9.262340089798408_wp, 1.0e-14_wp, "far quantile")
@@ -57,6 +61,7 @@ contains
 
       probability = [(real(place, wp) / (number + 1), place=1, number)]**3
       do kind = 1, size(law_names)
+         if (law_names(kind) == "table") cycle
          call new_threshold_law(law, law_names(kind), 0.3_wp, 0.2_wp, error)
          call law%quantiles(probability, threshold)
          call check(all(abs(threshold - law%quantile(probability)) <= 0.0_wp), &
@@ -73,6 +78,57 @@ contains
          call check(agree, "quantiles of 1 to 70 probabilities: " // law_names(kind))
       end do
    end subroutine several
+
+   !> A table: its functions, its width, and partial moments that add up cell by cell.
+   subroutine table()
+      real(wp), parameter :: edge(4) = [0.2_wp, 0.8_wp, 1.0_wp, 1.8_wp]
+      real(wp), parameter :: weight(3) = [0.3_wp, 0.4_wp, 0.3_wp]
+      real(wp), parameter :: exponent(5) = [0.0_wp, 0.5_wp, -0.5_wp, -1.0_wp, 2.0_wp]
+      real(wp), parameter :: minimum = 0.5_wp, threshold = 0.9_wp
+      type(parameters_type) :: parameters
+      type(partial_moments_type) :: moments
+      real(wp) :: expected(size(exponent)), found(size(exponent)), mean, stretch
+      integer :: sample
+      integer, parameter :: samples = 200000
+
+      mean = sum(weight * 0.5_wp * (edge(:3) + edge(2:)))
+      call new_parameters(parameters, [("threshold_edges  ", sample=1, 4), &
+         & ("threshold_weights", sample=1, 3)], [edge / mean, weight])
+      call make_threshold_law(law, "table", parameters, 0.0_wp, error)
+      call check(.not. allocated(error), "a law of a table")
+      call consistency(law, "table")
+      call check_close(law%quantile(0.3_wp + 0.4_wp * 0.25_wp), 0.95_wp / mean, 1.0e-14_wp, &
+         & "a quantile within a cell")
+      stretch = sqrt(sum(weight * (edge(:3)**2 + edge(:3) * edge(2:) + edge(2:)**2)) / 3.0_wp &
+         & / mean**2 - 1.0_wp)
+      call check_close(law%width, stretch, 1.0e-14_wp, "the width of a table")
+
+      call make_threshold_law(law, "table", parameters, minimum, error)
+      call consistency(law, "table above a minimum")
+      call new_partial_moments(moments, law, exponent)
+      expected = 0.0_wp
+      do sample = 1, samples
+         associate (one => law%quantile((sample - 0.5_wp) / samples))
+            if (one > threshold) expected = expected + one**exponent / samples
+         end associate
+      end do
+      found = moments%above(threshold)
+      call check(all(abs(found - expected) < 2.0e-5_wp), "partial moments of a table")
+      call moments%interpolate(threshold, expected)
+      call check(all(abs(found - expected) <= 0.0_wp), "partial moments of a table, once more")
+      call check_close(sum(moments%above(0.0_wp) * [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), &
+         & 1.0_wp, 0.0_wp, "all of a table")
+
+      call new_parameters(parameters, [character(len=17) :: "threshold_edges", "threshold_edges", &
+         & "threshold_weights"], [1.5_wp, 0.5_wp, 1.0_wp])
+      call make_threshold_law(law, "table", parameters, 0.0_wp, error)
+      call check(allocated(error), "edges that descend are refused")
+      call new_parameters(parameters, [character(len=17) :: "threshold_edges", "threshold_edges", &
+         & "threshold_weights"], [0.5_wp, 2.5_wp, 1.0_wp])
+      deallocate (error)
+      call make_threshold_law(law, "table", parameters, 0.0_wp, error)
+      call check(allocated(error), "a mean that is not 1 is refused")
+   end subroutine table
 
    !> Mean and standard deviation, integrated over the quantiles.
    subroutine moments(law, width, name)

@@ -57,11 +57,15 @@ FORCE = {
     },
 }
 
+TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
+
 KINDS: dict[str, dict[str, Any]] = {
     "rigid": {},
     "rigid, three realizations": {"run__realizations": 3, "contacts__coupling": "equal"},
     "rigid, steady": {"contacts__initial": "steady"},
     "rigid, bundle": {"contacts__reattach": False},
+    "rigid, table": TABLE,
+    "rigid, table, me": TABLE | {"run__engine": "me"},
     "rigid, lattice": SNAPSHOTS,
     "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
     "rigid, me": {"run__engine": "me"},

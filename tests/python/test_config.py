@@ -786,7 +786,7 @@ def test_numbers_of_numpy(klein):
     assert "integer" in message
 
 
-@pytest.mark.parametrize("law", sorted(LAWS))
+@pytest.mark.parametrize("law", sorted(LAWS.keys() - {"table"}))
 @pytest.mark.parametrize("width", [1e-6, 1e-3, 0.3])
 def test_narrow_laws_have_their_quantities(klein, law, width):
     """The steady force over that of no width is 1 + width^2/(1 - f_b^2), at first order of it."""

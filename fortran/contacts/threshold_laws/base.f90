@@ -23,6 +23,8 @@ module mesoslip_contacts_threshold_laws_base
       !> Whether the density varies with the logarithm of the threshold: thresholds close to 0 are
       !> of many orders of magnitude
       logical :: is_logarithmic = .false.
+      !> Number of cells in which the density is constant; 0 for a law with a formula
+      integer :: cells = 0
    contains
       !> Take what the law is made of
       procedure(take_interface), deferred :: take
@@ -33,6 +35,8 @@ module mesoslip_contacts_threshold_laws_base
       !> Thresholds that are exceeded with several probabilities, the same as those of quantile to
       !> the bit: a law may find them in less time together
       procedure :: quantiles
+      !> Edges of the cells before rejection
+      procedure :: cell_edges
       !> Threshold that is exceeded with a given probability
       procedure, non_overridable :: quantile
       !> Probability density
@@ -132,6 +136,16 @@ contains
 
       threshold = self%quantile(probability)
    end subroutine quantiles
+
+   !> Edges of the cells in which the density is constant; none unless a law has some.
+   pure function cell_edges(self) result(edge)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> Relative thresholds, ascending, before rejection, shape (cells + 1)
+      real(wp) :: edge(self%cells + 1)
+
+      edge = 0.0_wp
+   end function cell_edges
 
    !> Smallest threshold that rejection leaves.
    pure function min_threshold(self) result(threshold)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,12 @@ EXCLUSIVE = {
     "drive": ("velocity", "stage", "cycle", "history", "force", "force_rate"),
     "cycle": ("velocity", "frequency"),
     "history": ("file", "time", "displacement"),
+    "threshold": ("relative_width", "file", "samples", "weights"),
     "slider": ("damping", "damping_ratio"),
 }
+
+# Keys that name a file, relative to the folder of the configuration.
+FILES = (("drive", "history", "file"), ("contacts", "threshold", "file"))
 
 # Removes a key.
 NONE = "none"
@@ -85,7 +89,8 @@ def _read(path: Path, outer: tuple[Path, ...]) -> Merged:
 
 def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Path, ...]) -> Merged:
     base = tables.pop("base", None)
-    _resolve_history(tables, folder)
+    for keys in FILES:
+        _place_file(tables, keys, folder)
     if base is None:
         return Merged(tables)
     if not isinstance(base, str) or not base or "\0" in base:
@@ -110,12 +115,15 @@ def _check_base(path: Path, source: str, base: str) -> None:
         return
 
 
-def _resolve_history(tables: dict[str, Any], folder: Path) -> None:
-    """Make the file of a history of the drive relative to the folder of the file that names it."""
-    match tables:
-        case {"drive": {"history": {"file": str(name)} as history} as drive} if name:
-            placed = {**history, "file": str(folder / name)}
-            tables["drive"] = {**drive, "history": placed}
+def _place_file(tables: dict[str, Any], keys: Sequence[str], folder: Path) -> None:
+    """Make a file relative to the folder of the file that names it, in copies of the tables."""
+    key, *inner = keys
+    value = tables.get(key)
+    if inner and isinstance(value, Mapping):
+        tables[key] = dict(value)
+        _place_file(tables[key], inner, folder)
+    elif not inner and isinstance(value, str) and value:
+        tables[key] = str(folder / value)
 
 
 def _are_the_same(path: Path, other: Path) -> bool:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip import _core
+from mesoslip.configuration.kernel_parameters import Names, Parameters, named
 from mesoslip.configuration.threshold_laws import LAWS
+from mesoslip.configuration.threshold_laws.table import sample_problem
 from mesoslip.errors import MesoslipError
 
 
@@ -17,18 +20,25 @@ class ThresholdLaw:
     """A law of the relative threshold u = f_si/f_s: mean 1, standard deviation ``relative_width``.
 
     Draws at or below ``minimum``, the back force over the mean threshold, are rejected. Mean and
-    width are those before rejection. Source: model section 2; the gaussian law is Braun's.
+    width are those before rejection. The law "table" has the cells of ``samples``, with ``weights``
+    if they differ. Source: model section 2; the gaussian law is Braun's.
     """
 
     law: str
     relative_width: float
     minimum: float = 0.0
+    samples: tuple[float, ...] | None = None
+    weights: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.law not in LAWS:
             raise MesoslipError(
                 f"there is no threshold law {self.law!r}; there are {', '.join(LAWS)}"
             )
+        if LAWS[self.law].is_sampled:
+            key, message = sample_problem(self.samples or (), self.weights)
+            if key:
+                raise MesoslipError(f"{key} {message}")
 
     @property
     def acceptance(self) -> float:
@@ -61,12 +71,17 @@ class ThresholdLaw:
         values = np.asarray(argument, dtype=np.float64)
         return self._kernel(function, values.ravel())[0].reshape(values.shape)
 
+    @cached_property
+    def _parameters(self) -> tuple[Names, NDArray[np.float64], Names]:
+        parameters: Parameters = {"threshold_law": self.law}
+        return named(parameters | LAWS[self.law].kernel_parameters(self))
+
     def _kernel(
         self, function: str, argument: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], float]:
         """Values of a function of the law, and the acceptance."""
         values, acceptance, status, message = _core.evaluate_threshold_law(
-            self.law, self.relative_width, self.minimum, function, argument
+            *self._parameters, self.minimum, function, argument
         )
         if status != 0:
             raise MesoslipError(message.decode().strip())

@@ -18,6 +18,8 @@ from mesoslip.quantities import with_unit
 STEPS = 200
 # Name of the choice that omits a table.
 NONE = "none"
+# Threshold laws that are made of a width alone.
+WIDTH_LAWS = tuple(name for name, law in LAWS.items() if not law.is_sampled)
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,7 @@ CONTROLS = (
     Control("contacts.drag_rate", "drag rate η", "Contacts", 5, usual=1e11),
     Control("contacts.coupling", "coupling", "Contacts", choices=tuple(COUPLINGS)),
     Control("contacts.initial", "at the start", "Contacts", choices=tuple(INITIAL_STATES)),
-    Control("contacts.threshold.law", "law", "Thresholds", choices=tuple(LAWS)),
+    Control("contacts.threshold.law", "law", "Thresholds", choices=WIDTH_LAWS),
     Control(
         "contacts.threshold.relative_width", "width Δf_s/f_s", "Thresholds", 2, (1e-3, 1), 0.01
     ),

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import threading
 import weakref
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
+from mesoslip.configuration.kernel_parameters import Parameters, named
 from mesoslip.errors import RunError
 
 Array = NDArray[np.float64]
 Words = NDArray[np.int64]
 
-Names = NDArray[np.bytes_]
-
-# Characters of a name, see fortran/numerics/parameters.f90, and names in a list at most.
-NAME_LENGTH = 32
+# Maximum number of names in a list.
 MAX_NAMES = 64
 
 
@@ -108,9 +106,7 @@ class Kernel:
     def __reduce__(self) -> NoReturn:
         self.__copy__()
 
-    def set_contacts(
-        self, kind: str, parameters: Mapping[str, float | str], seed: int, realization: int
-    ) -> None:
+    def set_contacts(self, kind: str, parameters: Parameters, seed: int, realization: int) -> None:
         """Make the contacts of a kind from named parameters."""
         self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
@@ -222,25 +218,6 @@ class Kernel:
     def restore(self, words: Words) -> None:
         """Go on from a state, instead of starting."""
         self._call(_core.restore_simulation, words)
-
-
-def named(parameters: Mapping[str, float | str]) -> tuple[Names, Array, Names]:
-    """Parameters as a kernel takes them: names, numbers, and words where there are no numbers."""
-    # Of arrays of one length f2py refuses all but the first if that is 0.
-    room = max(1, len(parameters))
-    values, words = np.zeros(room), [""] * room
-    for number, value in enumerate(parameters.values()):
-        if isinstance(value, str):
-            words[number] = value
-        else:
-            values[number] = value
-    return _padded(parameters), values, _padded(words)
-
-
-def _padded(words: Iterable[str]) -> Names:
-    """Words with blanks behind, as Fortran compares them."""
-    padded = [word.ljust(NAME_LENGTH).encode() for word in words]
-    return np.array(padded, dtype=f"S{NAME_LENGTH}")
 
 
 def name_list(which: str) -> tuple[str, ...]:

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 from scipy.optimize.elementwise import find_root
 
-from mesoslip.configuration.threshold_law import ThresholdLaw
+from mesoslip.theory.thresholds import threshold_quadrature
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -19,7 +18,6 @@ Array = NDArray[np.float64]
 # Panels and points of the quadrature over the configured thresholds, and the normal deviate that
 # has the probability of its limits.
 PANELS, POINTS = 80, 12
-MAX_DEVIATE = 8.0
 
 
 def steady_force(config: Config, velocity: float) -> float:
@@ -46,7 +44,7 @@ def steady_force(config: Config, velocity: float) -> float:
         The force [N].
     """
     contacts = config.contacts
-    weight, threshold = _thresholds(config)
+    weight, threshold = threshold_quadrature(config, PANELS, POINTS)
     back = contacts.back_force_ratio
     if velocity == 0 or np.isinf(velocity):
         # All contacts are old when they break, or all young.
@@ -63,7 +61,7 @@ def steady_force(config: Config, velocity: float) -> float:
 
 def mean_life(config: Config, velocity: float) -> float:
     """Mean displacement from attaching to breaking, v <T> [m]; at velocity 0 that of the old."""
-    weight, threshold = _thresholds(config)
+    weight, threshold = threshold_quadrature(config, PANELS, POINTS)
     stretch = config.contacts.break_stretch
     if velocity == 0:
         broken = _threshold(config, threshold, np.inf)
@@ -100,7 +98,7 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
         The force [N].
     """
     contacts = config.contacts
-    weight, threshold = _thresholds(config)
+    weight, threshold = threshold_quadrature(config, PANELS, POINTS)
     back = contacts.back_force_ratio
     speed = velocity / contacts.break_stretch
     life = speed * _lives(config, threshold, speed)
@@ -114,21 +112,6 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
     force = start - (start * broken - moment) / mean
     steady = float(weight @ (back * life + life**2 / 2)) / mean
     return contacts.static_force * (steady + float(np.max(force)))
-
-
-def _thresholds(config: Config) -> tuple[Array, Array]:
-    """Weights and points of a quadrature over the configured thresholds, relative to the mean."""
-    contacts = config.contacts
-    law = ThresholdLaw(
-        contacts.threshold.law, contacts.threshold.relative_width, contacts.min_threshold
-    )
-    # Panels that a normal law would have of one width: narrow where a law is steep.
-    edges = law.quantile(special.ndtr(np.linspace(MAX_DEVIATE, -MAX_DEVIATE, PANELS + 1)))
-    point, share = np.polynomial.legendre.leggauss(POINTS)
-    half = np.diff(edges)[:, None] / 2
-    threshold = (edges[:-1, None] + half * (1 + point)).ravel()
-    weight = (half * share).ravel() * law.density(threshold)
-    return weight / np.sum(weight), threshold
 
 
 def _threshold(config: Config, configured: Array, age: float | Array) -> Array:

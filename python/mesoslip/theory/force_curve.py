@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,12 +22,13 @@ from scipy import optimize, special
 from scipy.interpolate import BPoly
 
 from mesoslip import _core
+from mesoslip.configuration.kernel_parameters import Parameters, named
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
-from mesoslip.simulation.kernel import checked, named
+from mesoslip.simulation.kernel import checked
 from mesoslip.theory.lives import law_parameters, scales
 from mesoslip.theory.sliders import loading_rate
 
@@ -114,9 +115,7 @@ def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
     return BPoly(np.linalg.solve(bernstein, values), edges, extrapolate=False)
 
 
-def _solve(
-    parameters: Mapping[str, float | str], start: float, width: float, panels: int
-) -> _Solution:
+def _solve(parameters: Parameters, start: float, width: float, panels: int) -> _Solution:
     point, breaks, slope, force, stiffness, pinned, mismatch = checked(
         _core.force_curve(*named(parameters), start, width, panels, POINTS)
     )
@@ -467,9 +466,7 @@ class ForceCurve:
         The integral of the density and the fraction add up to 1.
         """
         contacts = self.config.contacts
-        law = ThresholdLaw(
-            contacts.threshold.law, contacts.threshold.relative_width, contacts.back_force_ratio
-        )
+        law = contacts.threshold.above(contacts.back_force_ratio)
         unit = self._stretch
         x = np.atleast_1d(np.asarray(stretch, dtype=float)) / unit
         moved = displacement / unit

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from mesoslip import _core
-from mesoslip.simulation.kernel import checked, named
+from mesoslip.configuration.kernel_parameters import Parameters, named
+from mesoslip.simulation.kernel import checked
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -25,7 +26,7 @@ class Scales(NamedTuple):
     mean_mass: float
 
 
-def law_parameters(config: Config, newborn_width: float = 0.0) -> dict[str, float | str]:
+def law_parameters(config: Config, newborn_width: float = 0.0) -> Parameters:
     """Contact parameters for the kernels of the master equation; ``newborn_width`` in m."""
     contacts = config.contacts
     return {

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.configuration.threshold_law import ThresholdLaw
+from mesoslip.configuration.threshold_laws import LAWS
+from mesoslip.configuration.threshold_laws.table import law_cells
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import with_unit
 from mesoslip.theory.sliders import dynamic_stiffness
@@ -165,44 +167,81 @@ class SteadySliding:
         self._drag = contacts.count * contacts.contact_drag if self.delay > 0 else 0.0
 
     @cached_property
+    def _law(self) -> ThresholdLaw:
+        """The threshold law; of another width than samples have, a lognormal one."""
+        threshold, minimum = self.config.contacts.threshold, self.config.contacts.min_threshold
+        if self.relative_width == threshold.relative_width:
+            return threshold.above(minimum)
+        name = "lognormal" if threshold.kind.is_sampled else threshold.law
+        return ThresholdLaw(name, self.relative_width, minimum)
+
+    @cached_property
     def _panels(self) -> tuple[Array, float, Array]:
         """Middles of the panels, half their width, and coefficients (panels, points, averages) of
         Legendre polynomials for density, stiffness, force at breaking and mass."""
-        contacts = self.config.contacts
-        back = contacts.back_force_ratio
-        law = ThresholdLaw(contacts.threshold.law, self.relative_width, contacts.min_threshold)
-        is_scaled = contacts.coupling == "scaled"
-        weakest, strongest = law.quantile([1 - LEFT_OUT, LEFT_OUT])
-
-        def life(threshold: float) -> float:
-            return (
-                math.sqrt(threshold) - back / math.sqrt(threshold)
-                if is_scaled
-                else (threshold - back)
-            )
-
-        edges = np.linspace(life(float(weakest)), life(float(strongest)), PANELS + 1)
+        first, last = self._life(self._law.quantile([1 - LEFT_OUT, LEFT_OUT]))
+        edges = np.linspace(first, last, PANELS + 1)
         half = (edges[1] - edges[0]) / 2
-        point, weight = np.polynomial.legendre.leggauss(POINTS)
         middle = (edges[1:] + edges[:-1]) / 2
+        if LAWS[self._law.law].is_sampled:
+            return middle, half, self._projected(edges)
+        point, weight = np.polynomial.legendre.leggauss(POINTS)
         lives = middle[:, None] + half * point
-        if is_scaled:
-            root = (lives + np.sqrt(lives**2 + 4 * back)) / 2
-            threshold, stretch, stiffness, mass = root**2, root, root, root**2
-            # du/dl, as l = u^(1/2) - b u^(-1/2).
-            density = law.density(threshold) * 2 * root / (1 + back / root**2)
-        else:
-            threshold = stretch = lives + back
-            stiffness = mass = np.ones_like(lives)
-            density = law.density(threshold)
+        density, averaged = self._at_lives(lives)
         density /= half * np.sum(density * weight)
-        values = density[:, :, None] * np.stack(
-            [np.ones_like(lives), stiffness, stiffness * stretch, mass], axis=-1
-        )
+        values = density[:, :, None] * averaged
         legendre = np.polynomial.legendre.legvander(point, POINTS - 1).T
         order = (np.arange(POINTS) + 0.5)[:, None]
         coefficients = np.einsum("nj,pja->pna", order * legendre * weight, values)
         return middle, half, half * coefficients
+
+    def _life(self, threshold: Array) -> Array:
+        """Life x_s - x_b of contacts of a threshold."""
+        contacts = self.config.contacts
+        back = contacts.back_force_ratio
+        if contacts.coupling == "equal":
+            return threshold - back
+        return np.sqrt(threshold) - back / np.sqrt(threshold)
+
+    def _at_lives(self, lives: Array) -> tuple[Array, Array]:
+        """Density of lives, and 1, stiffness, force at breaking and mass of contacts of a life."""
+        contacts = self.config.contacts
+        back = contacts.back_force_ratio
+        if contacts.coupling == "scaled":
+            root = (lives + np.sqrt(lives**2 + 4 * back)) / 2
+            threshold, stretch, stiffness, mass = root**2, root, root, root**2
+            # du/dl, as l = u^(1/2) - b u^(-1/2).
+            density = self._law.density(threshold) * 2 * root / (1 + back / root**2)
+        else:
+            threshold = stretch = lives + back
+            stiffness = mass = np.ones_like(lives)
+            density = self._law.density(threshold)
+        return density, np.stack(
+            [np.ones_like(lives), stiffness, stiffness * stretch, mass], axis=-1
+        )
+
+    def _projected(self, edges: Array) -> Array:
+        """Coefficients of panels for a law whose density is constant in cells: integrals over the
+        parts of cells in each panel."""
+        law = self._law
+        assert law.samples is not None
+        cells = self._life(law_cells(law.samples, law.weights).edges[1:])
+        ends = np.unique(np.clip(np.concatenate([edges, cells]), edges[0], edges[-1]))
+        point, weight = np.polynomial.legendre.leggauss(POINTS)
+        half = np.diff(ends)[:, None] / 2
+        lives = ends[:-1, None] + half * (1 + point)
+        density, averaged = self._at_lives(lives)
+        share = density * half * weight
+        share /= np.sum(share)
+        panel = np.clip(np.searchsorted(edges, lives[:, 0], "right") - 1, 0, PANELS - 1)
+        width = edges[1] - edges[0]
+        place = 2 * (lives - edges[panel][:, None]) / width - 1
+        legendre = np.polynomial.legendre.legvander(place, POINTS - 1)
+        order = np.arange(POINTS) + 0.5
+        parts = np.einsum("pj,pjn,pja->pna", share, order * legendre, averaged)
+        coefficients = np.zeros((PANELS, *parts.shape[1:]))
+        np.add.at(coefficients, panel, parts)
+        return coefficients
 
     @cached_property
     def lives(self) -> Lives:

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
-from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import MesoslipError
+from mesoslip.theory.thresholds import threshold_quadrature
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -27,7 +26,6 @@ Array = NDArray[np.float64]
 # Panels and points of the quadrature over the thresholds, and the normal deviate that has the
 # probability of its limits.
 PANELS, POINTS = 60, 10
-MAX_DEVIATE = 8.0
 # Hazards between which stretches have a quadrature: below, all contacts survive, above, none.
 MIN_HAZARD, MAX_HAZARD = 1e-17, 40.0
 # Exponents whose exponential functions are numbers.
@@ -154,7 +152,7 @@ def _lives(config: Config, velocity: float, min_hazard: float = MIN_HAZARD) -> _
     contacts, thermal = config.contacts, config.contacts.thermal
     assert thermal is not None
     back, scale = contacts.back_force_ratio, thermal.ratio(contacts.contact_static_force)
-    share, threshold = _thresholds(config)
+    share, threshold = threshold_quadrature(config, PANELS, POINTS)
     log_reach = np.log(thermal.rate * scale * contacts.break_stretch / velocity)
     # Logarithm of the hazard over e^((x - x_b)/f_T) - 1.
     log_first = log_reach + (back - threshold) / scale
@@ -176,18 +174,3 @@ def _lives(config: Config, velocity: float, min_hazard: float = MIN_HAZARD) -> _
         hazard=np.exp(np.minimum(log_hazard, MAX_EXPONENT)),
         log_rate=(stretch - threshold[:, None]) / scale,
     )
-
-
-def _thresholds(config: Config) -> tuple[Array, Array]:
-    """Weights and points of a quadrature over the thresholds, relative to their mean."""
-    contacts = config.contacts
-    law = ThresholdLaw(
-        contacts.threshold.law, contacts.threshold.relative_width, contacts.min_threshold
-    )
-    # Panels that a normal law would have of one width: narrow where a law is steep.
-    edges = law.quantile(special.ndtr(np.linspace(MAX_DEVIATE, -MAX_DEVIATE, PANELS + 1)))
-    point, share = np.polynomial.legendre.leggauss(POINTS)
-    half = np.diff(edges)[:, None] / 2
-    threshold = (edges[:-1, None] + half * (1 + point)).ravel()
-    weight = (half * share).ravel() * law.density(threshold)
-    return weight / np.sum(weight), threshold

@@ -13,6 +13,7 @@ from mesoslip.configuration.contacts.tables import (
     Interaction,
     Thermal,
 )
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
 
@@ -25,7 +26,7 @@ def thermal_of(config: Setting) -> Thermal:
     return config.contacts.thermal
 
 
-def thermal_parameters(config: Setting) -> dict[str, float | str]:
+def thermal_parameters(config: Setting) -> Parameters:
     """Parameters of activation in the kernel."""
     thermal, force = thermal_of(config), config.contacts.contact_static_force
     return {"activation_rate": thermal.rate, "activation_force": thermal.ratio(force) * force}
@@ -72,7 +73,7 @@ class ActivatedContacts(ContactKind):
     def bytes_per_contact(self) -> int:
         return 260 if self.on_lattice else 150
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         columns = rows = 0
         if self.interaction is not None:
             columns, rows = self.interaction.columns, self.interaction.rows
@@ -99,7 +100,7 @@ class ActivatedAgeingContacts(ActivatedContacts):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
         return super().is_meant(run, contacts, interaction) and contacts.ageing is not None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
 
     def problems(self, config: Setting) -> Complaints:

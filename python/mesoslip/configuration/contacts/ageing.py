@@ -7,6 +7,7 @@ from typing import ClassVar
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables import Ageing, Contacts, Interaction
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
 
@@ -54,7 +55,7 @@ class AgeingContacts(ContactKind):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
         return run.engine == "eq" and contacts.ageing is not None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         return (
             common_parameters(config)
             | ageing_of(config).kernel_parameters()
@@ -74,7 +75,7 @@ class AgeingPopulations(PopulationContacts):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
         return run.engine == "me" and contacts.ageing is not None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
 
     def problems(self, config: Setting) -> Complaints:

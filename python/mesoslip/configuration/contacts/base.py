@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -85,14 +86,14 @@ class ContactKind(ABC):
         return self.interaction is not None
 
     @abstractmethod
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         """Parameters of the contacts in the kernel, in SI; forces and stiffness of one contact."""
 
     def coarse_parameters(
         self,
         config: Setting,  # noqa: ARG002
         coarsening: float,  # noqa: ARG002
-    ) -> dict[str, float | str] | None:
+    ) -> Parameters | None:
         """The same with longer steps; None where the numbers of a run do not depend on steps."""
         return None
 
@@ -101,7 +102,7 @@ class ContactKind(ABC):
         """The combinations that this kind refuses."""
 
 
-def common_parameters(config: Setting) -> dict[str, float | str]:
+def common_parameters(config: Setting) -> Parameters:
     """Parameters that contacts of all kinds have in the kernel."""
     contacts = config.contacts
     ignores_delay = config.slider.ignores_delay

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -25,7 +26,7 @@ class EnsembleContacts(ContactKind):
     def bytes_per_contact(self) -> int:
         return 260 if self.on_lattice else 150
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         columns = rows = 0
         if self.interaction is not None:
             columns, rows = self.interaction.columns, self.interaction.rows

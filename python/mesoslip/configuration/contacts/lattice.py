@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaints
 from mesoslip.configuration.tables import Run
 
@@ -24,7 +25,7 @@ class LatticeContacts(ContactKind):
             return False
         return run.engine == "eq" and interaction is not None and interaction.strength > 0
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         return common_parameters(config) | {
             "bond": self.interaction.bond_stiffness(config.contacts),
             "lattice": self.interaction.lattice,

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
 
@@ -30,10 +31,10 @@ class PopulationContacts(ContactKind):
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
         return run.engine == "me" and contacts.ageing is None
 
-    def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
+    def kernel_parameters(self, config: Setting) -> Parameters:
         return common_parameters(config) | {"resolution": config.run.resolution}
 
-    def coarse_parameters(self, config: Setting, coarsening: float) -> dict[str, float | str]:
+    def coarse_parameters(self, config: Setting, coarsening: float) -> Parameters:
         return self.kernel_parameters(config) | {"resolution": coarsening * config.run.resolution}
 
     def problems(self, config: Setting) -> Complaints:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Self
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, StrictBool, model_validator
 
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import (
     Area,
     Complaint,
@@ -21,6 +24,7 @@ from mesoslip.configuration.table import (
     Stiffness,
     Table,
     Temperature,
+    Text,
     Time,
     Whole,
     choice,
@@ -29,6 +33,8 @@ from mesoslip.configuration.table import (
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
+from mesoslip.configuration.threshold_laws.table import law_cells, read_samples, sample_problem
+from mesoslip.errors import FileError
 
 Array = NDArray[np.float64]
 
@@ -65,9 +71,54 @@ class Threshold(Table):
     """Law of the relative thresholds, f_si/f_s: its mean is 1."""
 
     law: Annotated[str, choice(LAWS)] = "gaussian"
-    """Law of the relative thresholds, whose mean is 1."""
+    """Law of the relative thresholds, whose mean is 1; `table` is that of samples, such as measured
+    areas of contacts."""
     relative_width: Annotated[Number, Field(gt=0)]
-    """Standard deviation of the relative thresholds, Δf_s/f_s."""
+    """Standard deviation of the relative thresholds, Δf_s/f_s. That of a table follows from its
+    samples; leave it out."""
+    file: Text | None = None
+    """With `table`: a CSV file with a column threshold or area, and maybe a column weight; relative
+    to the configuration. Outputs keep the samples, not the name of the file."""
+    samples: tuple[Number, ...] | None = None
+    """With `table`: samples of the thresholds, instead of a file. Only their ratios matter."""
+    weights: tuple[Number, ...] | None = None
+    """Weights of the samples; by default they are equal."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping):
+            return values
+        table = {key: one for key, one in values.items() if one is not None}
+        if table.get("law") != "table":
+            return values
+        if isinstance(table.get("file"), str):
+            if table.keys() & {"samples", "weights"}:
+                raise problem("file", "give either a file, or samples and weights")
+            try:
+                table.update(read_samples(Path(table.pop("file"))))
+            except FileError as error:
+                raise problem("file", str(error)) from None
+        # Where samples are wrong, their error is reported, not that of the width.
+        table.setdefault("relative_width", _width_of(table.get("samples"), table.get("weights")))
+        return table
+
+    @model_validator(mode="after")
+    def _samples_of_a_table(self) -> Self:
+        if not self.kind.is_sampled:
+            for key in ("file", "samples", "weights"):
+                if getattr(self, key) is not None:
+                    raise problem(key, f'is for law = "table", not "{self.law}"')
+            return self
+        if self.samples is None:
+            raise problem("file", 'needed for law = "table", or samples')
+        key, message = sample_problem(self.samples, self.weights)
+        if key:
+            raise problem(key, message)
+        width = law_cells(self.samples, self.weights).relative_width
+        if not math.isclose(width, self.relative_width, rel_tol=1e-6):
+            raise problem("relative_width", f"follows from the samples, {width:.6g}: leave it out")
+        return self
 
     @model_validator(mode="after")
     def _width_that_is_possible(self) -> Self:
@@ -82,15 +133,31 @@ class Threshold(Table):
         return LAWS[self.law]
 
     @property
-    def kernel_parameters(self) -> dict[str, float | str]:
+    def kernel_parameters(self) -> Parameters:
         """Parameters of the law in the kernel."""
         return {"threshold_law": self.law, **self.kind.kernel_parameters(self)}
 
     def probability_above(self, threshold: float) -> float:
         """Probability that a draw is above a relative threshold."""
         # Not a law cut off there, which does not exist if the probability is 0.
-        law = ThresholdLaw(self.law, self.relative_width)
+        law = self.above(0.0)
         return law.acceptance * float(law.survival(threshold))
+
+    def above(self, minimum: float) -> ThresholdLaw:
+        """The law, with thresholds at or below a minimum rejected."""
+        return ThresholdLaw(self.law, self.relative_width, minimum, self.samples, self.weights)
+
+
+def _width_of(samples: Any, weights: Any) -> float:
+    """Relative width of samples that are still to be checked; 1 if they are wrong."""
+    try:
+        values = tuple(float(one) for one in samples)
+        shares = None if weights is None else tuple(float(one) for one in weights)
+        if sample_problem(values, shares)[0]:
+            return 1.0
+        return law_cells(values, shares).relative_width
+    except (TypeError, ValueError, OverflowError):
+        return 1.0
 
 
 class Ageing(Table):
@@ -132,7 +199,7 @@ class Ageing(Table):
             return self.initial_age
         return INFINITE_AGE if self.law == "relax" else 0.0
 
-    def kernel_parameters(self) -> dict[str, float | str]:
+    def kernel_parameters(self) -> Parameters:
         """Parameters of the law in the kernel."""
         return {
             "ageing": self.law,

@@ -10,9 +10,10 @@ from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
 from mesoslip.configuration.threshold_laws.exponential import EXPONENTIAL
 from mesoslip.configuration.threshold_laws.gaussian import GAUSSIAN
 from mesoslip.configuration.threshold_laws.lognormal import LOGNORMAL
+from mesoslip.configuration.threshold_laws.table import TABLE
 from mesoslip.configuration.threshold_laws.uniform import UNIFORM
 from mesoslip.configuration.threshold_laws.weibull import WEIBULL
 
 LAWS: dict[str, ThresholdLawKind] = {
-    law.name: law for law in (GAUSSIAN, UNIFORM, LOGNORMAL, WEIBULL, EXPONENTIAL)
+    law.name: law for law in (GAUSSIAN, UNIFORM, LOGNORMAL, WEIBULL, EXPONENTIAL, TABLE)
 }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from mesoslip.configuration.kernel_parameters import Parameters
+
 # Maximum relative width at which the kernels can compute quantiles.
 MAX_WIDTH = 20.0
 # Minimum relative width: below it double precision does not resolve the shape of the law.
@@ -16,6 +18,10 @@ class Keys(Protocol):
 
     @property
     def relative_width(self) -> float: ...
+    @property
+    def samples(self) -> tuple[float, ...] | None: ...
+    @property
+    def weights(self) -> tuple[float, ...] | None: ...
 
 
 @dataclass(frozen=True)
@@ -32,12 +38,15 @@ class ThresholdLawKind:
         Why a larger one is wrong, as the end of a message.
     jumps
         Ends of the law's support at which its density is not continuous.
+    is_sampled
+        Whether it is made of samples, not of a width.
     """
 
     name: str
     max_width: float = MAX_WIDTH
     if_wider: str = ""
     jumps: Literal["none", "lower", "both"] = "none"
+    is_sampled: bool = False
 
     def width_problem(self, width: float) -> str:
         """The error of a relative width; empty if it is possible."""
@@ -48,6 +57,6 @@ class ThresholdLawKind:
             return f"must be at most {self.max_width:.4g} for the {self.name} law{self.if_wider}"
         return ""
 
-    def kernel_parameters(self, keys: Keys) -> dict[str, float]:
+    def kernel_parameters(self, keys: Keys) -> Parameters:
         """Parameters of the law in the kernel."""
         return {"relative_width": keys.relative_width}

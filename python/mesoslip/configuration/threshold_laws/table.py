@@ -1,0 +1,181 @@
+"""The law of a table of thresholds, such as those of the measured areas of contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.configuration.columns import HEADER, Cells, FoundColumn, cells_of, values_of
+from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.reading import text_of
+from mesoslip.configuration.threshold_laws.base import Keys, ThresholdLawKind
+from mesoslip.errors import FileError
+
+# Names of the columns; a threshold is proportional to the area of its contact.
+SAMPLE_COLUMNS = ("threshold", "area")
+WEIGHT_COLUMN = "weight"
+STIFFNESS_COLUMN = "stiffness"
+# Maximum number of samples, and of the cells of a law in the kernels.
+MAX_SAMPLES, MAX_CELLS = 100_000, 4000
+WANTED = "the header must name a column threshold or area, and may name a column weight"
+
+
+class LawCells(NamedTuple):
+    """Cells of thresholds in each of which the density is constant; the mean is 1."""
+
+    edges: NDArray[np.float64]
+    """Edges, ascending, shape (cells + 1)."""
+    weights: NDArray[np.float64]
+    """Probability of each cell, shape (cells)."""
+
+    @property
+    def relative_width(self) -> float:
+        """Standard deviation of the thresholds."""
+        low, high = self.edges[:-1], self.edges[1:]
+        square = float(np.sum(self.weights * (low**2 + low * high + high**2)) / 3)
+        return math.sqrt(max(0.0, square - 1))
+
+
+def sample_problem(samples: Sequence[float], weights: Sequence[float] | None) -> tuple[str, str]:
+    """The key and the error of samples; empty if they make a law.
+
+    Parameters
+    ----------
+    samples
+        Thresholds, in any unit.
+    weights
+        Weights of the samples; None for equal ones.
+    """
+    if len(samples) > MAX_SAMPLES:
+        return "samples", f"must have at most {MAX_SAMPLES} values (has {len(samples)})"
+    wrong = [one for one in samples if not one > 0]
+    if wrong:
+        return "samples", f"must be positive: a threshold is {wrong[0]:g}"
+    if weights is not None:
+        if len(weights) != len(samples):
+            return "weights", f"must have as many values as samples, {len(samples)}"
+        wrong = [one for one in weights if one < 0]
+        if wrong:
+            return "weights", f"must not be negative: one is {wrong[0]:g}"
+        if samples and not any(weights):
+            return "weights", "must not all be 0"
+    used = {
+        one for one, weight in zip(samples, weights or [1] * len(samples), strict=True) if weight
+    }
+    if len(used) < 2:
+        return "samples", (
+            f"must have at least two different values with a weight (has {len(used)}); contacts of "
+            "one threshold have a narrow law of another kind"
+        )
+    return "", ""
+
+
+@lru_cache(maxsize=8)
+def law_cells(samples: tuple[float, ...], weights: tuple[float, ...] | None) -> LawCells:
+    """The law of samples: each has a cell around it, with its weight.
+
+    A cell reaches half-way to the samples beside it, and as far on the other side at the ends, but
+    not below 0. Equal samples share a cell, and so do neighbours if there are more than `MAX_CELLS`
+    different ones. The mean of the law is 1, whatever the unit of the
+    samples.
+    """
+    value, place = np.unique(np.array(samples), return_inverse=True)
+    shares = np.ones(len(samples)) if weights is None else np.array(weights)
+    weight = np.bincount(place, shares).astype(np.float64)
+    value, weight = value[weight > 0], weight[weight > 0]
+    if len(value) > MAX_CELLS:
+        middle_share = (np.cumsum(weight) - weight / 2) / np.sum(weight)
+        group = np.unique((MAX_CELLS * middle_share).astype(int), return_inverse=True)[1]
+        total = np.bincount(group, weight)
+        value = (np.bincount(group, weight * value) / total).astype(np.float64)
+        weight = total.astype(np.float64)
+    middle = value[:-1] + np.diff(value) / 2
+    first = max(0.0, 2 * value[0] - middle[0])
+    edges = np.concatenate([[first], middle, [2 * value[-1] - middle[-1]]])
+    weight = weight / np.sum(weight)
+    mean = np.sum(weight * (edges[1:] + edges[:-1]) / 2)
+    return LawCells(edges / mean, weight)
+
+
+class TableLaw(ThresholdLawKind):
+    """The law of samples; its width is theirs."""
+
+    def kernel_parameters(self, keys: Keys) -> Parameters:
+        """Cells of the law, see `law_cells`."""
+        cells = law_cells(keys.samples or (), keys.weights)
+        return {
+            "threshold_edges": tuple(cells.edges.tolist()),
+            "threshold_weights": tuple(cells.weights.tolist()),
+        }
+
+
+TABLE = TableLaw("table", jumps="lower", is_sampled=True)
+
+
+def read_samples(path: Path) -> dict[str, list[float]]:
+    """Samples and weights of a file.
+
+    Parameters
+    ----------
+    path
+        A table, see `mesoslip.configuration.columns`. Its header names a column ``threshold`` or
+        ``area``, in any unit, and maybe a column ``weight``; others are not read.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read or is not such a table; the message names the line and the fix.
+    """
+    cells = cells_of(text_of(path, "a table of thresholds"), str(path))
+    columns = _columns(cells)
+    found = [name for name in SAMPLE_COLUMNS if name in columns]
+    if not found:
+        raise FileError(f"{path}: there is no column threshold or area; {WANTED}")
+    if len(found) > 1:
+        raise FileError(f"{path}: has a column threshold and a column area; remove one of them")
+    if STIFFNESS_COLUMN in columns:
+        raise FileError(
+            f"{path}: has a column stiffness, which is not used: contacts.coupling gives the "
+            'stiffness ("scaled": as the root of the threshold; "equal"); remove the column'
+        )
+    if len(cells.lines) < 2:
+        raise FileError(f"{path}: must have at least two rows of numbers (has {len(cells.lines)})")
+    wanted = {
+        name: FoundColumn(columns[name], 1.0) for name in (*found, WEIGHT_COLUMN) if name in columns
+    }
+    values = values_of(cells, cells.first, wanted)
+    for (line, _), one in zip(cells.lines, values[found[0]], strict=True):
+        if not one > 0:
+            raise FileError(f"{path}: line {line}: the {found[0]} must be positive (is {one:g})")
+    for (line, _), one in zip(cells.lines, values.get(WEIGHT_COLUMN, []), strict=False):
+        if one < 0:
+            raise FileError(f"{path}: line {line}: the weight must not be negative (is {one:g})")
+    key, message = sample_problem(values[found[0]], values.get(WEIGHT_COLUMN))
+    if key:
+        column = WEIGHT_COLUMN if key == "weights" else found[0]
+        raise FileError(f"{path}: the column {column} {message}")
+    read = {"samples": values[found[0]]}
+    if WEIGHT_COLUMN in values:
+        read["weights"] = values[WEIGHT_COLUMN]
+    return read
+
+
+def _columns(cells: Cells) -> dict[str, int]:
+    """Places of the columns by name; units do not matter, as only ratios of thresholds do."""
+    if not cells.has_header:
+        raise FileError(f"{cells.source}: there is no header; {WANTED}")
+    columns: dict[str, int] = {}
+    for place, header in enumerate(cells.first):
+        match = HEADER.fullmatch(header)
+        name = "" if match is None else match["name"].strip().lower()
+        if name in columns:
+            raise FileError(f"{cells.source}: has two columns {name}")
+        if name in {*SAMPLE_COLUMNS, WEIGHT_COLUMN, STIFFNESS_COLUMN}:
+            columns[name] = place
+    return columns

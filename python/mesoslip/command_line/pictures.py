@@ -49,7 +49,7 @@ def plot(
         typer.Option(
             "-o",
             "--output",
-            help="Picture, beside the first output by default; .gif: a movie of the lattice",
+            help="Picture, beside the first output by default; .gif, .mp4: a movie",
             metavar="FIG",
         ),
     ] = None,

@@ -14,11 +14,14 @@ from mesoslip.configuration import differences
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.kinds import KINDS, kind_of, kind_of_all
+from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, legend_above, styled
 from mesoslip.plots.views import VIEWS, view_of
 from mesoslip.plots.views.base import Options, View
 
 NO_OPTIONS = Options()
+# Views of which a movie is made without a view, the first that an output has.
+MOVIES = ("lattice", "layers")
 
 
 class Picture(NamedTuple):
@@ -59,6 +62,36 @@ def comparison(
             legend_above(axes, columns=1)
 
     return Picture(lambda figure: compare(trees, labels, options, figure), panel)
+
+
+def movie_of(tree: xr.DataTree, name: str | None = None, options: Options = NO_OPTIONS) -> Movie:
+    """The movie of a view of an output, by default of the first one that it has.
+
+    Raises
+    ------
+    FileError
+        If the view has no movie, or the output lacks its data.
+    ConfigError
+        If there is no such view, or it does not have one of the options.
+    """
+    if name is not None:
+        chosen, options = _chosen(tree, name, options)
+        if chosen.movie is None:
+            names = [one.name for one in VIEWS if one.movie and one.kind == chosen.kind]
+            others = f"; {', '.join(names)} have one" if names else ""
+            raise FileError(f"the view {chosen.name!r} has no movie{others}")
+        return chosen.movie(tree, options)
+    reasons = []
+    for one in MOVIES:
+        view = next(
+            (each for each in VIEWS if each.name == one and each.kind == kind_of(tree)), None
+        )
+        if view is not None and view.movie is not None:
+            try:
+                return view_of(tree, one, options).movie(tree, options)  # type: ignore[misc]
+            except FileError as error:
+                reasons.append(f"no movie of the {one}: {error}")
+    raise FileError("\n".join(reasons or [f"{KINDS[kind_of(tree)].description} has no movie"]))
 
 
 def _chosen(tree: xr.DataTree, name: str | None, options: Options) -> tuple[View, Options]:

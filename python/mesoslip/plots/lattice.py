@@ -61,8 +61,9 @@ def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
     """
     if "snapshots" not in tree.children:
         raise FileError(
-            "the output has no snapshots of the lattice; they are recorded with output.snapshots "
-            "(at times) or output.snapshot_size (after avalanches of at least that size)"
+            "the output has no snapshots of its contacts; they are recorded with [interaction] and "
+            "output.snapshots (times) or output.snapshot_size (a minimum size of avalanches); with "
+            "interaction.strength = 0 the motion is that without [interaction]"
         )
     data = group_of(tree, "snapshots")
     count = data.sizes["snapshot"]

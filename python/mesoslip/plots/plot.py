@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.inputs import OutputLike, opened, several
-from mesoslip.plots.animation import animate
-from mesoslip.plots.draw import draw
+from mesoslip.plots.draw import draw, movie_of
 from mesoslip.plots.extent import Extent
+from mesoslip.plots.movie import ENDINGS, write
 from mesoslip.plots.printing import Print, finish, printed
 from mesoslip.plots.style import save, styled
 from mesoslip.plots.views.base import Options
@@ -53,11 +53,12 @@ def plot(
     output
         The output, or several.
     file
-        Where to save the picture; nowhere by default. If its name ends in ``.gif`` it is an
-        animation of the lattice: of the avalanche that spreads before a snapshot, or of all
-        snapshots.
+        Where to save the picture; nowhere by default. If its name ends in ``.gif`` or ``.mp4`` it
+        is a movie: of the views "layers", "contacts", or "lattice", which shows the avalanche that
+        spreads before a snapshot, or all snapshots. Without a view it is one that the output has.
     view
-        View of a run, such as "avalanches" for their sizes, "lattice" for a snapshot, "layers" for
+        View of a run, such as "avalanches" for their sizes, "lattice" and
+        "contacts" for a snapshot, "layers" for
         the waves in an elastic slider, "response" for steady forces, velocity steps and holds; or
         measure of a sweep.
     snapshot
@@ -120,14 +121,16 @@ def plot(
             kind = "a figure" if key == "figure" else "axes"
             raise ConfigError([Problem("", key, f"must be {kind} of matplotlib", value)])
     path = None if file is None else as_path(file)
-    is_animation = path is not None and path.suffix == ".gif"
-    if is_animation and (view not in {None, "lattice"} or len(outputs) > 1):
-        reason = "of one output" if len(outputs) > 1 else f"not the view {view!r}"
-        raise FileError(f"{path}: a .gif is an animation of the lattice, {reason}")
+    is_movie = path is not None and path.suffix.lower() in ENDINGS
+    if is_movie and len(outputs) > 1:
+        raise FileError(f"{path}: a movie is of one output")
     with ExitStack() as stack, printed(how):
         trees, names = opened(outputs, stack)
-        if path is not None and is_animation:
-            return animate(trees[0], path, snapshot)
+        if path is not None and is_movie:
+            with styled():
+                film = movie_of(trees[0], view, options)
+                write(film, path)
+            return film.figure
         drawn = draw(trees, names, view, options, figure=figure, axes=ax)
         if ax is None:
             with styled():

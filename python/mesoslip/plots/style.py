@@ -81,7 +81,7 @@ def titles(
     texts = [*headings(tree), about]
     lines = [filled(text, width, max_lines=2) for text in texts if text]
     lines += [mathematical] if mathematical else []
-    lines += [""] * _legend_rows(axes) if beside_legend else []
+    lines += [""] * legend_rows(axes) if beside_legend else []
     axes.set_title("\n".join(lines), loc="left")
 
 
@@ -153,7 +153,8 @@ def _legend_columns(axes: Axes, columns: int = 3) -> int:
     return 1
 
 
-def _legend_rows(axes: Axes) -> int:
+def legend_rows(axes: Axes) -> int:
+    """Rows of a legend above axes."""
     labels = axes.get_legend_handles_labels()[1]
     return -(-len(labels) // _legend_columns(axes))
 

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.plots.extent import EVERYTHING, Extent
+from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, canvas, shared_legend, styled
 
 # Options of a view of a trace.
@@ -74,6 +75,8 @@ class View:
         The same for several outputs with a label each; None if it shows one output only.
     applies
         Whether it is for an output, where views of one name are for different outputs of a kind.
+    movie
+        Makes a movie of an output; None if there is none.
     """
 
     name: str
@@ -85,6 +88,7 @@ class View:
     compare: Compare | None = None
     compare_panel: ComparePanel | None = None
     applies: Callable[[xr.DataTree], bool] = lambda _: True
+    movie: Callable[[xr.DataTree, Options], Movie] | None = None
 
 
 def single_panel(

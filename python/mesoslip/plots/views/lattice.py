@@ -6,6 +6,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.plots.lattice import chosen_snapshot, draw_generations, draw_load
+from mesoslip.plots.lattice_movie import lattice_movie
 from mesoslip.plots.style import Canvas, side_by_side, styled
 from mesoslip.plots.views.base import Options, View
 
@@ -31,8 +32,9 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 VIEW = View(
     name="lattice",
     kind="run",
-    summary="contacts on their lattice, at a snapshot",
+    summary="contacts on their lattice, at a snapshot; movie",
     draw=draw,
     panel=draw_panel,
     options=frozenset({"snapshot"}),
+    movie=lambda tree, options: lattice_movie(tree, options.snapshot),
 )

@@ -17,6 +17,7 @@ from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import max_size
+from mesoslip.plots.movie import Movie, chosen_frames, time_bar
 from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
@@ -105,11 +106,64 @@ def layer_motion(
     return times, np.diff(data.values, axis=0) / np.diff(times)[:, None]
 
 
+def movie(tree: xr.DataTree, options: Options) -> Movie:
+    """Displacement and velocity of each layer, above the forces over time."""
+    window = _window(tree, options.extent)
+    times, velocity = layer_motion(tree, options.extent, window)
+    middles = (times[1:] + times[:-1]) / 2
+    moved = np.cumsum(velocity * np.diff(times)[:, None], axis=0)
+    # Many frames where layers move against each other.
+    activity = np.abs(np.diff(moved, axis=0)).sum(axis=1)
+    frames = chosen_frames(middles, activity)
+    layers = np.arange(velocity.shape[1]) + 1
+    figure = canvas(None, (5.0, 4.2))
+    grid = figure.add_gridspec(2, 2, height_ratios=[2.4, 1])
+    panels = []
+    for column, (values, unit, name) in enumerate(
+        (
+            (moved, "m", "displacement"),
+            (velocity, "m/s", "velocity"),
+        )
+    ):
+        axes, scale = figure.add_subplot(grid[0, column]), scale_for(max_size(values), unit)
+        values = values / scale.size
+        (line,) = axes.plot(values[0], layers, ".-", color="black" if column else BLUE)
+        margin = 0.05 * max(float(np.ptp(values)), 1e-12)
+        axes.set_xlim(values.min() - margin, values.max() + margin)
+        axes.set_ylim(0.5, layers[-1] + 0.5)
+        axes.axvline(0, color="0.8", zorder=0)
+        axes.set_xlabel(scale.label(f"{name} of the layer"))
+        panels.append((line, values))
+    first = figure.axes[0]
+    first.set_ylabel("layer, 1 at the contacts")
+    below, horizontal = figure.add_subplot(grid[1, :]), time_since(window)
+    near = Extent(options.extent.first, *window)
+    curves = [
+        curve(tree, "contact_force", near, color="0.7", label="contact force"),
+        curve(tree, "elastic_force", near, color=BLUE, label="mean elastic force"),
+        curve(tree, "spring_force", near, **SPRING | {"label": "force at the drive"}),
+    ]
+    draw_curves(below, curves, "spring_force", horizontal, "force")
+    legend_above(below)
+    bar = time_bar(below)
+
+    def show(number: int) -> None:
+        index = frames[number]
+        for line, values in panels:
+            line.set_xdata(values[index])
+        time = middles[index] - window[0]
+        first.set_title(f"{time / horizontal.scale.size:.2f} {horizontal.scale.name}")
+        bar.set_xdata([time / horizontal.scale.size] * 2)
+
+    return Movie(figure, len(frames), show)  # type: ignore[arg-type]
+
+
 VIEW = View(
     name="layers",
     kind="run",
-    summary="waves in an elastic slider",
+    summary="waves in an elastic slider; movie",
     draw=draw,
     panel=draw_waves,
     options=frozenset({"realization", "start, end"}),
+    movie=movie,
 )

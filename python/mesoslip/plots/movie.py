@@ -1,0 +1,171 @@
+"""Movies: their frames, and the files of them."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from mesoslip.errors import FileError
+from mesoslip.output.targets import written_whole
+from mesoslip.plots.style import RED
+
+Array = NDArray[np.float64]
+
+ENDINGS = (".gif", ".mp4")
+MAX_FRAMES = 100
+# Time for which a frame is shown [s], and dots of a frame per inch.
+FRAME_SECONDS = 0.08
+DPI = 120
+# Share of the frames that are at equal intervals of time; the others are where there is motion.
+EVEN_SHARE = 0.3
+# Size of a .gif [bytes]; colours and magnifications that are tried until it is below.
+MAX_GIF_BYTES = 3_000_000
+GIF_FORMS = ((256, 1.0), (64, 1.0), (32, 1.0), (32, 0.75), (16, 0.5), (8, 0.35))
+# Frames from which the colours of a .gif are taken.
+SAMPLED_FRAMES = 8
+
+
+@dataclass(frozen=True)
+class Movie:
+    """A movie: a figure whose axes stay, the number of frames, and what shows one of them."""
+
+    figure: Figure
+    count: int
+    show: Callable[[int], None]
+
+    def frames(self) -> Iterator[NDArray[np.uint8]]:
+        """The frames, shape (height, width, 3)."""
+        self.figure.set_dpi(DPI)
+        canvas = FigureCanvasAgg(self.figure)
+        for number in range(self.count):
+            self.show(number)
+            canvas.draw()  # type: ignore[no-untyped-call]
+            # The layout of the first frame is that of all.
+            self.figure.set_layout_engine("none")
+            frame = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+            yield frame[..., :3].copy()
+
+
+def chosen_frames(times: Array, activity: Array, count: int = MAX_FRAMES) -> NDArray[np.intp]:
+    """Indices of samples that become frames: many where there is much motion.
+
+    Parameters
+    ----------
+    times
+        Times of the samples, shape (T).
+    activity
+        How much moves between them, of any unit, shape (T - 1).
+    count
+        Maximum number of frames.
+    """
+    if times.size <= count:
+        return np.arange(times.size)
+    moved = np.append(0.0, np.cumsum(activity))
+    place = (times - times[0]) / (times[-1] - times[0])
+    if moved[-1] > 0:
+        place = EVEN_SHARE * place + (1 - EVEN_SHARE) * moved / moved[-1]
+    wanted = np.linspace(0, place[-1], count)
+    return np.unique(np.searchsorted(place, wanted * (1 - 1e-12)).clip(max=times.size - 1))
+
+
+def time_bar(axes: Axes) -> Any:
+    """A line across axes over time that is moved from frame to frame."""
+    return axes.axvline(0, color=RED, linewidth=1.0)
+
+
+def write(movie: Movie, path: Path) -> None:
+    """Write a movie, a .gif or an .mp4.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written, or nothing here writes an .mp4.
+    """
+    if path.suffix.lower() == ".mp4":
+        program = _ffmpeg(path)
+        with written_whole(path) as part:
+            _write_mp4(movie, part, program)
+    else:
+        with written_whole(path) as part:
+            _write_gif(list(movie.frames()), part)
+
+
+def _write_gif(frames: list[NDArray[np.uint8]], path: Path) -> None:
+    """Write frames of one palette, with fewer colours and pixels as long as they take too much."""
+    chosen = np.unique(np.linspace(0, len(frames) - 1, SAMPLED_FRAMES).astype(int))
+    sample = Image.fromarray(np.concatenate([frames[one] for one in chosen]))
+    for colors, magnification in GIF_FORMS:
+        palette = sample.quantize(colors, method=Image.Quantize.MAXCOVERAGE)
+        images = []
+        for frame in frames:
+            image = Image.fromarray(frame)
+            if magnification < 1:
+                size = [round(magnification * one) for one in image.size]
+                image = image.resize((size[0], size[1]), Image.Resampling.LANCZOS)
+            images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+        duration = round(1000 * FRAME_SECONDS)
+        images[0].save(
+            path,
+            format="GIF",
+            save_all=True,
+            append_images=images[1:],
+            duration=duration,
+            loop=0,
+            optimize=True,
+        )
+        if path.stat().st_size <= MAX_GIF_BYTES:
+            return
+
+
+def _ffmpeg(path: Path) -> str:
+    """The program ffmpeg: that of imageio-ffmpeg, or one that is installed."""
+    try:
+        import imageio_ffmpeg
+
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        found = shutil.which("ffmpeg")
+    if found is None:
+        raise FileError(
+            f"{path}: an .mp4 needs ffmpeg, which pip install 'mesoslip[movie]' brings; a .gif "
+            "does not"
+        )
+    return found
+
+
+def _write_mp4(movie: Movie, path: Path, program: str) -> None:
+    process = None
+    for frame in movie.frames():
+        # The codec takes even sizes only.
+        height, width = (size - size % 2 for size in frame.shape[:2])
+        if process is None:
+            options = [
+                *("-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"),
+                *("-s", f"{width}x{height}", "-r", f"{1 / FRAME_SECONDS:g}", "-i", "-", "-an"),
+                *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"),
+                *("-movflags", "+faststart", str(path)),
+            ]
+            process = subprocess.Popen(
+                [program, *options], stdin=subprocess.PIPE, stderr=subprocess.PIPE
+            )
+        assert process.stdin is not None
+        try:
+            process.stdin.write(frame[:height, :width].tobytes())
+        except BrokenPipeError:
+            break
+    assert process is not None
+    _, errors = process.communicate()
+    if process.returncode:
+        text = errors.decode(errors="replace").strip() or f"ffmpeg: {process.returncode}"
+        raise RuntimeError(text)

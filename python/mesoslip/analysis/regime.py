@@ -29,7 +29,7 @@ from mesoslip.analysis.cycles import (
     variation,
 )
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
-from mesoslip.analysis.noise import noise_level
+from mesoslip.analysis.noise import noise_level, without_impulses
 from mesoslip.configuration.config import Config
 from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, opened_run
@@ -197,6 +197,8 @@ class Scales:
         Whether the slider moves as the drive, so that it neither sticks nor slips.
     has_velocity
         Whether the drive has a velocity with which that of the slider can be compared.
+    is_measured
+        Whether noise and drift may hide cycles and velocities: then slips are the cycles.
     """
 
     stage: _Stage
@@ -205,6 +207,7 @@ class Scales:
     renewal_displacement: float
     is_rigid: bool
     has_velocity: bool
+    is_measured: bool = False
 
     @classmethod
     def of_config(cls, config: Config, reached: float) -> Scales:
@@ -257,6 +260,7 @@ class Scales:
             0.0,
             math.isinf(apparatus.stiffness),
             math.isfinite(stage.velocity),
+            is_measured=True,
         )
 
 
@@ -334,6 +338,9 @@ def _window(
     time, force = time[inside], force[inside]
     if config is not None:
         return Scales.of_config(config, last_time), time, force, velocity
+    if "noise" in tree.children:
+        impulses = group_of(tree, "noise")["impulse_time"].values
+        force = without_impulses(time, force, impulses)
     time, force, velocity = _even(time, force, velocity)
     scales = Scales.of_measurement(apparatus, stage, force, noise_level(force))
     return scales, time, force, velocity
@@ -447,13 +454,18 @@ def classify(
     cycles = find_cycles(
         time, force, np.clip(force, low - excursion, high + excursion), TURNING * (high - low)
     )
-    is_large = drops >= TURNING * (high - low)
+    min_drop = TURNING * (high - low)
+    if scales.is_measured and drops.size:
+        # The strength may vary along the track by more than slips are deep.
+        min_drop = min(min_drop, TURNING * float(np.median(drops)))
+    is_large = drops >= min_drop
     slips = Cycles(np.diff(starts[is_large]), drops[is_large], cycles.peaks)
     # In the catalogue a slip and its rebounds are one, but oscillations without slips are missing;
     # a trace with few samples may miss slips. The more regular of the two descriptions counts,
     # unless it leaves out most cycles.
     has_most = len(slips.periods) >= max(MIN_CYCLES, len(cycles.periods) / MAX_PATTERN)
-    if has_most and not irregularity(slips.periods) >= irregularity(cycles.periods):
+    is_regular = not irregularity(slips.periods) >= irregularity(cycles.periods)
+    if (has_most and is_regular) or (scales.is_measured and len(slips.periods) >= MIN_CYCLES):
         cycles = slips
     change, error = trend(cycles.falls)
     moved = abs(stage.velocity) * (time[-1] - time[0])
@@ -479,7 +491,9 @@ def classify(
     }
     if not scales.has_velocity:
         moved = math.inf
-    elif np.isfinite(velocity).all():
+    elif np.isfinite(velocity).all() and not (
+        scales.is_measured and _scatter(velocity) > STICKING * abs(stage.velocity)
+    ):
         numbers |= {
             "fast_share": float(np.mean(velocity > abs(stage.velocity))),
             "stick_share": float(np.mean(velocity < STICKING * abs(stage.velocity))),
@@ -545,6 +559,11 @@ def _measured_stage(tree: xr.DataTree, apparatus: Apparatus, reached: float) -> 
 
 def _step(count: int) -> int:
     return max(1, -(-count // MAX_SAMPLES))
+
+
+def _scatter(values: Array) -> float:
+    """Median distance from the median, which slips do not change."""
+    return float(np.median(np.abs(values - np.median(values))))
 
 
 def _amplitude(force: Array) -> float:

@@ -77,7 +77,18 @@ def trace(
     noise: Annotated[
         str | None, _option("Standard deviation of the noise; estimated by default", "0.1 uN")
     ] = None,
+    min_fall: Annotated[
+        str | None, _option("Minimum fall of a slip; from the noise by default", "6 mN")
+    ] = None,
     period: Annotated[str | None, _option("Period of the setup, if it is known", "25 ms")] = None,
+    part: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Which part of a file whose clock starts again; the longest by default",
+            metavar="NUMBER",
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print what is understood, and write nothing")
     ] = False,
@@ -107,6 +118,8 @@ def trace(
         trend=trend,
         noise=noise,
         period=period,
+        part=part,
+        min_fall=min_fall,
     )
     for line in understood.report:
         typer.echo(line)

@@ -64,6 +64,7 @@ UNITS = {
     "hum": ("1/s",),
     "noise": ("N", "1"),
     "period": ("s",),
+    "min_fall": ("N", "1"),
 }
 Rate = Annotated[str, _quantity(*UNITS["rate"], example="1 kHz", minimum=0)]
 Time = Annotated[str, _quantity(*UNITS["start"], example="100 s")]
@@ -74,6 +75,7 @@ Stiffness = Annotated[str, _quantity(*UNITS["stiffness"], example="1002 N/m", mi
 Velocity = Annotated[str, _quantity(*UNITS["velocity"], example="42 um/s")]
 Frequency = Annotated[str, _quantity(*UNITS["hum"], example="50 Hz", minimum=0)]
 Noise = Annotated[str, _quantity(*UNITS["noise"], example="0.1 uN", minimum=0, is_open=False)]
+Fall = Annotated[str, _quantity(*UNITS["min_fall"], example="6 mN", minimum=0)]
 Period = Annotated[str, _quantity(*UNITS["period"], example="25 ms", minimum=0)]
 
 
@@ -167,6 +169,8 @@ class TraceDescription(Table):
     """Trend of the friction with displacement, taken off for rates and states."""
     noise: Noise | None = None
     """Standard deviation of the noise; estimated by default."""
+    min_fall: Fall | None = None
+    """Minimum fall of a slip; by default from the noise and the number of slips."""
     period: Period | None = None
     """Period of the setup, 2 pi (M/K)^1/2."""
 

@@ -156,9 +156,10 @@ def _check_units(record: Record, trace: TraceDescription, model: Config | None) 
     ConfigError
         If they are not.
     """
-    if record.is_friction and trace.is_in("noise", "N"):
-        message = "the file has friction coefficients: expected a number such as 0.001"
-        raise ConfigError([Problem("", "--noise", message, trace.noise)])
+    for name in ("noise", "min_fall"):
+        if record.is_friction and trace.is_in(name, "N"):
+            message = "the file has friction coefficients: expected a number such as 0.001"
+            raise ConfigError([Problem("", option_name(name), message, getattr(trace, name))])
     if record.is_friction and model is not None:
         message = "is for forces, and the file has friction coefficients: give --normal-force too"
         raise ConfigError([Problem("", "--config", message)])
@@ -182,6 +183,8 @@ def read_trace(
     config: ConfigLike | None = None,
     noise: str | float | None = None,
     period: str | float | None = None,
+    part: int | None = None,
+    min_fall: str | float | None = None,
 ) -> xr.DataTree:
     """Read a measured trace as the laboratory wrote it, as an output like that of a run.
 
@@ -219,6 +222,11 @@ def read_trace(
         Standard deviation of the noise, in the unit of the force; estimated by default.
     period
         Period of the setup [s]; by default that of the configuration, or an estimate.
+    part
+        Which part of a file whose clock starts again, from 1; by default the longest.
+    min_fall
+        Minimum fall of a slip, in the unit of the force; by default from the noise and the number
+        of slips.
 
     Returns
     -------
@@ -253,6 +261,8 @@ def read_trace(
             trend=trend,
             noise=noise,
             period=period,
+            part=part,
+            min_fall=min_fall,
         )
     )
 
@@ -273,8 +283,13 @@ def trace_of(understood: Understood) -> xr.DataTree:
     if velocity is not None and stiffness is not None and record.load_point is None:
         loading_rate = abs(velocity) * stiffness
     drive, velocity = _drive(record, velocity, config, stiffness)
-    displacement = _displacement(record, drive, stiffness)
     noise = understood.noise
+    displacement = _displacement(record, record.force, drive, stiffness)
+    smooth = displacement
+    if isinstance(noise, TraceNoise):
+        # Impulses and hum are no motion.
+        cleaned = noise.clean(record.time, record.force)
+        smooth = _displacement(record, cleaned, drive, stiffness)
     direction = -1.0 if velocity is not None and velocity < 0 else 1.0
     found = find_slips(
         record.time,
@@ -282,6 +297,7 @@ def trace_of(understood: Understood) -> xr.DataTree:
         noise=noise,
         period=period,
         direction=direction,
+        min_fall=trace.si("min_fall"),
         loading_rate=loading_rate,
     )
     level = noise.deviation if isinstance(noise, TraceNoise) else noise
@@ -302,6 +318,7 @@ def trace_of(understood: Understood) -> xr.DataTree:
         understood,
         drive,
         displacement,
+        None if smooth is None else _velocity(record.time, smooth, found.period),
         found,
         velocity,
         attributes,
@@ -377,18 +394,22 @@ def _drive_displacement(config: Config, time: Array) -> Array:
     return displacement
 
 
-def _displacement(record: Record, drive: Array | None, stiffness: float | None) -> Array | None:
+def _displacement(
+    record: Record, force: Array, drive: Array | None, stiffness: float | None
+) -> Array | None:
+    """Displacement of the slider [m]: recorded, or from the stretch of the spring; or unknown."""
     if record.displacement is not None:
         return record.displacement
     if drive is None or stiffness is None or not 0 < stiffness < math.inf:
         return None
-    return drive - record.force / stiffness
+    return drive - force / stiffness
 
 
 def _tree(
     understood: Understood,
     drive: Array | None,
     displacement: Array | None,
+    speed: Array | None,
     found: FoundSlips,
     velocity: float | None,
     attributes: dict[str, Any],
@@ -397,13 +418,10 @@ def _tree(
 
     record = understood.record
     unit = "1" if record.is_friction else "N"
-    velocities = None
-    if displacement is not None:
-        velocities = _velocity(record.time, displacement, found.period)
     traces = {
         "drive_displacement": drive,
         "displacement": displacement,
-        "velocity": velocities,
+        "velocity": speed,
         record.force_name: record.force,
         "normal_force": record.normal_force,
         "normal_stress": record.normal_stress,

@@ -1,6 +1,6 @@
 """The noise of a measured trace: what it consists of, what can be taken off, and its errors."""
 
-from mesoslip.analysis.noise.estimate import TraceNoise, estimate_noise
+from mesoslip.analysis.noise.estimate import TraceNoise, estimate_noise, without_impulses
 from mesoslip.analysis.noise.hum import HumLine
 from mesoslip.analysis.noise.levels import digital_step_of, noise_level
 from mesoslip.analysis.noise.parts import Part, parts_of
@@ -13,4 +13,5 @@ __all__ = [
     "estimate_noise",
     "noise_level",
     "parts_of",
+    "without_impulses",
 ]

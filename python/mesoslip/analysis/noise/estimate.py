@@ -91,8 +91,6 @@ class TraceNoise:
         time
             Times of the trace, or of a part of it [s].
         """
-        if self.impulse_time.size == 0:
-            return np.zeros(len(time), dtype=bool)
         return np.isin(time, self.impulse_time)
 
     def clean(self, time: Array, force: Array) -> Array:
@@ -106,10 +104,7 @@ class TraceNoise:
         cleaned = force.astype(float)
         for line in self.hum:
             cleaned -= line(time)
-        wrong = self.is_impulse(time)
-        if wrong.any() and not wrong.all():
-            cleaned[wrong] = np.interp(time[wrong], time[~wrong], cleaned[~wrong])
-        return cleaned
+        return without_impulses(time, cleaned, self.impulse_time)
 
     def linear_error(self, time: Array, weights: Array) -> float:
         """Standard error of a weighted sum of samples, sum_i w_i F_i, by the noise of the trace.
@@ -198,6 +193,24 @@ class TraceNoise:
                 f"drift of {size(self.drift * self.duration)} over {with_unit(self.duration, 's')}"
             )
         return found
+
+
+def without_impulses(time: Array, values: Array, impulse_time: Array) -> Array:
+    """A trace with lines through the neighbours instead of the samples of impulses.
+
+    Parameters
+    ----------
+    time, values
+        The trace, shape (samples,).
+    impulse_time
+        Times of the samples in impulses [s].
+    """
+    wrong = np.isin(time, impulse_time)
+    if not wrong.any() or wrong.all():
+        return values
+    repaired = values.copy()
+    repaired[wrong] = np.interp(time[wrong], time[~wrong], values[~wrong])
+    return repaired
 
 
 def estimate_noise(time: Array, force: Array, *, hum: float | None = None) -> TraceNoise:

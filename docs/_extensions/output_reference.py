@@ -46,6 +46,23 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         "Dimension `stage`: stages that were found in the recorded load point.",
     ),
     (
+        "Group slips of a measured trace",
+        Group({k: v for k, v in variables.MEASURED_SLIPS.items() if k not in variables.SLIPS}),
+        "Further columns. Forces of friction coefficients have the unit 1.",
+    ),
+    (
+        "Group slip_counts",
+        variables.SLIP_COUNTS,
+        "Dimension `threshold`: how the number of slips of a measured trace depends on the minimum "
+        "fall. Attributes: the one that is used, and the plateau.",
+    ),
+    (
+        "Group noise",
+        variables.NOISE,
+        "Noise of a measured trace ([estimates](../../fit.md#noise-of-a-trace)): numbers, and the "
+        "dimensions `impulse` and `line`.",
+    ),
+    (
         "Group slip_traces",
         variables.SLIP_TRACES,
         "Dimension `sample`: the trace at `output.slip_interval` during slips.",

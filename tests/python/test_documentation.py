@@ -244,6 +244,7 @@ def test_scripts_of_the_gallery(script):
 
 def test_names_of_the_glossary_are_those_of_the_program():
     """Keys, lines of info and curve, variables of outputs, tables of fits, and commands."""
+    from mesoslip.analysis import slips
     from mesoslip.analysis.rate_and_state import rows
     from mesoslip.configuration.messages import all_keys
     from mesoslip.output import variables
@@ -262,6 +263,7 @@ def test_names_of_the_glossary_are_those_of_the_program():
         *force_curve.SUMMARY,
         *slip_onset.SUMMARY,
         *rows.FIT,
+        *slips.MEANINGS,
     }
     assert len(names) > 50
     assert names <= known, names - known

@@ -52,6 +52,25 @@ MEANINGS = {
 UNITS = {"stick_duration": "s", "creep_displacement": "m", "creep_share": "1"}
 
 
+# Units of forces where the trace is a friction coefficient.
+COEFFICIENT_UNITS = {"N": "1", "N/s": "1/s", "N/m": "1/m"}
+
+
+def as_recorded(head: str, unit: str, force_unit: str) -> tuple[str, str]:
+    """Head and unit of a column of forces, for friction coefficients if the trace has these.
+
+    Parameters
+    ----------
+    head, unit
+        Those for forces in newtons.
+    force_unit
+        Unit of the trace, "N" or "1".
+    """
+    if force_unit != "1":
+        return head, unit
+    return head.replace("force", "friction"), COEFFICIENT_UNITS.get(unit, unit)
+
+
 def slips(output: OutputLike) -> xr.Dataset:
     """The catalogue of slips of an output, dimension ``slip``, in SI.
 

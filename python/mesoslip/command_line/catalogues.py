@@ -36,8 +36,14 @@ COLUMNS = {
     "creep_share": ("creep share", "1"),
     "peak_fall_rate": ("peak fall rate", "N/s"),
 }
-# Units of forces where the trace is a friction coefficient.
-COEFFICIENT_UNITS = {"N": "1", "N/s": "1/s", "N/m": "1/m"}
+# Columns of which the terminal has statistics, and --csv and --json the rows.
+STATISTICS_ONLY = {
+    "stick_duration",
+    "loading_rate",
+    "loading_stiffness",
+    "creep_displacement",
+    "peak_fall_rate",
+}
 
 
 def slips(
@@ -65,21 +71,19 @@ def slips(
         return
     # Columns of which nothing is known, as breaks of a measured trace, are left out.
     shown = [name for name in COLUMNS if not rows or any(row[name] is not None for row in rows)]
-    is_coefficient = apparatus_of(tree).force_unit == "1"
+    force_unit = apparatus_of(tree).force_unit
     heads, columns = {}, {}
     for name in shown:
-        head, unit = COLUMNS[name]
-        if is_coefficient:
-            head, unit = head.replace("force", "friction"), COEFFICIENT_UNITS.get(unit, unit)
-        heads[name] = head
+        heads[name], unit = catalogue.as_recorded(*COLUMNS[name], force_unit)
         columns[name] = column([row[name] for row in rows], unit, 5)
-    table_rows = [["realization", *(columns[name].head(heads[name]) for name in shown)]]
-    table_rows += [
-        [str(row["realization_index"]), *(columns[name].text(row[name]) for name in shown)]
-        for row in rows
-    ]
+    in_table = [name for name in shown if name not in STATISTICS_ONLY]
+    table_rows = [[columns[name].head(heads[name]) for name in in_table]]
+    table_rows += [[columns[name].text(row[name]) for name in in_table] for row in rows]
+    if tree.sizes["realization"] > 1:
+        owners = ["realization", *(str(row["realization_index"]) for row in rows)]
+        table_rows = [[owner, *row] for owner, row in zip(owners, table_rows, strict=True)]
     print_table(table_rows)
-    typer.echo(counted(len(rows), "slip"))
+    typer.echo(f"{counted(len(rows), 'slip')}{'; all columns with --csv FILE' if rows else ''}")
     for name in shown:
         if name in statistics:
             mean, deviation, low, high = (
@@ -95,7 +99,7 @@ def slips(
             summary = f"mean {number(mean / scale.size, 5)}{spread if low < high else ''}"
             typer.echo(f"{scale.label(heads[name]):26} {summary}")
     if counts is not None:
-        _print_counts(counts, "1" if is_coefficient else "N")
+        _print_counts(counts, force_unit)
 
 
 def _print_counts(counts: dict[str, Any], unit: str) -> None:

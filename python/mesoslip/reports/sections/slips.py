@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from mesoslip.analysis import slips as catalogue
+from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.output.access import group_of
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.style import curve_color
@@ -30,6 +31,8 @@ COLUMNS = {
     "contacts_broken": ("breaks", "1"),
     "duration": ("duration", "s"),
     "waiting_time": ("waiting time", "s"),
+    "loading_stiffness": ("loading stiffness", "N/m"),
+    "creep_share": ("creep share", "1"),
 }
 # Columns of which there are histograms.
 DISTRIBUTIONS = ("force_drop", "duration", "waiting_time")
@@ -68,13 +71,19 @@ def _statistics(subjects: Sequence[Subject], subject: Subject) -> list[Block]:
         return [Text(named(subjects, subject, "There is no slip."))]
     rows = tuple(
         row_in_one_unit(header, [statistics[name][one] for one in STATISTICS], unit)
-        for name, (header, unit) in COLUMNS.items()
+        for name, (header, unit) in _columns(subject).items()
         if name in statistics
     )
     head = (f"{count} slip{'s' if count > 1 else ''}", *STATISTICS.values())
     note = "Statistics include the first slip, which is larger if all contacts were relaxed."
     name: list[Block] = [Text(subject.name)] if len(subjects) > 1 else []
     return [*name, Table(head, rows, note)]
+
+
+def _columns(subject: Subject) -> dict[str, tuple[str, str]]:
+    """Header and unit of each column of an output."""
+    unit = apparatus_of(subject.tree).force_unit
+    return {name: catalogue.as_recorded(*one, unit) for name, one in COLUMNS.items()}
 
 
 def _rows(subject: Subject) -> list[Block]:
@@ -88,7 +97,7 @@ def _rows(subject: Subject) -> list[Block]:
     # A measured trace has no breaks.
     columns += [
         (header, [row[name] for row in shown], unit, 4)
-        for name, (header, unit) in COLUMNS.items()
+        for name, (header, unit) in _columns(subject).items()
         if any(row[name] is not None for row in shown)
     ]
     note = f"The first {MAX_ROWS} of {len(rows)} slips." if len(rows) > MAX_ROWS else ""
@@ -101,7 +110,7 @@ def _histograms(subjects: Sequence[Subject]) -> Figure:
     panels = figure.subplots(1, len(DISTRIBUTIONS))
     catalogues = [catalogue.slips(one.tree) for one in subjects]
     for axes, name in zip(panels, DISTRIBUTIONS, strict=True):
-        header, unit = COLUMNS[name]
+        header, unit = _columns(subjects[0])[name]
         all_values = [one[name].values for one in catalogues]
         all_values = [values[np.isfinite(values)] for values in all_values]
         scale = scale_for(max_size(*all_values), unit)

@@ -2,7 +2,7 @@
 module mesoslip_boundary_names
    use mesoslip_contacts_ageing_law, only: ageing_names
    use mesoslip_contacts_base, only: contact_columns, snapshot_columns
-   use mesoslip_contacts_mechanics, only: coupling_names, initial_names
+   use mesoslip_contacts_mechanics, only: coupling_names, delay_names, initial_names
    use mesoslip_contacts_individual_neighbours, only: lattice_names
    use mesoslip_contacts_threshold_laws, only: law_names
    use mesoslip_loop_endings, only: ending_names
@@ -56,6 +56,8 @@ contains
          names = ending_names(1:)
       case ("couplings")
          names = coupling_names
+      case ("delay_laws")
+         names = delay_names
       case ("initial_states")
          names = initial_names
       case ("lattices")

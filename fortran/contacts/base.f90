@@ -8,7 +8,7 @@ module mesoslip_contacts_base
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length, parameters_type
-   use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled
+   use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled, delay_fixed, delay_names
    use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
       & window_type
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
@@ -47,8 +47,9 @@ module mesoslip_contacts_base
       real(wp) :: stiffness = 0.0_wp
       !> Drag of a contact of mean mass, m eta [N s/m]
       real(wp) :: drag = 0.0_wp
-      !> Delay between detaching and attaching [s]
+      !> Delay between detaching and attaching, or its mean [s], and one of the delay_ codes
       real(wp) :: delay = 0.0_wp
+      integer :: delay_law = delay_fixed
       !> Backward force over mean static threshold, f_b/f_s
       real(wp) :: back_force_ratio = 0.0_wp
       !> One of the coupling_ codes
@@ -307,6 +308,7 @@ contains
       call parameters%take("stiffness", self%stiffness, error)
       call parameters%take("drag", self%drag, error)
       call parameters%take("delay", self%delay, error)
+      call parameters%take("delay_law", delay_names, self%delay_law, error)
       call parameters%take("back_force_ratio", self%back_force_ratio, error)
       call parameters%take("coupling", coupling_names, self%coupling, error)
       call parameters%take("reattach", self%reattach, error)

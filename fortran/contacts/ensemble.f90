@@ -12,6 +12,7 @@ module mesoslip_contacts_ensemble
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &
       & total_law
    use mesoslip_contacts_individual_births, only: drag_of
+   use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_contacts_individual_queue, only: contact_queue_type, new_contact_queue
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate
@@ -141,6 +142,8 @@ contains
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
+      ! A schedule attaches contacts in the order in which they broke.
+      if (self%parameters%delay_law /= delay_fixed) return
       call self%queue%preview(self%record, min(limit, max_events), self%listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return

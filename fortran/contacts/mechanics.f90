@@ -9,6 +9,7 @@ module mesoslip_contacts_mechanics
    private
 
    public :: coupling_scaled, coupling_equal, coupling_names
+   public :: delay_fixed, delay_exponential, delay_names
    public :: initial_relaxed, initial_steady, initial_uniform, initial_names
    public :: stiffness_of, breaking_distance, broken_threshold, broken_threshold_slope
 
@@ -18,6 +19,13 @@ module mesoslip_contacts_mechanics
    integer, parameter :: coupling_equal = 2
    !> Names of the coupling_ codes
    character(len=*), parameter :: coupling_names(2) = [character(len=6) :: "scaled", "equal"]
+
+   !> All contacts wait for the same delay
+   integer, parameter :: delay_fixed = 1
+   !> Each delay is drawn from the exponential law
+   integer, parameter :: delay_exponential = 2
+   !> Names of the delay_ codes
+   character(len=*), parameter :: delay_names(2) = [character(len=11) :: "fixed", "exponential"]
 
    !> All stretches are zero
    integer, parameter :: initial_relaxed = 1

@@ -396,6 +396,7 @@ contains
             & "rows"], [values, 0.0_wp, 0.0_wp])
       end select
       call parameters%add_word("threshold_law", law)
+      call parameters%add_word("delay_law", "fixed")
       call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
          & contacts(:6) == "ageing"))))
       if (contacts(:6) == "ageing") call parameters%add_word("ageing", "relax")

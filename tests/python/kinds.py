@@ -57,6 +57,7 @@ FORCE = {
     },
 }
 
+RANDOM = {"contacts__delay_law": "exponential"}
 TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
 
 KINDS: dict[str, dict[str, Any]] = {
@@ -64,6 +65,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, three realizations": {"run__realizations": 3, "contacts__coupling": "equal"},
     "rigid, steady": {"contacts__initial": "steady"},
     "rigid, bundle": {"contacts__reattach": False},
+    "rigid, exponential delays": RANDOM,
+    "rigid, exponential delays, me": RANDOM | {"run__engine": "me"},
     "rigid, table": TABLE,
     "rigid, table, me": TABLE | {"run__engine": "me"},
     "rigid, lattice": SNAPSHOTS,

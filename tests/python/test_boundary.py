@@ -23,6 +23,7 @@ from mesoslip.theory.slip_onset import EQUATIONS, Onset
 NAMES = {
     "ageing_laws": contacts.AGEING_LAWS,
     "couplings": contacts.COUPLINGS,
+    "delay_laws": contacts.DELAY_LAWS,
     "endings": tuple(ENDINGS)[1:],
     "equations": EQUATIONS,
     "initial_states": contacts.INITIAL_STATES,

@@ -144,34 +144,45 @@ def compare_growth() -> None:
         (1600.0, 3e-4, 20e-6, 6e-6),
         (1600.0, 3e-4, 20e-6, 3e-6),
     ]:
-        changes = {"slider": {"stiffness": stiffness}, "contacts": {"delay": delay}}
-        alone = Config.from_dict(
-            {**tables(**changes, run={"duration": 1.0}), "drive": {"velocity": velocity}}
-        )
-        sliding = SteadySliding(alone)
-        root = sliding.leading_root
-        assert root is not None
-        ramp = np.linspace(begin, velocity, RAMP_STEPS)
-        stages = [{"duration": 0.5, "velocity": begin}]
-        stages += [{"duration": 0.01, "velocity": float(one)} for one in ramp]
-        last = {"duration": min(2.0, 12 / abs(root.real)), "velocity": velocity}
-        started = sum(float(one["duration"]) for one in stages)
-        config = Config.from_dict(
-            {
-                **tables(
-                    **changes, run={"duration": started + last["duration"], "resolution": 0.25}
-                ),
-                "drive": {"stage": [*stages, last]},
-                "output": {"interval": 2 * math.pi / root.imag / 50},
-            }
-        )
-        growth, frequency = measured_growth(config, started)
-        print(
-            f"K {stiffness:6.0f} N/m, delay {1e3 * delay:.2f} ms, {1e6 * velocity:4.1f} um/s: "
-            f"growth {root.real:7.2f}, engine {growth:7.2f} 1/s; "
-            f"frequency {root.imag:7.2f}, engine {frequency:7.2f} 1/s",
-            flush=True,
-        )
+        print_growth(stiffness, delay, begin, velocity)
+
+
+def compare_growth_with_random_delays() -> None:
+    """The same with delays from the exponential law."""
+    for delay, velocity in [(1e-4, 30e-6), (3e-4, 60e-6), (3e-4, 30e-6)]:
+        print_growth(97.0, delay, 100e-6, velocity, delay_law="exponential")
+
+
+def print_growth(
+    stiffness: float, delay: float, begin: float, velocity: float, **contacts: Any
+) -> None:
+    """Growth by theory and by the engine, from a velocity [m/s] slowly to another one."""
+    changes = {"slider": {"stiffness": stiffness}, "contacts": {"delay": delay, **contacts}}
+    alone = Config.from_dict(
+        {**tables(**changes, run={"duration": 1.0}), "drive": {"velocity": velocity}}
+    )
+    sliding = SteadySliding(alone)
+    root = sliding.leading_root
+    assert root is not None
+    ramp = np.linspace(begin, velocity, RAMP_STEPS)
+    stages = [{"duration": 0.5, "velocity": begin}]
+    stages += [{"duration": 0.01, "velocity": float(one)} for one in ramp]
+    last = {"duration": min(2.0, 12 / abs(root.real)), "velocity": velocity}
+    started = sum(float(one["duration"]) for one in stages)
+    config = Config.from_dict(
+        {
+            **tables(**changes, run={"duration": started + last["duration"], "resolution": 0.25}),
+            "drive": {"stage": [*stages, last]},
+            "output": {"interval": 2 * math.pi / root.imag / 50},
+        }
+    )
+    growth, frequency = measured_growth(config, started)
+    print(
+        f"K {stiffness:6.0f} N/m, delay {1e3 * delay:.2f} ms, {1e6 * velocity:4.1f} um/s: "
+        f"growth {root.real:7.2f}, engine {growth:7.2f} 1/s; "
+        f"frequency {root.imag:7.2f}, engine {frequency:7.2f} 1/s",
+        flush=True,
+    )
 
 
 # Of the map: velocities of its panels, delays and stiffnesses of runs, and of the theory.
@@ -278,4 +289,8 @@ if __name__ == "__main__":
     if sys.argv[1] == "map":
         draw_map(sys.argv[2] if len(sys.argv) > 2 else "docs/steady-sliding.png")
     else:
-        {"response": compare_responses, "growth": compare_growth}[sys.argv[1]]()
+        {
+            "response": compare_responses,
+            "growth": compare_growth,
+            "random": compare_growth_with_random_delays,
+        }[sys.argv[1]]()

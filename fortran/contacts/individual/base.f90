@@ -9,8 +9,9 @@ module mesoslip_contacts_individual_base
    use mesoslip_contacts_base, only: contacts_type, exchange_contacts, extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
       & new_avalanche_track, row_generation
-   use mesoslip_contacts_individual_births, only: bear, births_type, drag_of
+   use mesoslip_contacts_individual_births, only: bear, births_type, delay_of, drag_of
    use mesoslip_contacts_individual_detached, only: detached_contacts_type, new_detached_contacts
+   use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
       & row_origin, row_renewal, row_stiffness, behind_coordinate
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
@@ -118,7 +119,7 @@ contains
          return
       end if
       call new_detached_contacts(self%detached, self%parameters%count, self%parameters%reattach, &
-         & error)
+         & self%parameters%delay_law == delay_fixed, error)
       if (.not. allocated(error)) call new_avalanche_track(self%track, columns, rows, error)
    end subroutine allocate_records
 
@@ -189,7 +190,8 @@ contains
       if (drag > 0.0_wp) call self%drag%add(drag)
       self%breaks = self%breaks + 1.0_wp
       call self%track%add(contact)
-      call self%detached%push(contact, time + self%parameters%delay, drag)
+      call self%detached%push(contact, time + delay_of(self%parameters, contact, &
+         & self%record(row_renewal, contact)), drag)
       if (self%detached%count == self%parameters%count) then
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()

@@ -7,13 +7,14 @@ module mesoslip_contacts_individual_births
    use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
    use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_renewal, &
       & row_stiffness
-   use mesoslip_contacts_mechanics, only: coupling_scaled, initial_steady, initial_uniform
+   use mesoslip_contacts_mechanics, only: coupling_scaled, delay_exponential, initial_steady, &
+      & initial_uniform
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_random, only: uniform_pairs
+   use mesoslip_numerics_random, only: uniform_pair, uniform_pairs
    implicit none
    private
 
-   public :: births_type, bear, drag_of
+   public :: births_type, bear, delay_of, drag_of
 
    !> Draws that are made together
    integer, parameter :: draws_together = 32
@@ -161,6 +162,27 @@ contains
       if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
       limit = threshold * parameters%static_force / stiffness
    end subroutine bear
+
+   !> Time between detaching and attaching of a contact that has broken.
+   !>
+   !> The second deviate of the birth that comes is that of the delay: the first is its threshold's.
+   pure function delay_of(parameters, contact, renewal) result(delay)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Number of the contact, and how often it has been born before the birth that comes
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: renewal
+      !> Delay [s]
+      real(wp) :: delay
+
+      real(wp) :: uniform(2)
+
+      delay = parameters%delay
+      if (parameters%delay_law /= delay_exponential) return
+      call uniform_pair(parameters%seed, parameters%realization, int(contact - 1, i8), &
+         & int(renewal, i8), 0_i8, uniform)
+      delay = -delay * log(uniform(2))
+   end function delay_of
 
    !> Drag of a contact while it is detached.
    pure function drag_of(parameters, stiffness) result(drag)

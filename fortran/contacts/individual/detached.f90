@@ -1,6 +1,7 @@
 !> Detached contacts in the order in which they attach again.
 !>
-!> All wait for the same delay, so that the order is that of breaking: a ring.
+!> Where all wait for the same delay the order is that of breaking: a ring. Where each has a delay
+!> of its own they are a binary heap, which uses the same arrays from their start.
 module mesoslip_contacts_individual_detached
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -19,8 +20,8 @@ module mesoslip_contacts_individual_detached
       integer :: count = 0
       !> Time at which the next one attaches; huge when none does [s]
       real(wp) :: next_due = huge(1.0_wp)
-      !> Whether they attach again
-      logical, private :: attach = .true.
+      !> Whether they attach again, and whether they do so in the order in which they broke
+      logical, private :: attach = .true., in_order = .true.
       !> Number of contacts in all, and the position of the first one in the ring, from 0
       integer, private :: capacity = 0, first = 0
       !> The ring: numbers of the contacts, shape (capacity), and what is kept for them, shape
@@ -28,7 +29,7 @@ module mesoslip_contacts_individual_detached
       integer, allocatable, private :: contact(:)
       real(wp), allocatable, private :: value(:, :)
    contains
-      !> Put a contact in, behind all others
+      !> Put a contact in
       procedure, non_overridable :: push
       !> The contact that attaches next
       procedure, non_overridable :: next_contact
@@ -38,18 +39,19 @@ module mesoslip_contacts_individual_detached
       procedure, non_overridable :: preview
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
+      procedure, non_overridable, private :: sift_up, sift_down
    end type detached_contacts_type
 
 contains
 
    !> Set up without contacts.
-   subroutine new_detached_contacts(self, capacity, attach, error)
+   subroutine new_detached_contacts(self, capacity, attach, in_order, error)
       !> The detached contacts
       type(detached_contacts_type), intent(out) :: self
       !> Number of contacts in all
       integer, intent(in) :: capacity
-      !> Whether detached contacts attach again
-      logical, intent(in) :: attach
+      !> Whether detached contacts attach again, and whether all wait for the same delay
+      logical, intent(in) :: attach, in_order
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
@@ -57,12 +59,13 @@ contains
 
       self%capacity = capacity
       self%attach = attach
+      self%in_order = in_order
       allocate (self%contact(capacity), source=0, stat=stat)
       if (stat == 0) allocate (self%value(length, capacity), source=0.0_wp, stat=stat)
       if (stat /= 0) call raise(error, status_memory, "not enough memory for detached contacts")
    end subroutine new_detached_contacts
 
-   !> Put a contact in, behind all others.
+   !> Put a contact in, behind all others if all wait for the same delay.
    pure subroutine push(self, contact, due, drag)
       !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
@@ -79,7 +82,8 @@ contains
       self%value(row_due, position + 1) = due
       self%value(row_drag, position + 1) = drag
       self%count = self%count + 1
-      if (self%count == 1 .and. self%attach) self%next_due = due
+      if (.not. self%in_order) call self%sift_up()
+      if (self%attach) self%next_due = self%value(row_due, self%first + 1)
    end subroutine push
 
    !> The contact that attaches next.
@@ -103,15 +107,67 @@ contains
       contact = self%contact(self%first + 1)
       drag = self%value(row_drag, self%first + 1)
       self%count = self%count - 1
-      self%first = self%first + 1
-      if (self%first == self%capacity) self%first = 0
+      if (self%in_order) then
+         self%first = self%first + 1
+         if (self%first == self%capacity) self%first = 0
+      else
+         self%contact(1) = self%contact(self%count + 1)
+         self%value(:, 1) = self%value(:, self%count + 1)
+         call self%sift_down()
+      end if
       self%next_due = huge(1.0_wp)
       if (self%count > 0) self%next_due = self%value(row_due, self%first + 1)
    end subroutine pop
 
+   !> Move the last contact of the heap up to its place.
+   pure subroutine sift_up(self)
+      class(detached_contacts_type), intent(inout) :: self
+
+      integer :: place, above, contact
+      real(wp) :: kept(length)
+
+      place = self%count
+      contact = self%contact(place)
+      kept = self%value(:, place)
+      do while (place > 1)
+         above = place / 2
+         if (self%value(row_due, above) <= kept(row_due)) exit
+         self%contact(place) = self%contact(above)
+         self%value(:, place) = self%value(:, above)
+         place = above
+      end do
+      self%contact(place) = contact
+      self%value(:, place) = kept
+   end subroutine sift_up
+
+   !> Move the first contact of the heap down to its place.
+   pure subroutine sift_down(self)
+      class(detached_contacts_type), intent(inout) :: self
+
+      integer :: place, below, contact
+      real(wp) :: kept(length)
+
+      place = 1
+      contact = self%contact(place)
+      kept = self%value(:, place)
+      do
+         below = 2 * place
+         if (below > self%count) exit
+         if (below < self%count) then
+            if (self%value(row_due, below + 1) < self%value(row_due, below)) below = below + 1
+         end if
+         if (kept(row_due) <= self%value(row_due, below)) exit
+         self%contact(place) = self%contact(below)
+         self%value(:, place) = self%value(:, below)
+         place = below
+      end do
+      self%contact(place) = contact
+      self%value(:, place) = kept
+   end subroutine sift_down
+
    !> The next contacts to attach, and their times.
    pure subroutine preview(self, limit, number, contact, due, drag)
-      !> The detached contacts
+      !> The detached contacts, which all wait for the same delay
       class(detached_contacts_type), intent(in) :: self
       !> Maximum number
       integer, intent(in) :: limit

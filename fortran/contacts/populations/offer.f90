@@ -156,10 +156,9 @@ contains
       !> Find what breaks and attaches in the step.
       subroutine find_own()
          births%own = 0.0_wp
-         if (.not. (self%parameters%reattach .and. self%parameters%delay < span)) return
+         if (.not. self%detached%own_part(span) > 0.0_wp) return
          if (.not. distance > 0.0_wp) return
-         births%own = self%pinned%trial%breaks * distance / reach &
-            & * (1.0_wp - self%parameters%delay / span)
+         births%own = self%pinned%trial%breaks * distance / reach * self%detached%own_part(span)
          births%own_mass = 0.0_wp
          if (births%own > 0.0_wp) births%own_mass = births%own * self%pinned%trial%mass &
             & / self%pinned%trial%breaks

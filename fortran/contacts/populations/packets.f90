@@ -1,12 +1,17 @@
 !> Detached contacts of infinitely many: packets of them, in the order in which they broke.
 !>
 !> A packet is what broke within one step, evenly in time. It attaches as evenly, after the delay.
+!> Where delays are drawn from the exponential law there are no packets: of all that is detached the
+!> same part attaches in a second.
 module mesoslip_contacts_populations_packets
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_contacts_base, only: contact_parameters_type
-   use mesoslip_contacts_populations_motion, only: patience, position_at
+   use mesoslip_contacts_mechanics, only: delay_exponential
+   use mesoslip_contacts_populations_motion, only: max_time, patience, position_at
+   use mesoslip_contacts_populations_waiting, only: mean_attached_time, mean_own_time, &
+      & attached_part, own_attached_part
    use mesoslip_interface_law, only: pose_type
    implicit none
    private
@@ -46,9 +51,12 @@ module mesoslip_contacts_populations_packets
       !> First and last packet
       integer, private :: first = 1, last = 0
       !> Part of the first one that is attached again
-      real(wp), private :: attached_part = 0.0_wp
+      real(wp), private :: first_part = 0.0_wp
       !> Contacts that broke and are too few for a packet of their own: they go with the next
       real(wp), private :: pending(packet_length) = 0.0_wp
+      !> Whether delays are exponential, and then number and mass of what broke in the last step
+      logical, private :: is_random = .false.
+      real(wp), private :: fresh(2) = 0.0_wp
       !> The packets, shape (packet_length, packets)
       real(wp), allocatable, private :: packet(:, :)
    contains
@@ -56,13 +64,14 @@ module mesoslip_contacts_populations_packets
       procedure, non_overridable :: add
       !> Whether none waits to attach
       procedure, non_overridable :: is_empty
-      !> What will attach in a step
+      !> What will attach in a step, and what part of what breaks in it
       procedure, non_overridable :: expect
+      procedure, non_overridable :: own_part
       !> Take out what is due to attach
       procedure, non_overridable :: take_due
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
-      procedure, non_overridable, private :: due_times, make_room
+      procedure, non_overridable, private :: due_times, make_room, expect_random, take_random
    end type detached_packets_type
 
 contains
@@ -76,6 +85,7 @@ contains
 
       self%delay = parameters%delay
       self%reattach = parameters%reattach
+      self%is_random = parameters%delay_law == delay_exponential
       self%negligible = negligible_part * parameters%count
       allocate (self%packet(packet_length, initial_packets), source=0.0_wp)
    end subroutine new_detached_packets
@@ -92,6 +102,10 @@ contains
       call self%number%add(number)
       call self%mass%add(mass)
       if (.not. (self%reattach .and. number > 0.0_wp)) return
+      if (self%is_random) then
+         self%fresh = [number, mass]
+         return
+      end if
       ! Few that waited are taken to have broken with more that come: a delay is not stretched back.
       if (number >= self%pending(row_number)) self%pending(row_start) = start_time
       self%pending(row_end) = end_time
@@ -112,6 +126,8 @@ contains
       logical :: is_empty
 
       is_empty = self%first > self%last
+      if (self%is_random) is_empty = .not. self%reattach &
+         & .or. .not. self%number%total() > self%negligible
    end function is_empty
 
    !> Make room for one more packet: where some have attached, or in a larger array.
@@ -141,7 +157,7 @@ contains
 
       early = self%packet(row_start, index) + self%delay
       late = self%packet(row_end, index) + self%delay
-      if (index == self%first) early = early + self%attached_part * (late - early)
+      if (index == self%first) early = early + self%first_part * (late - early)
    end subroutine due_times
 
    !> What will attach in a step, and until when it may last for it.
@@ -160,6 +176,10 @@ contains
       real(wp) :: early, late, until, left
       integer :: index
 
+      if (self%is_random) then
+         call self%expect_random(time, duration, max_births, breaks, births)
+         return
+      end if
       until = time
       do index = self%first, self%last
          call self%due_times(index, early, late)
@@ -170,7 +190,7 @@ contains
             return
          end if
          left = self%packet(row_number, index)
-         if (index == self%first) left = left * (1.0_wp - self%attached_part)
+         if (index == self%first) left = left * (1.0_wp - self%first_part)
          call add_even(left, self%packet(row_mass, index) / self%packet(row_number, index))
          if (births%end_time < huge(1.0_wp)) return
          if (late >= time + duration) then
@@ -229,10 +249,11 @@ contains
       births = 0.0_wp
       moment = 0.0_wp
       when = 0.0_wp
+      if (self%is_random) call self%take_random(before, after, births, moment, when)
       do while (self%first <= self%last)
          call self%due_times(self%first, early, late)
          if (early > after%time) exit
-         part_before = self%attached_part
+         part_before = self%first_part
          part = 1.0_wp
          until = late
          if (late > after%time) then
@@ -244,9 +265,9 @@ contains
          moment = moment + more * position_at(before, after, 0.5_wp * (early + until))
          when = when + more * 0.5_wp * (early + until)
          call self%mass%add(-self%packet(row_mass, self%first) * (part - part_before))
-         self%attached_part = part
+         self%first_part = part
          if (part < 1.0_wp) exit
-         self%attached_part = 0.0_wp
+         self%first_part = 0.0_wp
          self%first = self%first + 1
       end do
       if (self%first > self%last) then
@@ -255,6 +276,75 @@ contains
       end if
       if (births > 0.0_wp) call self%number%add(-births)
    end subroutine take_due
+
+   !> Part of what breaks evenly in a step that attaches in it.
+   elemental function own_part(self, duration) result(part)
+      !> The packets
+      class(detached_packets_type), intent(in) :: self
+      !> How long the step lasts [s]
+      real(wp), intent(in) :: duration
+      !> The part
+      real(wp) :: part
+
+      part = 0.0_wp
+      if (.not. self%reattach) return
+      if (self%is_random) then
+         part = own_attached_part(duration / self%delay)
+      else if (self%delay < duration) then
+         part = 1.0_wp - self%delay / duration
+      end if
+   end function own_part
+
+   !> What will attach in a step where delays are exponential; see expect.
+   subroutine expect_random(self, time, duration, max_births, breaks, births)
+      class(detached_packets_type), intent(in) :: self
+      real(wp), intent(in) :: time, duration, max_births
+      logical, intent(in) :: breaks
+      type(expected_births_type), intent(inout) :: births
+
+      real(wp) :: number, part, length
+
+      if (self%is_empty()) then
+         if (self%reattach .and. breaks .and. duration < max_time) births%end_time &
+            & = max(time + patience * duration, nearest(time, 1.0_wp))
+         return
+      end if
+      number = self%number%total()
+      ! At rest what is detached attaches in a step, but for what is negligible.
+      length = duration
+      if (duration >= max_time) length = self%delay * log(number / self%negligible)
+      part = attached_part(length / self%delay)
+      births%end_time = max(time + patience * length, nearest(time, 1.0_wp))
+      if (part * number > max_births) then
+         part = max_births / number
+         births%end_time = max(time - self%delay * log(1.0_wp - part), nearest(time, 1.0_wp))
+      end if
+      births%number = part * number
+      births%mass = part * self%mass%total()
+   end subroutine expect_random
+
+   !> Take out what attaches in a step where delays are exponential; see take_due.
+   subroutine take_random(self, before, after, births, moment, when)
+      class(detached_packets_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+      real(wp), intent(inout) :: births, moment, when
+
+      real(wp) :: duration, ratio, part(2), number(2), time(2)
+
+      duration = after%time - before%time
+      ratio = duration / self%delay
+      ! What was detached at the start of the step, and what broke in it.
+      part = [attached_part(ratio), own_attached_part(ratio)]
+      time = before%time + duration * [mean_attached_time(ratio), mean_own_time(ratio)]
+      number = part * [max(0.0_wp, self%number%total() - self%fresh(1)), self%fresh(1)]
+      births = sum(number)
+      moment = number(1) * position_at(before, after, time(1)) &
+         & + number(2) * position_at(before, after, time(2))
+      when = sum(number * time)
+      call self%mass%add(-part(1) * max(0.0_wp, self%mass%total() - self%fresh(2)) &
+         & - part(2) * self%fresh(2))
+      self%fresh = 0.0_wp
+   end subroutine take_random
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
@@ -272,9 +362,13 @@ contains
       if (size(pending) == packet_length) self%pending = pending
       call archive%exchange("first", self%first)
       call archive%exchange("last", self%last)
-      call archive%exchange("attached_part", self%attached_part)
+      call archive%exchange("attached_part", self%first_part)
       call archive%exchange("number", self%number)
       call archive%exchange("mass", self%mass)
+      if (.not. self%is_random) return
+      pending = self%fresh
+      call archive%exchange("fresh", pending)
+      if (size(pending) == size(self%fresh)) self%fresh = pending
    end subroutine exchange
 
 end module mesoslip_contacts_populations_packets

@@ -7,7 +7,8 @@ The master equation under a slider that moves with v t + ε e^(λt). The respons
 with g = 1/(⟨x_s - x_b⟩ + v τ_d), the Laplace transform ψ of the density of the lives x_s - x_b, and
 that of the force of a contact over its life, φ. A slider of dynamic stiffness Z(λ) has the
 characteristic equation Z(λ) + Λ(λ) = 0, whose roots in the right half-plane are counted by the
-argument principle. The derivation is in ``docs/steady-sliding.md``.
+argument principle. Where delays are exponential 1/(1 + λ τ_d) stands for e^(-λ τ_d). The derivation
+is in ``docs/steady-sliding.md``.
 """
 
 from __future__ import annotations
@@ -322,9 +323,13 @@ class SteadySliding:
         lives, contacts = self.lives, self.config.contacts
         s = rate / self._rate
         transforms = self._transforms(s)
-        late = np.exp(-rate * self.delay)
-        # 1 - e^(-λ τ), to all digits where it is small.
-        missing = -np.expm1(-rate * self.delay)
+        # Average of e^(-λ t) over the delays t, and 1 less that, to all digits where it is small.
+        if self.config.contacts.delay_law == "exponential":
+            late = 1 / (1 + rate * self.delay)
+            missing = rate * self.delay * late
+        else:
+            late = np.exp(-rate * self.delay)
+            missing = -np.expm1(-rate * self.delay)
         births = 1 - transforms.life * late
         density = 1 / (lives.mean_life + self._rate * self.delay)
         load = lives.newborn_force - transforms.broken_force

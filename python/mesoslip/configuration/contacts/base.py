@@ -112,6 +112,7 @@ def common_parameters(config: Setting) -> Parameters:
         "stiffness": contacts.contact_stiffness,
         "drag": 0.0 if ignores_delay else contacts.contact_drag,
         "delay": 0.0 if ignores_delay else contacts.delay,
+        "delay_law": "fixed" if ignores_delay or contacts.delay == 0 else contacts.delay_law,
         "back_force_ratio": contacts.back_force_ratio,
         "coupling": contacts.coupling,
         "reattach": int(contacts.reattach),

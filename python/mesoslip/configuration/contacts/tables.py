@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 
 # Choices, by the names that the kernels know.
 COUPLINGS = ("scaled", "equal")
+DELAY_LAWS = ("fixed", "exponential")
 AGEING_LAWS = ("relax", "log")
 INITIAL_STATES = ("relaxed", "steady", "uniform")
 LATTICES = ("triangular", "square")
@@ -297,6 +298,9 @@ class Contacts(Table):
     film_density."""
     delay: Annotated[Time, Field(ge=0)] = 0.0
     """Time between detaching and attaching again, τ_d."""
+    delay_law: Annotated[str, choice(DELAY_LAWS)] = "fixed"
+    """`fixed`: all contacts wait for the same delay; `exponential`: each delay is drawn from the
+    exponential law, whose mean is `delay`."""
     back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
     """Force at which a contact attaches, relative to the mean threshold, f_b/f_s."""
     coupling: Annotated[str, choice(COUPLINGS)] = "scaled"

@@ -65,7 +65,7 @@ class Plan:
     after: float = 0.0
     simulations: int = 1600
     seed: int = 1
-    simulated_contacts: int = 2000
+    simulated_contacts: int = 4000
     has_several: bool = False
     assumed: tuple[str, ...] = ()
 

@@ -52,6 +52,8 @@ module mesoslip_contacts_base
       integer :: delay_law = delay_fixed
       !> Backward force over mean static threshold, f_b/f_s
       real(wp) :: back_force_ratio = 0.0_wp
+      !> Standard deviation of the force at attaching over the mean static threshold
+      real(wp) :: newborn_width = 0.0_wp
       !> One of the coupling_ codes
       integer :: coupling = coupling_scaled
       !> Whether a broken contact attaches again
@@ -310,6 +312,7 @@ contains
       call parameters%take("delay", self%delay, error)
       call parameters%take("delay_law", delay_names, self%delay_law, error)
       call parameters%take("back_force_ratio", self%back_force_ratio, error)
+      call parameters%take("newborn_width", self%newborn_width, error)
       call parameters%take("coupling", coupling_names, self%coupling, error)
       call parameters%take("reattach", self%reattach, error)
       call parameters%take("threshold_law", law, error)

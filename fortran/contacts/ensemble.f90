@@ -24,6 +24,8 @@ module mesoslip_contacts_ensemble
 
    !> A probability too small to meet among the keys of a ring of buckets.
    real(wp), parameter :: rare = 1.0e-4_wp
+   !> A normal deviate too large to meet.
+   real(wp), parameter :: far_newborn = 4.0_wp
 
    !> An ensemble of contacts.
    type, extends(individual_contacts_type) :: contact_ensemble_type
@@ -62,7 +64,8 @@ contains
       if (allocated(error)) return
       ! A contact attached while the slider moves back has the back force to lose as well.
       max_distance = parameters%static_force / parameters%stiffness &
-         & * max(parameters%law%quantile(rare), 1.0_wp) * (1.0_wp + parameters%back_force_ratio)
+         & * max(parameters%law%quantile(rare), 1.0_wp) * (1.0_wp + parameters%back_force_ratio &
+         & + far_newborn * parameters%newborn_width)
       call new_contact_queue(self%queue, parameters%count, 1.1_wp * max_distance, error)
    end subroutine new_contact_ensemble
 
@@ -142,8 +145,9 @@ contains
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
-      ! A schedule attaches contacts in the order in which they broke.
-      if (self%parameters%delay_law /= delay_fixed) return
+      ! A schedule attaches contacts in the order in which they broke, with one force.
+      if (self%parameters%delay_law /= delay_fixed &
+         & .or. self%parameters%newborn_width > 0.0_wp) return
       call self%queue%preview(self%record, min(limit, max_events), self%listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return

@@ -361,9 +361,9 @@ contains
       integer, intent(in) :: coupling
       real(wp), intent(in) :: width
 
-      character(len=name_length), parameter :: common(8) = [character(len=name_length) :: &
+      character(len=name_length), parameter :: common(9) = [character(len=name_length) :: &
          & "count", "static_force", "stiffness", "drag", "delay", "back_force_ratio", &
-         & "reattach", "relative_width"]
+         & "reattach", "relative_width", "newborn_width"]
       character(len=name_length), parameter :: ageing(4) = [character(len=name_length) :: &
          & "ageing_time", "initial_age", "young_force_ratio", "young_relative_width"]
       ! Some thresholds fall, as the young are spread widely.
@@ -371,12 +371,12 @@ contains
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
       type(recorder_parameters_type) :: recorder
-      real(wp) :: values(8), delay
+      real(wp) :: values(9), delay
 
       delay = 5.0e-4_wp
       if (slider == "quasistatic") delay = 0.0_wp
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
-         & 0.1_wp, 1.0_wp, width]
+         & 0.1_wp, 1.0_wp, width, 0.0_wp]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &

@@ -58,6 +58,7 @@ FORCE = {
 }
 
 RANDOM = {"contacts__delay_law": "exponential"}
+NEWBORN = {"contacts__newborn_width": 0.05}
 TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
 
 KINDS: dict[str, dict[str, Any]] = {
@@ -67,6 +68,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, bundle": {"contacts__reattach": False},
     "rigid, exponential delays": RANDOM,
     "rigid, exponential delays, me": RANDOM | {"run__engine": "me"},
+    "rigid, newborn width": NEWBORN,
+    "rigid, newborn width, me": NEWBORN | {"run__engine": "me"},
     "rigid, table": TABLE,
     "rigid, table, me": TABLE | {"run__engine": "me"},
     "rigid, lattice": SNAPSHOTS,

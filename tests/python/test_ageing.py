@@ -39,7 +39,11 @@ PRESCRIBED = {"slider": {"kind": "prescribed"}, "contacts__coupling": "equal"}
 
 @pytest.mark.parametrize(
     "kind",
-    [kind for kind in KINDS if not any(one in kind for one in ("lattice", "ageing", "table"))],
+    [
+        kind
+        for kind in KINDS
+        if not any(one in kind for one in ("lattice", "ageing", "table", "newborn"))
+    ],
 )
 @pytest.mark.parametrize("law", ["relax", "log"])
 def test_young_like_old_is_without_ageing_to_the_bit(kind, law):

@@ -408,7 +408,7 @@ def test_klein_file_is_kleins_case(klein):
     for table in ("drive", "contacts", "slider"):
         ours, theirs = config.to_dict()[table], expected.to_dict()[table]
         assert ours.keys() == theirs.keys()
-        for name in ours.keys() - {"threshold", "kind", "coupling", "initial"}:
+        for name in ours.keys() - {"threshold", "kind", "coupling", "delay_law", "initial"}:
             assert ours[name] == pytest.approx(theirs[name], rel=1e-12), name
 
 
@@ -933,7 +933,9 @@ def test_what_the_kernel_is_reported_of_contacts(klein):
         # rho (A/N) h eta
         "drag": pytest.approx(956 * 1e-10 / 4080 * 3.5e-9 * 2e11),
         "delay": 5e-4,
+        "delay_law": "fixed",
         "back_force_ratio": 0.1,
+        "newborn_width": 0.0,
         "coupling": "scaled",
         "reattach": 1,
         "threshold_law": "gaussian",

@@ -9,7 +9,8 @@ module mesoslip_contacts_individual_base
    use mesoslip_contacts_base, only: contacts_type, exchange_contacts, extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
       & new_avalanche_track, row_generation
-   use mesoslip_contacts_individual_births, only: bear, births_type, delay_of, drag_of
+   use mesoslip_contacts_individual_births, only: bear, births_type, delay_of, drag_of, &
+      & draw_newborn
    use mesoslip_contacts_individual_detached, only: detached_contacts_type, new_detached_contacts
    use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
@@ -215,7 +216,7 @@ contains
             force = back_force &
                & + self%neighbour_force(self%detached%next_contact(), pose%displacement)
          end if
-         call self%attach_next(pose%displacement, force, contact)
+         call self%attach_next(pose, force, contact)
          call self%join(contact, pose)
       end do
       self%detached_count = real(self%detached%count, wp)
@@ -236,25 +237,34 @@ contains
    end function neighbour_force
 
    !> Attach the contact that is the next one to do so.
-   subroutine attach_next(self, displacement, force, contact)
+   subroutine attach_next(self, pose, mean_force, contact)
       class(individual_contacts_type), intent(inout) :: self
-      real(wp), intent(in) :: displacement
-      !> Force that the contact bears when it attaches, with that of its neighbours [N]
-      real(wp), intent(in) :: force
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Mean force that a contact bears when it attaches, with that of its neighbours [N]
+      real(wp), intent(in) :: mean_force
       !> Number of the contact
       integer, intent(out) :: contact
 
-      real(wp) :: stiffness, limit, origin, drag
+      real(wp) :: stiffness, limit, origin, drag, force, threshold, drawn
 
       call self%detached%pop(contact, drag)
       if (.not. self%record(row_next, contact) > 0.0_wp) then
          call self%births%draw(self%parameters, self%record)
       end if
-      call bear(self%parameters, self%record(row_next, contact), stiffness, limit)
-      origin = displacement - force / (stiffness + self%bonds)
+      force = mean_force
+      threshold = self%record(row_next, contact)
+      if (self%parameters%newborn_width > 0.0_wp) then
+         call draw_newborn(self%parameters, contact, self%record(row_renewal, contact), threshold, &
+            & drawn)
+         force = mean_force + pose%direction * self%parameters%static_force &
+            & * (drawn - self%parameters%back_force_ratio)
+      end if
+      call bear(self%parameters, threshold, stiffness, limit)
+      origin = pose%displacement - force / (stiffness + self%bonds)
       call self%drag%add(-drag)
       if (self%detached%count == 0) self%drag = accumulator_type()
-      call self%birth_gain%add(0.5_wp * stiffness * (displacement - origin)**2)
+      call self%birth_gain%add(0.5_wp * stiffness * (pose%displacement - origin)**2)
       call self%stiffness%add(stiffness)
       call self%offset%add(stiffness * origin)
       self%record(row_origin, contact) = origin

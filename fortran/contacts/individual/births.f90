@@ -9,15 +9,18 @@ module mesoslip_contacts_individual_births
       & row_stiffness
    use mesoslip_contacts_mechanics, only: coupling_scaled, delay_exponential, initial_steady, &
       & initial_uniform
+   use mesoslip_contacts_threshold_laws_gaussian, only: inverse_normal
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_random, only: uniform_pair, uniform_pairs
    implicit none
    private
 
-   public :: births_type, bear, delay_of, drag_of
+   public :: births_type, bear, delay_of, drag_of, draw_newborn
 
    !> Draws that are made together
    integer, parameter :: draws_together = 32
+   !> Attempt of the first draw of a force at attaching; the next attempts count down
+   integer(i8), parameter :: force_attempt = 65535_i8
 
    !> Births to come.
    type :: births_type
@@ -162,6 +165,32 @@ contains
       if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
       limit = threshold * parameters%static_force / stiffness
    end subroutine bear
+
+   !> Draw the force with which a contact attaches, from a normal law.
+   !>
+   !> A contact whose force is not below its threshold could not attach: both are drawn again.
+   pure subroutine draw_newborn(parameters, contact, renewal, threshold, force)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Number of the contact, and how often it has been born before
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: renewal
+      !> Relative threshold that was drawn, and that with which it attaches
+      real(wp), intent(inout) :: threshold
+      !> Relative force, positive in the direction of motion
+      real(wp), intent(out) :: force
+
+      real(wp) :: uniform(2)
+      integer(i8) :: attempt
+
+      do attempt = force_attempt, 1_i8, -1_i8
+         call uniform_pair(parameters%seed, parameters%realization, int(contact - 1, i8), &
+            & int(renewal, i8), attempt, uniform)
+         if (attempt < force_attempt) threshold = parameters%law%quantile(uniform(1))
+         force = parameters%back_force_ratio + parameters%newborn_width * inverse_normal(uniform(2))
+         if (abs(force) < threshold) return
+      end do
+   end subroutine draw_newborn
 
    !> Time between detaching and attaching of a contact that has broken.
    !>

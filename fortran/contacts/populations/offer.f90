@@ -212,10 +212,10 @@ contains
          middle = middle - self%pinned%newborn_stiffness * (births%number + births%own) * distance &
             & / 8.0_wp
          if (births%own > 0.0_wp) slope = slope + births%own * parameters%static_force &
-            & * parameters%back_force_ratio / distance
+            & * self%pinned%newborn_force / distance
          if (span > 0.0_wp .and. span < max_time) then
             velocity = max(0.0_wp, direction * (pose%velocity + span * pose%acceleration))
-            rate = (births%number * parameters%static_force * parameters%back_force_ratio &
+            rate = (births%number * parameters%static_force * self%pinned%newborn_force &
                & + parameters%drag * mass * velocity) / span
          end if
          law%stiffness = law%stiffness + slope

@@ -7,7 +7,7 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_partial_moments, only: new_partial_moments
    use mesoslip_contacts_populations_breaking, only: breaking_populations_type, unresolved_part
    use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
-      & new_population_rows, stiff
+      & new_population_rows, number, stiff
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -20,18 +20,30 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: step_part = 0.6_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
+   !> Forces at attaching if they have a width, evenly spaced, and how far they reach in standard
+   !> deviations
+   integer, parameter :: max_classes = 25
+   real(wp), parameter :: reach = 6.0_wp
 
    !> Populations of pinned contacts.
    type, extends(breaking_populations_type) :: pinned_populations_type
       !> Mean stiffness of a contact that attaches [N/m], and the energy it gains [J]
       real(wp) :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
+      !> Mean relative force of a contact that attaches
+      real(wp) :: newborn_force = 0.0_wp
+      !> Forces with which contacts attach: how many there are, the relative forces, thresholds at
+      !> or below which a contact could not attach with each, and the shares of contacts
+      integer, private :: classes = 1
+      real(wp), private :: class_force(max_classes) = 0.0_wp, class_broken(max_classes) = 0.0_wp, &
+         & share(max_classes) = 1.0_wp
    contains
       !> Let thresholds change with age
       procedure, non_overridable :: set_ageing
       !> Prepare the populations for the start of a run
       procedure, non_overridable :: initialize
-      !> Attach contacts as a population
+      !> Attach contacts as a population, or as one for each force
       procedure, non_overridable :: attach
+      procedure, non_overridable, private :: spread_newborns
    end type pinned_populations_type
 
 contains
@@ -64,7 +76,36 @@ contains
       self%newborn_stiffness = parameters%stiffness * all(stiff)
       self%newborn_energy = 0.5_wp * parameters%back_force_ratio**2 * all(compliant) &
          & * parameters%static_force * self%stretch
+      self%newborn_force = parameters%back_force_ratio
+      self%class_force(1) = parameters%back_force_ratio
+      if (parameters%newborn_width > 0.0_wp) call self%spread_newborns()
    end subroutine new_pinned_populations
+
+   !> Set the forces with which contacts attach, from a normal law cut off at the thresholds.
+   subroutine spread_newborns(self)
+      class(pinned_populations_type), intent(inout) :: self
+
+      real(wp) :: left(moments_length, max_classes), deviate
+      integer :: class
+
+      self%classes = max_classes
+      do class = 1, max_classes
+         ! Evenly spaced points are exact for a normal law, but for what its tails lack.
+         deviate = reach * (2.0_wp * (class - 1) / (max_classes - 1) - 1.0_wp)
+         self%class_force(class) = self%parameters%back_force_ratio &
+            & + self%parameters%newborn_width * deviate
+         self%class_broken(class) = abs(self%class_force(class))
+         self%share(class) = exp(-0.5_wp * deviate**2)
+         call self%moments(1)%interpolate(self%class_broken(class), left(:, class))
+      end do
+      self%share = self%share / sum(self%share * left(number, :))
+      associate (static => self%parameters%static_force, force => self%class_force)
+         self%newborn_stiffness = self%parameters%stiffness * sum(self%share * left(stiff, :))
+         self%newborn_force = sum(self%share * left(number, :) * force)
+         self%newborn_energy = 0.5_wp * sum(self%share * left(compliant, :) * force**2) * static &
+            & * self%stretch
+      end associate
+   end subroutine spread_newborns
 
    !> Let thresholds change with age.
    subroutine set_ageing(self, ageing)
@@ -122,20 +163,25 @@ contains
       call self%sum_forces()
    end subroutine initialize
 
-   !> Attach contacts as one population, where they do on average.
-   subroutine attach(self, births, moment, force, displacement, birth, time)
+   !> Attach contacts as one population for each force, where they do on average.
+   subroutine attach(self, births, moment, direction, displacement, birth, time)
       !> The populations
       class(pinned_populations_type), intent(inout) :: self
-      !> How many they are, the sum of their displacements [m], and the force of each, signed
-      real(wp), intent(in) :: births, moment, force
+      !> How many they are, the sum of their displacements [m], and the direction of their forces
+      real(wp), intent(in) :: births, moment, direction
       !> Where the slider is [m], when the contacts attached on average, and when that is [s]
       real(wp), intent(in) :: displacement, birth, time
 
+      integer :: class
+
       call self%stiffness%add(self%newborn_stiffness * births)
       call self%offset%add(self%newborn_stiffness * moment &
-         & - self%parameters%static_force * births * force)
+         & - self%parameters%static_force * births * (direction * self%newborn_force))
       self%last_birth = time
-      call self%add(moment / births, force, births, 1, 0.0_wp, displacement, birth, time)
+      do class = 1, self%classes
+         call self%add(moment / births, direction * self%class_force(class), &
+            & self%share(class) * births, 1, self%class_broken(class), displacement, birth, time)
+      end do
    end subroutine attach
 
 end module mesoslip_contacts_populations_pinned

@@ -88,11 +88,11 @@ contains
 
       call self%birth_gain%add(births * self%pinned%newborn_energy)
       origin = moment / births
-      force = after%direction * self%parameters%back_force_ratio
+      force = after%direction * self%pinned%newborn_force
       call self%step_work%add(-births * (after%displacement - origin) &
          & * (0.5_wp * self%pinned%newborn_stiffness * (after%displacement - origin) &
          & + self%parameters%static_force * force))
-      call self%pinned%attach(births, moment, force, after%displacement, &
+      call self%pinned%attach(births, moment, after%direction, after%displacement, &
          & min(when / births, after%time), after%time)
    end subroutine attach_due
 

@@ -2,7 +2,7 @@
 !>
 !> The ratio h is that of the duration of a step to the mean delay; times within the step are over
 !> its duration. Of what is detached at the start the part 1 - exp(-h) attaches; of what breaks
-!> evenly in the step it is 1 - (1 - exp(-h))/h. Short steps have series, as differences lose digits.
+!> evenly in the step it is 1 - (1 - exp(-h))/h. Short steps have series: differences lose digits.
 module mesoslip_contacts_populations_waiting
    use mesoslip_numerics_kinds, only: wp
    implicit none

@@ -148,6 +148,29 @@ def output_problems(config: Setting) -> Complaints:
         )
 
 
+def newborn_problems(config: Setting) -> Complaints:
+    """What is wrong with the width of the force at which contacts attach."""
+    contacts = config.contacts
+    width = contacts.newborn_width
+    if width == 0:
+        return
+    key = "contacts.newborn_width"
+    if contacts.initial == "steady":
+        yield Complaint(
+            key,
+            'must be 0 with contacts.initial = "steady", where all contacts attached with one '
+            'force; start with "relaxed" and slide for some breaking stretches',
+            width,
+        )
+    if contacts.ageing is not None:
+        yield Complaint(
+            key,
+            "must be 0 with contacts.ageing: whether a contact attaches is decided by its "
+            "configured threshold, not by that of a young one",
+            width,
+        )
+
+
 def curve_problems(config: Setting) -> Complaints:
     """What is wrong with the force curve."""
     width, stretch = config.curve.newborn_width, config.contacts.break_stretch
@@ -155,6 +178,12 @@ def curve_problems(config: Setting) -> Complaints:
         yield Complaint(
             "curve.newborn_width",
             f"must be at most a quarter of the mean breaking stretch, {0.25 * stretch:.3g} m",
+            width,
+        )
+    if width > 0 and config.contacts.newborn_width > 0:
+        yield Complaint(
+            "curve.newborn_width",
+            "is for contacts without contacts.newborn_width, which the curve uses if it is given",
             width,
         )
     if width > 0 and config.contacts.initial == "steady":

@@ -126,6 +126,7 @@ class Config(Table):
             *checks.drive_problems(self),
             *self.slider.problems(self),
             *self.contact_kind.problems(self),
+            *checks.newborn_problems(self),
             *checks.curve_problems(self),
         ]
         # Output intervals are compared with the duration, which a wrong drive does not have.

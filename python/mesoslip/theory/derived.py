@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing, Thermal
 from mesoslip.output.inputs import ConfigLike, as_config
-from mesoslip.theory.lives import scales
+from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import quantities
 from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
 
@@ -163,7 +163,10 @@ def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
     """Averages over the lives of contacts, from attaching to breaking."""
     contacts = config.contacts
     static, stiffness = contacts.contact_static_force, contacts.contact_stiffness
-    lives = scales(config)
+    newborn_width = newborn_stretch(config)
+    if newborn_width is None:
+        return
+    lives = scales(config, newborn_width)
     yield (
         "mean_life",
         lives.mean_life * static / stiffness,
@@ -208,7 +211,8 @@ def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str
         "omega_0 f_T/k: in much faster sliding contacts come to their thresholds",
     )
     speed = config.drive_speed
-    if speed > 0 and contacts.reattach and contacts.ageing is None:
+    is_known = contacts.ageing is None and contacts.newborn_width == 0
+    if speed > 0 and contacts.reattach and is_known:
         yield (
             "F_steady_drive",
             steady_force(config, speed),

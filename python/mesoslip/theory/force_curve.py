@@ -29,13 +29,18 @@ from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.simulation.kernel import checked
-from mesoslip.theory.lives import law_parameters, scales
+from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.sliders import loading_rate
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
 Array = NDArray[np.float64]
+
+WITHOUT_NEWBORN_WIDTH = (
+    'has a force curve for coupling = "equal" only, with thresholds of which hardly any is below '
+    'the width; a run of a prescribed slider with engine "me" gives F(X)'
+)
 
 # Points of collocation in a panel: the force converges with the order of this number.
 POINTS = 12
@@ -206,7 +211,10 @@ class ForceCurve:
                     )
                 ]
             )
-        self.newborn_width = config.curve.newborn_width
+        newborn_width = newborn_stretch(config)
+        if newborn_width is None:
+            raise ConfigError([Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)])
+        self.newborn_width = newborn_width or config.curve.newborn_width
         self._stretch = contacts.static_force / contacts.stiffness
         self.scales = scales(config, self.newborn_width)
         self.length = config.curve_length

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from mesoslip import _core
 from mesoslip.configuration.kernel_parameters import Parameters, named
@@ -10,6 +13,10 @@ from mesoslip.simulation.kernel import checked
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
+
+
+# Probability of a force beyond the threshold against the motion that counts as none.
+MAX_BEYOND = 1e-6
 
 
 class Scales(NamedTuple):
@@ -37,6 +44,26 @@ def law_parameters(config: Config, newborn_width: float = 0.0) -> Parameters:
         "reattach": int(contacts.reattach),
         "initial": contacts.initial,
     }
+
+
+def newborn_stretch(config: Config) -> float | None:
+    """Standard deviation of the stretch at which contacts attach [m]; None if there is no theory.
+
+    It holds for contacts of one stiffness, of which none attaches with a force beyond its threshold
+    against the motion.
+    """
+    contacts = config.contacts
+    width, back = contacts.newborn_width, contacts.back_force_ratio
+    if width == 0:
+        return 0.0
+    law = contacts.threshold.above(contacts.min_threshold)
+    probability = (np.arange(1000) + 0.5) / 1000
+    beyond = np.mean(
+        [math.erfc((u + back) / (width * math.sqrt(2))) / 2 for u in law.quantile(probability)]
+    )
+    if contacts.coupling != "equal" or beyond > MAX_BEYOND:
+        return None
+    return width * contacts.break_stretch
 
 
 def scales(config: Config, newborn_width: float = 0.0) -> Scales:

@@ -80,6 +80,12 @@ WITHOUT_ACTIVATION = (
 )
 
 
+WITHOUT_NEWBORN_WIDTH = (
+    "has no linear stability theory here: contacts must attach with one force; `mesoslip curve` "
+    "gives the steady force of contacts of one stiffness"
+)
+
+
 class Lives(NamedTuple):
     """Averages over the threshold law; stretches over f_s/k, stiffness over k, mass over m."""
 
@@ -145,6 +151,8 @@ class SteadySliding:
             problems.append(Problem("", "contacts.ageing", WITHOUT_AGEING))
         if contacts.thermal is not None:
             problems.append(Problem("", "contacts.thermal", WITHOUT_ACTIVATION))
+        if contacts.newborn_width > 0:
+            problems.append(Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH))
         if not contacts.reattach:
             problems.append(
                 Problem("", "contacts.reattach", "without it there is no steady sliding", False)

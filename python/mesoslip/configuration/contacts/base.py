@@ -114,6 +114,7 @@ def common_parameters(config: Setting) -> Parameters:
         "delay": 0.0 if ignores_delay else contacts.delay,
         "delay_law": "fixed" if ignores_delay or contacts.delay == 0 else contacts.delay_law,
         "back_force_ratio": contacts.back_force_ratio,
+        "newborn_width": contacts.newborn_width,
         "coupling": contacts.coupling,
         "reattach": int(contacts.reattach),
         **contacts.threshold.kernel_parameters,

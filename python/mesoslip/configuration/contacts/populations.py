@@ -12,6 +12,8 @@ from mesoslip.configuration.tables import Run
 
 # Minimum step of the master equation, relative to the mean breaking stretch.
 MIN_STEP = 2e-5
+# Maximum width of the force at attaching over that of the thresholds.
+MAX_NEWBORN_RATIO = 3.0
 
 
 class PopulationContacts(ContactKind):
@@ -55,6 +57,16 @@ class PopulationContacts(ContactKind):
                 "run.realizations",
                 'must be 1 with engine "me", which has no random numbers',
                 run.realizations,
+            )
+        width = config.contacts.newborn_width
+        max_width = MAX_NEWBORN_RATIO * config.contacts.threshold.relative_width
+        if width > max_width:
+            yield Complaint(
+                "contacts.newborn_width",
+                f'must be at most {max_width:.3g} with engine "me", {MAX_NEWBORN_RATIO:g} times '
+                "contacts.threshold.relative_width: it has populations of some forces at "
+                "attaching, which the thresholds must blur",
+                width,
             )
         if run.resolution * config.contacts.threshold.relative_width < MIN_STEP:
             yield Complaint(

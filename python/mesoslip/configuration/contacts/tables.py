@@ -303,6 +303,9 @@ class Contacts(Table):
     exponential law, whose mean is `delay`."""
     back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
     """Force at which a contact attaches, relative to the mean threshold, f_b/f_s."""
+    newborn_width: Annotated[Number, Field(ge=0, le=0.25)] = 0.0
+    """Standard deviation of the force at which contacts attach, relative to the mean threshold. The
+    force is normal, and drawn again with the threshold where it is not below that."""
     coupling: Annotated[str, choice(COUPLINGS)] = "scaled"
     """`scaled`: stiffness is proportional to the square root of the threshold, mass to the
     threshold; `equal`: all contacts have the same stiffness and mass."""

@@ -30,13 +30,17 @@ def write_pages(folder: Path) -> None:
             path.write_text(text)
 
 
+# What the scripts of the gallery start from.
+STARTS = ("klein", "measured/paper-k1002-v42", "measured/basalt-step")
+
+
 def _on_start(app: Any) -> None:
     folder = Path(app.srcdir)
     write_pages(folder / FOLDER)
-    # What the scripts of the gallery start from.
-    start = folder / "gallery" / "klein.toml"
-    start.unlink(missing_ok=True)
-    mesoslip.example("klein", start)
+    for name in STARTS:
+        start = folder / "gallery" / f"{name.rpartition('/')[2]}.toml"
+        start.unlink(missing_ok=True)
+        mesoslip.example(name, start)
 
 
 def setup(app: Any) -> dict[str, bool]:

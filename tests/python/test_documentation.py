@@ -39,7 +39,7 @@ FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<language>\S*).*$")
 LEFT_OUT = re.compile(r"^(?:<!--|%)\s*not run: \S.*$")
 FILE = re.compile(r"# (?P<path>[\w/.-]+\.toml)")
 # Commands whose arguments are parsed and no more: they take long, or what no other has made.
-PARSED_ONLY = {"explore", "trace", "fit"}
+PARSED_ONLY = {"explore", "fit"}
 # Names that stand for those of a reader's own.
 PLACEHOLDER = re.compile(r"[A-Z]{3,}\b|…|\.\.\.")
 # What makes files of the documentation short enough for a test.
@@ -109,6 +109,9 @@ def workshop(tmp_path, monkeypatch):
     for path in tmp_path.rglob("*.toml"):
         make_shorter(path)
     shutil.copy(ROOT / "runs" / "klein.toml", tmp_path)
+    for name in ("paper-k1002-v42", "basalt-step"):
+        for path in (ROOT / "runs" / "measured").glob(f"{name}.*"):
+            shutil.copy(path, tmp_path)
     (tmp_path / "stage.csv").write_text(HISTORY)
     (tmp_path / "out").mkdir()
     monkeypatch.chdir(tmp_path)
@@ -154,7 +157,7 @@ def run_command(words, comment, command):
     if name in PARSED_ONLY or is_placeholder or any(one.endswith(".gif") for one in arguments):
         return
     if name == "example":
-        Path(f"{arguments[-1]}.toml").unlink(missing_ok=True)
+        Path(f"{Path(arguments[-1]).name}.toml").unlink(missing_ok=True)
     expected = STATUS.search(comment)
     status, out, err = command(name, *arguments)
     assert status == (int(expected[1]) if expected else 0), f"{shlex.join(words)}\n{out}{err}"

@@ -111,6 +111,16 @@ def test_commands_from_the_file_to_the_page(tmp_path, command, monkeypatch, name
     assert ("friction drop" in page) == (name == "coefficients")
 
 
+def test_a_short_trace_at_a_late_time_has_its_own_unit(tmp_path):
+    path = tmp_path / "late.csv"
+    time = 11_600 + 0.1 * np.arange(1000)
+    np.savetxt(
+        path, np.column_stack([time, 1 + 1e-3 * np.sin(time)]), "%.6f", ",", header="t [s],mu"
+    )
+    figure = mesoslip.plot(mesoslip.read_trace(path))
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
 def test_minimum_fall_and_part_are_options(tmp_path, command, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "teeth.csv", LABORATORIES["newtons"])

@@ -16,6 +16,9 @@ from mesoslip.plots.lines import line, max_size
 from mesoslip.plots.trace import UNITS, is_known
 from mesoslip.quantities import Scale, scale_for
 
+# Time from which on the axis of a short trace has the unit of its length [s].
+LATE = 60.0
+
 
 @dataclass(frozen=True)
 class HorizontalAxis:
@@ -54,8 +57,10 @@ def horizontal_axis(trees: Sequence[xr.DataTree], extent: Extent) -> HorizontalA
             for tree, window in zip(trees, windows, strict=True)
         ]
         return HorizontalAxis(scale_for(max_size(*lines), UNITS[name]), label, None)
-    scale = scale_for(max_size(windows), "s")
     low, high = float(windows[:, 0].min()), float(windows[:, 1].max())
+    # The time of an instrument may be hours where a trace lasts seconds.
+    is_late = low > high - low and high > LATE
+    scale = scale_for(high - low if is_late else max_size(windows), "s")
     limits = (low / scale.size, high / scale.size) if high > low else None
     return HorizontalAxis(scale, label, limits)
 

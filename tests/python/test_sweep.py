@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import subprocess
@@ -11,6 +12,7 @@ from concurrent.futures import Future
 from contextlib import nullcontext
 from pathlib import Path
 
+import matplotlib as mpl
 import mesoslip
 import netCDF4
 import numpy as np
@@ -216,6 +218,44 @@ def test_a_map_shows_each_value_where_it_belongs(tmp_path):
     line = mesoslip.plot(xr.DataTree(data.isel({"slider.stiffness": 1})))
     np.testing.assert_array_equal(line.axes[0].lines[-1].get_xdata(), sorted(delays))
     np.testing.assert_array_equal(line.axes[0].lines[-1].get_ydata(), [6.5, 10.5, 2.5])
+
+
+def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
+    """A boundary known in closed form, between few points; a measure over decades in logarithms."""
+    delays, stiffnesses = np.logspace(-4, -2, 6), np.logspace(1.5, 3, 5)
+    dimensions = ("contacts.delay", "slider.stiffness", "realization")
+    product = (delays[:, None] * stiffnesses)[..., None]
+    flags = {"flag_meanings": "smooth stick_slip irregular transient"}
+    data = xr.Dataset(
+        {
+            "status": (dimensions, 0 * product),
+            "regime": (dimensions, np.where(product > 0.5, 0.0, 1.0), flags),
+            "growth_rate": (dimensions, 0.5 - product, {"units": "s-1"}),
+            "mean_waiting_time": (dimensions, 1 / product, {"units": "s"}),
+            "mean_force": (dimensions, 1e-6 * (1 + product), {"units": "N"}),
+        },
+        {"contacts.delay": delays, "slider.stiffness": stiffnesses, "realization": [0]},
+        {"configuration": ""},
+    )
+    data["contacts.delay"].attrs["units"] = "s"
+    data["slider.stiffness"].attrs["units"] = "N m-1"
+    figure = mesoslip.plot(data, width=0.086)
+    regime, waiting, force = (one for one in figure.axes if one.get_title(loc="left"))
+    (line,) = (one for one in regime.collections if hasattr(one, "levels"))
+    x, y = np.concatenate([path.vertices for path in line.get_paths()]).T
+    # In milliseconds and kilonewtons per metre. Points are factors of 2.5 and 2.4 apart: cubics
+    # between them err by 1.5 %. Straight pieces have some ten corners.
+    np.testing.assert_allclose(x * y, 0.5, rtol=0.02)
+    assert x.size > 100
+    assert regime.get_xlabel() == r"delay $\tau_d$ (ms)"
+    assert regime.get_ylabel().replace("\n", " ") == "stiffness of the spring $K$ (kN/m)"
+    assert isinstance(waiting.collections[0].norm, mpl.colors.LogNorm)
+    assert not isinstance(force.collections[0].norm, mpl.colors.LogNorm)
+    assert waiting.get_title(loc="left") == "mean waiting time (s)"
+    figure.draw_without_rendering()
+    shown = [one for one in regime.get_xticklabels() if one.get_text()]
+    boxes = [one.get_window_extent() for one in shown]
+    assert all(one.x1 < two.x0 for one, two in itertools.pairwise(boxes))
 
 
 def test_names_can_be_drawn():

@@ -15,11 +15,13 @@ from mesoslip.analysis.avalanche_sizes import (
     fit_power_law,
     local_exponents,
 )
-from mesoslip.analysis.slips import write_table
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
+from mesoslip.output.tables import PrintedTable, write_table
+from mesoslip.quantities import column
 
 NO_AVALANCHES = (
     "the output has no avalanches: they are recorded with [interaction] or "
@@ -259,6 +261,17 @@ def write_csv(data: xr.Dataset, path: Path) -> None:
     """
     units = {name: data[name].attrs.get("units", "1") for name in _columns(data)}
     write_table(rows(data), units, path)
+
+
+def printed(data: xr.Dataset) -> PrintedTable:
+    """Avalanches as a table for print, each column in one unit."""
+    head, columns = [], []
+    for name in _columns(data):
+        values = data[name].values.tolist()
+        shown = column(values, from_cf_units(data[name].attrs.get("units", "1")), 5)
+        head.append(shown.head(name.replace("_", " ")))
+        columns.append([shown.text(value) for value in values])
+    return PrintedTable("Avalanches", tuple(head), tuple(zip(*columns, strict=True)))
 
 
 def _columns(data: xr.Dataset) -> list[str]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.stick_phases import stick_phases
 from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.targets import written_whole
+from mesoslip.output.tables import write_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -230,26 +229,3 @@ def write_csv(tree: xr.DataTree, path: Path) -> None:
     data = slips(tree)
     units = {name: data[name].attrs.get("units", "1") for name in COLUMNS}
     write_table(rows(tree), units, path)
-
-
-def write_table(rows: Iterable[Mapping[str, Any]], units: Mapping[str, str], path: Path) -> None:
-    """Write a table as comma-separated values.
-
-    Parameters
-    ----------
-    rows
-        A dictionary for each row.
-    units
-        Unit of each column, for the header.
-    path
-        The file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
-    with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(units))
-        writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
-        writer.writerows(rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -10,6 +9,7 @@ import typer
 from mesoslip.command_line.options import (
     JsonOption,
     OutputArgument,
+    TableOption,
     counted,
     print_json,
     print_table,
@@ -48,27 +48,22 @@ STATISTICS_ONLY = {
 
 def slips(
     output: OutputArgument,
-    table: Annotated[
-        Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
-    ] = None,
+    table: TableOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Print the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogue
     from mesoslip.analysis.apparatus import apparatus_of
     from mesoslip.output import files, targets
+    from mesoslip.output.tables import PrintedTable, is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
     tree = files.read_run(output)
-    if table is not None:
+    if table is not None and not is_printed(table):
         catalogue.write_csv(tree, table)
     rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
     counts = catalogue.counts(tree)
-    if as_json:
-        answer = {"slips": rows, "statistics": statistics}
-        print_json(answer if counts is None else answer | {"slip_counts": counts})
-        return
     # Columns of which nothing is known, as breaks of a measured trace, are left out.
     shown = [name for name in COLUMNS if not rows or any(row[name] is not None for row in rows)]
     force_unit = apparatus_of(tree).force_unit
@@ -82,6 +77,13 @@ def slips(
     if tree.sizes["realization"] > 1:
         owners = ["realization", *(str(row["realization_index"]) for row in rows)]
         table_rows = [[owner, *row] for owner, row in zip(owners, table_rows, strict=True)]
+    if table is not None and is_printed(table):
+        names, *cells = map(tuple, table_rows)
+        write_printed([PrintedTable("Slips", names, tuple(cells))], table)
+    if as_json:
+        answer = {"slips": rows, "statistics": statistics}
+        print_json(answer if counts is None else answer | {"slip_counts": counts})
+        return
     print_table(table_rows)
     typer.echo(f"{counted(len(rows), 'slip')}{'; all columns with --csv FILE' if rows else ''}")
     for name in shown:
@@ -127,9 +129,7 @@ def _print_counts(counts: dict[str, Any], unit: str) -> None:
 
 def avalanches(
     output: OutputArgument,
-    table: Annotated[
-        Path | None, typer.Option("--csv", help="Write the catalogue as a table", metavar="FILE")
-    ] = None,
+    table: TableOption = None,
     as_json: JsonOption = False,
     min_size: Annotated[
         int | None,
@@ -155,13 +155,16 @@ def avalanches(
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
+    from mesoslip.output.tables import is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
     tree = files.read_run(output)
     start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, min_force_ratio=min_force_ratio)
-    if table is not None:
+    if table is not None and is_printed(table):
+        write_printed([avalanche_catalogue.printed(data)], table)
+    elif table is not None:
         avalanche_catalogue.write_csv(data, table)
     statistics = avalanche_catalogue.avalanche_summary(
         tree, after=start, min_force_ratio=min_force_ratio, min_size=min_size

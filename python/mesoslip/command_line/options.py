@@ -46,6 +46,16 @@ PoolOption = Annotated[
         metavar="POOL",
     ),
 ]
+TableOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--table",
+        "--csv",
+        help="Write the table to a file: .md for Markdown, .tex for LaTeX with booktabs, otherwise "
+        "comma-separated values in SI units",
+        metavar="FILE",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units")]
 
 

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import JsonOption, print_json, print_table, quantity_or_none
+from mesoslip.command_line.options import (
+    JsonOption,
+    TableOption,
+    print_json,
+    print_table,
+    quantity_or_none,
+)
 
 if TYPE_CHECKING:
     from mesoslip.analysis.response import ResponseTable
@@ -17,10 +23,7 @@ def response(
     outputs: Annotated[
         list[Path], typer.Argument(help="Outputs of mesoslip run or trace", metavar="OUT.nc...")
     ],
-    table: Annotated[
-        Path | None,
-        typer.Option("--csv", help="Write a table with a row for each stage", metavar="FILE"),
-    ] = None,
+    table: TableOption = None,
     as_json: JsonOption = False,
     normal_force: Annotated[
         str | None,
@@ -44,20 +47,21 @@ def response(
     from mesoslip.analysis import response as responses
     from mesoslip.analysis.response import (
         force_scale,
-        latex,
-        markdown,
         rows_of,
         scalars_of,
         tables,
         write_csv,
     )
     from mesoslip.output import targets
+    from mesoslip.output.tables import is_printed, latex, markdown, write_printed
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
         targets.check_writable(table, outputs)
     tree = responses.response(outputs, normal_force=scale, fit=fit, free_stiffness=free_stiffness)
-    if table is not None:
+    if table is not None and is_printed(table):
+        write_printed(tables(tree), table)
+    elif table is not None:
         write_csv(tree, table)
     if as_json:
         groups = {str(name): rows_of(tree, str(name)) for name in tree.children}

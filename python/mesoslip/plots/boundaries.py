@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
 
 from mesoslip.plots.sweep_axis import SweptKey
 
+Array = NDArray[np.float64]
+
 # The measure in whose pictures the boundaries are drawn.
 REGIME = "regime"
+# Points of a sweep along a key from which lines are smooth, and points between them.
+MIN_POINTS = 4
+FINE_POINTS = 200
+# Distance of the legend from axes, in sizes of its font.
+LINES_BELOW = 3.6
 
 
 class Boundary(NamedTuple):
@@ -23,20 +34,28 @@ class Boundary(NamedTuple):
     value: float
     style: Literal["-", "--", "-.", ":"]
     label: str
+    # Whether the measure is smooth, and positive.
+    is_smooth: bool = True
+    is_positive: bool = False
 
 
 BOUNDARIES = (
     Boundary("growth_rate", 0.0, "-.", "steady sliding with delay turns unstable"),
-    Boundary("stable_out_of_step", 0.5, "-", "the same, contacts out of step"),
-    Boundary("critical_stiffness_ratio", 1.0, "--", "$K = K^*$"),
-    Boundary("waiting_over_damping", 1.0, ":", r"$\tau_{ss} \eta_S = 1$"),
+    Boundary("stable_out_of_step", 0.5, "-", "the same, contacts out of step", is_smooth=False),
+    Boundary("critical_stiffness_ratio", 1.0, "--", "$K = K^*$", is_positive=True),
+    Boundary("waiting_over_damping", 1.0, ":", r"$\tau_{ss} \eta_S = 1$", is_positive=True),
 )
 
 
-def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> None:
-    """Draw the boundaries in a map over two keys, those whose measures pass their value."""
+def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> list[Line2D]:
+    """Draw the boundaries in a map over two keys, those whose measures pass their value.
+
+    Returns
+    -------
+    list of Line2D
+        Lines for a legend.
+    """
     dimensions = data[REGIME].dims[:2]
-    x, y = (key.values[key.order] for key in keys)
     drawn = []
     for one in BOUNDARIES:
         if one.measure not in data:
@@ -44,14 +63,43 @@ def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> None:
         values = data[one.measure].mean("realization").transpose(*dimensions).values
         values = np.ma.masked_invalid(values[np.ix_(*(key.order for key in keys))].T)
         if values.count() and values.min() < one.value < values.max():
-            line = axes.contour(x, y, values, [one.value], colors="black", linewidths=1.2)
+            x, y, values, level = _interpolated(one, keys, values)
+            line = axes.contour(x, y, values, [level], colors="black", linewidths=1.2)
             line.set_linestyle(one.style)
             drawn.append(one)
-    _add_legend(axes, drawn)
+    return _handles(drawn)
 
 
-def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> None:
-    """Draw the boundaries along one key, interpolated between its values."""
+def _interpolated(
+    boundary: Boundary, keys: list[SweptKey], values: Any
+) -> tuple[Array, Array, Any, float]:
+    """Axes, values of a measure and level, between the points of a sweep by cubic splines.
+
+    Splines are those of the logarithm of what is positive, over the axes as they are drawn.
+    Measures that are unknown somewhere, or that jump, stay as they are.
+    """
+    axes = [key.values[key.order] for key in keys]
+    level = boundary.value
+    if (
+        not boundary.is_smooth
+        or not np.isfinite(np.ma.filled(values, np.nan)).all()
+        or min(values.shape) < MIN_POINTS
+    ):
+        return axes[0], axes[1], values, level
+    if boundary.is_positive and values.min() > 0:
+        values, level = np.log(values), math.log(level)
+    places = [
+        np.log(one) if key.is_logarithmic else one for one, key in zip(axes, keys, strict=True)
+    ]
+    fine = [np.linspace(one[0], one[-1], FINE_POINTS) for one in places]
+    spline = RectBivariateSpline(places[1], places[0], np.asarray(values))
+    between = spline(fine[1], fine[0])
+    x, y = (np.exp(one) if key.is_logarithmic else one for one, key in zip(fine, keys, strict=True))
+    return x, y, between, level
+
+
+def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> list[Line2D]:
+    """Draw the boundaries along one key, interpolated between its values; lines for a legend."""
     values = key.values[key.order]
     x = np.log(values) if key.is_logarithmic else values
     drawn = []
@@ -67,10 +115,22 @@ def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> None:
             axes.axvline(crossing, color="black", linestyle=one.style, linewidth=1.2)
         if changes.size:
             drawn.append(one)
-    _add_legend(axes, drawn)
+    return _handles(drawn)
 
 
-def _add_legend(axes: Axes, drawn: list[Boundary]) -> None:
-    handles = [Line2D([], [], color="black", linestyle=one.style, label=one.label) for one in drawn]
+def _handles(drawn: list[Boundary]) -> list[Line2D]:
+    return [Line2D([], [], color="black", linestyle=one.style, label=one.label) for one in drawn]
+
+
+def add_legend(axes: Axes, handles: list[Line2D]) -> None:
+    """Put the legend of boundaries below axes and the labels of their axis."""
     if handles:
-        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0, -0.2), ncols=1)
+        scale = axes.figure.figure.dpi_scale_trans
+        below = ScaledTranslation(0, -LINES_BELOW * mpl.rcParams["font.size"] / 72, scale)
+        axes.legend(
+            handles=handles,
+            loc="upper left",
+            bbox_to_anchor=(0, 0),
+            bbox_transform=axes.transAxes + below,
+            borderaxespad=0,
+        )

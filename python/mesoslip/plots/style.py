@@ -77,7 +77,7 @@ def titles(
     beside_legend
         Whether a line is left for a legend between title and axes.
     """
-    width = _width(axes)
+    width = axes_width(axes)
     texts = [*headings(tree), about]
     lines = [filled(text, width, max_lines=2) for text in texts if text]
     lines += [mathematical] if mathematical else []
@@ -98,16 +98,16 @@ def headings(tree: xr.DataTree) -> list[str]:
 def filled(text: str, width: float, max_lines: int | None = None) -> str:
     """A text in lines of a width [inch]."""
     return textwrap.fill(
-        plain(text), max(20, _characters(width)), max_lines=max_lines, placeholder=" …"
+        plain(text), max(20, characters(width)), max_lines=max_lines, placeholder=" …"
     )
 
 
-def _characters(width: float) -> int:
+def characters(width: float) -> int:
     """Characters in a line of a width [inch]."""
     return int(CHARACTERS_PER_INCH * width * 8 / mpl.rcParams["font.size"])
 
 
-def _width(axes: Axes) -> float:
+def axes_width(axes: Axes) -> float:
     """Approximate width of axes [inch]."""
     bounds, figure = axes.get_subplotspec(), axes.figure
     whole = figure.bbox.width / figure.figure.dpi
@@ -144,7 +144,7 @@ def _legend_columns(axes: Axes, columns: int = 3) -> int:
     # Formulas are shorter than their source; a line and its distance take five characters.
     labels = axes.get_legend_handles_labels()[1]
     lengths = [len(re.sub(r"\\[a-z]+|[${}_^]", "", one)) + 5 for one in labels]
-    room = 1.15 * _characters(_width(axes))
+    room = 1.15 * characters(axes_width(axes))
     for count in range(min(columns, len(labels)), 1, -1):
         rows = -(-len(labels) // count)
         widths = [max(lengths[at : at + rows]) for at in range(0, len(lengths), rows)]

@@ -10,12 +10,18 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.configuration.units import from_cf_units
+from mesoslip.plots.names import name_of
+from mesoslip.plots.style import axes_width, characters
 from mesoslip.quantities import Scale, number, scale_for
 
 Array = NDArray[np.float64]
 
 # Keys whose values span more than this factor have a logarithmic axis.
 LOGARITHMIC_RANGE = 5.0
+# Measures that span more than this factor have logarithmic colours and axes.
+LOGARITHMIC_MEASURE = 30.0
+# Share of the width of a map that its bar of colours takes.
+COLOR_BAR = 0.4
 # Values of an axis of a map up to which each has a label.
 MAX_LABELS = 8
 
@@ -47,10 +53,12 @@ class SweptKey:
         values = coordinate.values
         if values.dtype.kind not in "fiu":
             positions = np.arange(len(values), dtype=np.float64)
-            return cls(str(coordinate.name), positions, tuple(map(str, values)), False)
+            return cls(name_of(str(coordinate.name)), positions, tuple(map(str, values)), False)
         scale = scale_of(coordinate)
         is_wide = np.min(values) > 0 and np.max(values) > LOGARITHMIC_RANGE * np.min(values)
-        return cls(scale.label(str(coordinate.name)), values / scale.size, (), bool(is_wide))
+        return cls(
+            scale.label(name_of(str(coordinate.name))), values / scale.size, (), bool(is_wide)
+        )
 
     @property
     def order(self) -> NDArray[np.intp]:
@@ -83,8 +91,31 @@ class SweptKey:
         """Label each value of an axis of a map, if they are few."""
         if len(self.values) <= MAX_LABELS and not self.words:
             getattr(axes, f"set_{which}ticks")([], minor=True)
-            labels = [number(one, 3) for one in self.values.tolist()]
-            getattr(axes, f"set_{which}ticks")(self.values, labels)
+            values = self.values[self.order]
+            labels = [number(one, 3) for one in values.tolist()]
+            if which == "x":
+                labels = self._without_collisions(axes, labels)
+            getattr(axes, f"set_{which}ticks")(values, labels)
+
+    def _without_collisions(self, axes: Axes, labels: list[str]) -> list[str]:
+        """Labels of ticks, without those that would reach into the one before."""
+        edges, values = self.edges, self.values[self.order]
+        if self.is_logarithmic:
+            edges, values = np.log(edges), np.log(values)
+        room = characters(axes_width(axes)) * (1 - COLOR_BAR)
+        places = room * (values - edges[0]) / (edges[-1] - edges[0])
+        shown, end = [], -np.inf
+        for place, label in zip(places.tolist(), labels, strict=True):
+            fits = place - len(label) / 2 >= end
+            shown.append(label if fits else "")
+            end = place + len(label) / 2 + 1 if fits else end
+        return shown
+
+
+def spans_decades(values: Array) -> bool:
+    """Whether values of a measure are best shown on a logarithmic scale."""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0 and known.max() > LOGARITHMIC_MEASURE * known.min())
 
 
 def scale_of(data: xr.DataArray) -> Scale:

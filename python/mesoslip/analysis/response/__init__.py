@@ -16,8 +16,6 @@ from mesoslip.analysis.response.steady import steady_line
 from mesoslip.analysis.response.tables import (
     ResponseTable,
     force_scale,
-    latex,
-    markdown,
     tables,
 )
 
@@ -26,9 +24,7 @@ __all__ = [
     "ResponseTable",
     "force_scale",
     "healing_line",
-    "latex",
     "line",
-    "markdown",
     "response",
     "response_of",
     "rows_of",

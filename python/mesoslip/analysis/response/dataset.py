@@ -19,9 +19,9 @@ from mesoslip.analysis.response.holds import healing_line, hold_rows
 from mesoslip.analysis.response.line import Line
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
-from mesoslip.analysis.slips import write_table
 from mesoslip.errors import FileError
 from mesoslip.output.inputs import OutputLike, as_run, several
+from mesoslip.output.tables import write_table
 from mesoslip.output.variables import Group
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,32 +10,24 @@ from typing import Any
 import xarray as xr
 
 from mesoslip.analysis.response.dataset import ratio_name, rows_of, scalars_of
+from mesoslip.output.tables import PrintedTable
 from mesoslip.quantities import column, with_error, with_unit
 
 Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class ResponseTable:
+class ResponseTable(PrintedTable):
     """A table of a response.
 
     Attributes
     ----------
-    title
-        What a row is.
-    head
-        Headers, with units.
-    rows
-        Cells, as many in each row as there are columns.
     notes
         A note on each row; empty if there is none.
     line
         Slope of the line through the rows, as a sentence; empty if there is none.
     """
 
-    title: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
     line: str = ""
 
@@ -238,54 +229,3 @@ def _line(scalars: Mapping[str, Any], name: str, meaning: str, suffix: str) -> s
         ending = "s" if freedom > 1 else ""
         text += f" (chi square {square:.3g} with {freedom} degree{ending} of freedom)"
     return text
-
-
-# Texts of cells, and headers, as LaTeX writes them.
-LATEX = {
-    "µ": r"\textmu{}",
-    "±": r"$\pm$",
-    "D_c2": r"$D_{c,2}$",
-    "D_c": r"$D_c$",
-    "a - b": r"$a - b$",
-    "b2": r"$b_2$",
-    "%": r"\%",
-    "_": r"\_",
-}
-
-
-def latex(table: ResponseTable) -> str:
-    """A table as LaTeX, a ``tabular`` without packages.
-
-    Parameters
-    ----------
-    table
-        The table.
-    """
-    rows = [" & ".join(map(_latex, row)) + r" \\" for row in (table.head, *table.rows)]
-    lines = [
-        r"\begin{tabular}{" + "l" + "r" * (len(table.head) - 1) + "}",
-        r"\hline",
-        rows[0],
-        r"\hline",
-        *rows[1:],
-        r"\hline",
-        r"\end{tabular}",
-    ]
-    return "\n".join(lines)
-
-
-def _latex(text: str) -> str:
-    pattern = "|".join(re.escape(one) for one in LATEX)
-    return re.sub(pattern, lambda found: LATEX[found.group()], text)
-
-
-def markdown(table: ResponseTable) -> str:
-    """A table as Markdown.
-
-    Parameters
-    ----------
-    table
-        The table.
-    """
-    lines = [table.head, ("---",) * len(table.head), *table.rows]
-    return "\n".join(f"| {' | '.join(one)} |" for one in lines)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
+from mesoslip.plots.names import symbol_or_name
 from mesoslip.plots.printing import UNLETTERED, current, is_narrow
 from mesoslip.plots.style import BLUE, Canvas, canvas, plain, styled
 from mesoslip.plots.views.base import Options, View
@@ -23,18 +24,6 @@ Array = NDArray[np.float64]
 
 MEASURED = "black"
 PREDICTED = BLUE
-# Symbols of parameters.
-SYMBOLS = {
-    "contacts.static_force": "$F_s$",
-    "contacts.threshold.relative_width": r"$\Delta f_s/f_s$",
-    "contacts.delay": r"$\tau_d$",
-    "contacts.stiffness": "$Nk$",
-    "contacts.back_force_ratio": "$f_b/f_s$",
-    "slider.stiffness": "$K$",
-    "slider.mass": "$M$",
-    "slider.damping_ratio": r"$\eta_S/\Omega_S$",
-    "fit.wander": "wander",
-}
 # Bins of the histograms of slips.
 BINS = 16
 # Draws of a pair of parameters that are shown.
@@ -72,7 +61,7 @@ def _scale(draws: xr.DataArray) -> Scale:
 
 def _label(name: str, scale: Scale) -> str:
     """Symbol and unit of a parameter."""
-    return scale.label(SYMBOLS.get(name, name.rpartition(".")[2].replace("_", " ")))
+    return scale.label(symbol_or_name(name))
 
 
 def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:

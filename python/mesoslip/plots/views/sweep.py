@@ -8,14 +8,16 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
-from mesoslip.plots.boundaries import BOUNDARIES, REGIME, draw_contours, draw_crossings
+from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
+from mesoslip.plots.names import name_of, symbol_or_name
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, Canvas, canvas, styled
-from mesoslip.plots.sweep_axis import SweptKey, scale_of
+from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, filled, styled
+from mesoslip.plots.sweep_axis import SweptKey, scale_of, spans_decades
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
 
@@ -51,8 +53,11 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     with styled(), mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
         figure = canvas(figure, (max(4.4, 3.4 * columns), 2.5 * rows + 0.4))
         all_axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        lines: dict[str, Line2D] = {}
         for axes, (part, name) in zip(all_axes, panels, strict=False):
-            _draw_measure(axes, part, name)
+            lines |= {str(one.get_label()): one for one in _draw_measure(axes, part, name)}
+        if lines:
+            figure.legend(handles=list(lines.values()), loc="outside lower left")
         for axes in all_axes[len(panels) :]:
             axes.remove()
     return figure
@@ -71,7 +76,7 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     """
     data = tree.to_dataset()
     name = measures(data)[0] if options.measure is None else _known(data, options.measure)
-    _draw_measure(axes, data, name)
+    add_legend(axes, _draw_measure(axes, data, name))
 
 
 def measures(data: xr.Dataset) -> list[str]:
@@ -88,7 +93,9 @@ def _known(data: xr.Dataset, name: str) -> str:
     return name
 
 
-def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> None:
+def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
+    """Draw a measure; lines of boundaries for a legend."""
+    lines: list[Line2D] = []
     data, names, fixed = _first_two_keys(data)
     keys = [SweptKey.of(data[one]) for one in names]
     scale = scale_of(data[name])
@@ -97,17 +104,19 @@ def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> None:
     if len(keys) == 1:
         _draw_dots(axes, measure, keys[0], choices)
         if name == REGIME:
-            draw_crossings(axes, data, keys[0])
+            lines = draw_crossings(axes, data, keys[0])
     else:
         _draw_map(axes, measure, keys, choices)
         if name == REGIME:
-            draw_contours(axes, data, keys)
+            lines = draw_contours(axes, data, keys)
     for key, which in zip(keys, "xy", strict=False):
         key.apply(axes, which)
     if len(keys) == 2:
         for key, which in zip(keys, "xy", strict=True):
             key.label_values(axes, which)
-    axes.set_title("; ".join([scale.label(name), *fixed]), loc="left")
+    title = "; ".join([scale.label(name_of(name)), *fixed])
+    axes.set_title(filled(title, axes_width(axes)), loc="left")
+    return lines
 
 
 def _first_two_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
@@ -115,7 +124,7 @@ def _first_two_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]
     two, and the values of the others in words."""
     dimensions = [str(name) for name in data["status"].dims if name != "realization"]
     further = dimensions[2:]
-    fixed = [f"{name} = {_value(data[name])}" for name in further]
+    fixed = [f"{symbol_or_name(name)} = {_value(data[name])}" for name in further]
     data = data.isel(dict.fromkeys(further, 0))
     keys = []
     for name in dimensions[:2]:
@@ -140,7 +149,10 @@ def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[
     if choices:
         axes.set_yticks(range(len(choices)), choices)
         axes.set_ylim(-0.5, len(choices) - 0.5)
-    elif values.shape[1] > 1 and measure.dims[0] != "sample":
+        return
+    if spans_decades(values):
+        axes.set_yscale("log")
+    if values.shape[1] > 1 and measure.dims[0] != "sample":
         mean = measure.mean("realization").values
         axes.plot(key.values[key.order], mean[key.order], color="black")
 
@@ -153,7 +165,8 @@ def _draw_map(
     shown = shown[np.ix_(*(key.order for key in keys))].T
     edges = keys[0].edges, keys[1].edges
     if not choices:
-        mesh = axes.pcolormesh(*edges, shown, cmap="viridis")
+        scale = LogNorm() if spans_decades(shown) else None
+        mesh = axes.pcolormesh(*edges, shown, cmap="viridis", norm=scale)
         axes.figure.colorbar(mesh, ax=axes)
         return
     colors = ListedColormap(CHOICE_COLORS[: len(choices)])

@@ -1,0 +1,120 @@
+"""Tables as files: comma-separated values in SI, Markdown, and LaTeX with booktabs."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mesoslip.output.targets import written_whole
+
+# Endings of files of printed tables; all others are comma-separated values.
+MARKDOWN, LATEX = ".md", ".tex"
+
+# Texts of cells, and headers, as LaTeX writes them.
+LATEX_TEXTS = {
+    "µ": r"\textmu{}",
+    "±": r"$\pm$",
+    "D_c2": r"$D_{c,2}$",
+    "D_c": r"$D_c$",
+    "a - b": r"$a - b$",
+    "b2": r"$b_2$",
+    "%": r"\%",
+    "_": r"\_",
+    "&": r"\&",
+    "#": r"\#",
+    "$": r"\$",
+}
+
+
+@dataclass(frozen=True)
+class PrintedTable:
+    """A table of texts.
+
+    Attributes
+    ----------
+    title
+        What a row is.
+    head
+        Headers, with units.
+    rows
+        Cells, as many in each row as there are columns.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def is_printed(path: Path) -> bool:
+    """Whether a file is of printed tables, Markdown or LaTeX."""
+    return path.suffix.lower() in {MARKDOWN, LATEX}
+
+
+def latex(table: PrintedTable) -> str:
+    """A table as LaTeX, a ``tabular`` with the lines of booktabs."""
+    rows = [" & ".join(map(_latex, row)) + r" \\" for row in (table.head, *table.rows)]
+    lines = [
+        r"\begin{tabular}{" + "l" + "r" * (len(table.head) - 1) + "}",
+        r"\toprule",
+        rows[0],
+        r"\midrule",
+        *rows[1:],
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    return "\n".join(lines)
+
+
+def _latex(text: str) -> str:
+    pattern = "|".join(re.escape(one) for one in LATEX_TEXTS)
+    return re.sub(pattern, lambda found: LATEX_TEXTS[found.group()], text)
+
+
+def markdown(table: PrintedTable) -> str:
+    """A table as Markdown; numbers are aligned right."""
+    marks = (":---", *("---:" for _ in table.head[1:]))
+    lines = [table.head, marks, *table.rows]
+    return "\n".join(f"| {' | '.join(one)} |" for one in lines)
+
+
+def write_printed(tables: Sequence[PrintedTable], path: Path) -> None:
+    """Write tables as Markdown or LaTeX, by the ending of the file.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    if path.suffix.lower() == LATEX:
+        parts = [r"% \usepackage{booktabs}", *(f"% {one.title}\n{latex(one)}" for one in tables)]
+    else:
+        parts = [f"**{one.title}**\n\n{markdown(one)}" for one in tables]
+    with written_whole(path) as part:
+        part.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def write_table(rows: Iterable[Mapping[str, Any]], units: Mapping[str, str], path: Path) -> None:
+    """Write a table as comma-separated values.
+
+    Parameters
+    ----------
+    rows
+        A dictionary for each row.
+    units
+        Unit of each column, for the header.
+    path
+        The file.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(units))
+        writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
+        writer.writerows(rows)

@@ -52,7 +52,7 @@ def steady_force(config: Config, velocity: float) -> float:
         work = float(weight @ (broken**2 - back**2)) / 2
         return contacts.static_force * work / float(weight @ (broken - back))
     speed = velocity / contacts.break_stretch
-    life = _lives(config, threshold, speed)
+    life = lives(config, threshold, speed)
     delay = 0.0 if config.slider.ignores_delay else contacts.delay
     work = float(weight @ (back * life + speed * life**2 / 2))
     drag = contacts.contact_drag * contacts.count * velocity * delay
@@ -66,7 +66,7 @@ def mean_life(config: Config, velocity: float) -> float:
     if velocity == 0:
         broken = _threshold(config, threshold, np.inf)
         return stretch * float(weight @ broken - config.contacts.back_force_ratio)
-    return velocity * float(weight @ _lives(config, threshold, velocity / stretch))
+    return velocity * float(weight @ lives(config, threshold, velocity / stretch))
 
 
 def restart_peak(config: Config, velocity: float, hold: float) -> float:
@@ -101,8 +101,8 @@ def restart_peak(config: Config, velocity: float, hold: float) -> float:
     weight, threshold = threshold_quadrature(config, PANELS, POINTS)
     back = contacts.back_force_ratio
     speed = velocity / contacts.break_stretch
-    life = speed * _lives(config, threshold, speed)
-    held = speed * _lives(config, threshold, speed, hold)
+    life = speed * lives(config, threshold, speed)
+    held = speed * lives(config, threshold, speed, hold)
     mean = float(weight @ life)
     # The force is concave in y, and straight between the displacements at which contacts start to
     # break: its maximum is at one of them.
@@ -121,7 +121,7 @@ def _threshold(config: Config, configured: Array, age: float | Array) -> Array:
     return config.contacts.ageing.threshold(configured, width, age)
 
 
-def _lives(config: Config, configured: Array, speed: float, older: float = 0.0) -> Array:
+def lives(config: Config, configured: Array, speed: float, older: float = 0.0) -> Array:
     """Times T at which contacts break whose forces grow by f_s times a speed in a second [s].
 
     They are older than that by a time in which they were held.

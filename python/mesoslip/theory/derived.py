@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing, Thermal
+from mesoslip.errors import ConfigError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import quantities
@@ -192,7 +193,7 @@ def _lives(config: Config) -> Iterator[tuple[str, float, str, str]]:
 def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str, str]]:
     """Thermally activated breaking, and friction at the velocity of the drive."""
     # scipy takes long to import.
-    from mesoslip.theory.thermal import steady_force, steady_slope
+    from mesoslip.theory.thermal import creep_velocity, steady_force, steady_slope
 
     contacts = config.contacts
     ratio = thermal.ratio(contacts.contact_static_force)
@@ -211,8 +212,9 @@ def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str
         "omega_0 f_T/k: in much faster sliding contacts come to their thresholds",
     )
     speed = config.drive_speed
-    is_known = contacts.ageing is None and contacts.newborn_width == 0
-    if speed > 0 and contacts.reattach and is_known:
+    if contacts.newborn_width > 0 or not contacts.reattach:
+        return
+    if speed > 0:
         yield (
             "F_steady_drive",
             steady_force(config, speed),
@@ -223,7 +225,52 @@ def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str
             "F_steady_slope",
             steady_slope(config, speed),
             "N",
-            "dF/d ln v of stationary sliding at the drive's velocity",
+            "dF/d ln v of stationary sliding at the drive's velocity, a - b: below zero sliding "
+            "weakens with velocity",
+        )
+        yield from _rate_and_state(config, speed)
+    force = _first_force(config)
+    if force > 0:
+        yield (
+            "creep_velocity",
+            creep_velocity(config, force),
+            "m/s",
+            "velocity of steady creep under the force of the drive, that of the first stage",
+        )
+
+
+def _first_force(config: Config) -> float:
+    """Constant force of the drive, or that of the first stage [N]; 0 for a ramp from 0."""
+    if config.drive.force is not None:
+        return config.drive.force
+    stages = config.drive.stage or ()
+    return stages[0].first_force if stages and stages[0].is_force else 0.0
+
+
+def _rate_and_state(config: Config, speed: float) -> Iterator[tuple[str, float, str, str]]:
+    """Rate and state of activated contacts at the velocity of the drive."""
+    from mesoslip.theory.activated_sliding import ActivatedSliding
+
+    try:
+        found = ActivatedSliding(config, speed).rate_and_state
+    except ConfigError:
+        return
+    yield "direct_effect", found.a, "N", "a of rate and state: N f_T of the pinned contacts"
+    yield "evolution_effect", found.b, "N", "b of rate and state: a - dF/d ln v"
+    yield (
+        "slip_distance",
+        found.slip_distance,
+        "m",
+        "D_c: displacement over which the force evolves after a small velocity step",
+    )
+    mass = getattr(config.slider, "mass", None)
+    if found.b > found.a and mass is not None and 0 < config.spring_stiffness < math.inf:
+        yield (
+            "critical_stiffness_estimate",
+            found.critical_stiffness(speed, mass),
+            "N/m",
+            "Rice and Ruina's K_c = ((b - a)/D_c)(1 + M v^2/(a D_c)) at the drive's velocity: with "
+            "softer springs steady sliding is unstable",
         )
 
 

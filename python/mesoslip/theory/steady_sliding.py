@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from functools import cache, cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,9 +74,7 @@ WITHOUT_AGEING = (
 )
 
 WITHOUT_ACTIVATION = (
-    "has no linear stability theory here: contacts that break by thermal activation break at rates "
-    "that depend on the history of the motion; `mesoslip info` gives the steady force at the "
-    "velocity of the drive"
+    "has a response of its own: use mesoslip.theory.activated_sliding.ActivatedSliding"
 )
 
 
@@ -138,6 +136,8 @@ class SteadySliding:
         If contacts age or do not attach again, or there is no velocity.
     """
 
+    is_activated: ClassVar[bool] = False
+
     def __init__(
         self,
         config: Config,
@@ -147,9 +147,9 @@ class SteadySliding:
     ) -> None:
         contacts = config.contacts
         problems = []
-        if contacts.ageing is not None:
+        if contacts.ageing is not None and not self.is_activated:
             problems.append(Problem("", "contacts.ageing", WITHOUT_AGEING))
-        if contacts.thermal is not None:
+        if contacts.thermal is not None and not self.is_activated:
             problems.append(Problem("", "contacts.thermal", WITHOUT_ACTIVATION))
         if contacts.newborn_width > 0:
             problems.append(Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH))
@@ -327,7 +327,7 @@ class SteadySliding:
         parts = self._parts(values.ravel())
         return ((parts.fed + parts.free * parts.births) / parts.births).reshape(values.shape)
 
-    def _parts(self, rate: Complex) -> _Parts:
+    def _parts(self, rate: Complex) -> Parts:
         lives, contacts = self.lives, self.config.contacts
         s = rate / self._rate
         transforms = self._transforms(s)
@@ -346,7 +346,7 @@ class SteadySliding:
         dragging = self._drag * density * self._rate
         fed -= dragging * missing**2 * transforms.mass
         free = dragging * lives.mass * (rate * self.delay + missing)
-        return _Parts(fed, births, free, np.abs(transforms.life * late))
+        return Parts(fed, births, free, np.abs(transforms.life * late))
 
     def _characteristic(self, rate: Complex) -> tuple[Complex, Complex]:
         """An entire function with the roots of Z + Λ, over λ; and one with its extra roots, over λ.
@@ -449,6 +449,11 @@ class SteadySliding:
             )
         return values
 
+    @property
+    def _is_passive(self) -> bool:
+        """Whether the force of steady contacts does not depend on the motion of the slider."""
+        return self.delay == 0
+
     @cached_property
     def unstable_count(self) -> int:
         """Number of roots that grow, each of a pair counted.
@@ -458,7 +463,7 @@ class SteadySliding:
         RunError
             If that leaves the range of floating-point numbers.
         """
-        if not self._has_motion or self.delay == 0:
+        if not self._has_motion or self._is_passive:
             return 0
         return self._right_of(NO_GROWTH * self._scale)
 
@@ -634,7 +639,7 @@ def steady_sliding(config: Config, max_work: int) -> SteadySliding | None:
     return sliding
 
 
-class _Parts(NamedTuple):
+class Parts(NamedTuple):
     """Λ = fed/births + free, for each rate; ``life`` is |ψ e^(-λ τ_d)|."""
 
     fed: Complex

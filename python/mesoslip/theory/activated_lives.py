@@ -1,0 +1,231 @@
+"""Lives of contacts that break by thermal activation, in steady sliding (model sections 9, 13).
+
+A contact that attached with the stretch x_b has at the age t the stretch x = x_b + v t and the
+threshold f_s(t), which is constant without ageing. It breaks at the rate
+
+    h(t) = ω_0 e^((k x - f_s(t))/f_T),
+
+so that it survives until the age t with the probability S(t) = exp(-∫ h dt), and breaks at its
+threshold at the latest, at the age T.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.theory import ageing
+from mesoslip.theory.thresholds import threshold_quadrature
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+Array = NDArray[np.float64]
+
+# Panels and points of the quadratures, over thresholds and over ages, and the probability beyond
+# either end of the former.
+MAX_PANELS, MIN_PANELS, POINTS = 60, 12, 10
+LEFT_OUT = 1e-15
+# Length of a panel over thresholds, over f_T.
+THRESHOLD_PANEL = 1.0
+# Hazards between which ages have a fine quadrature: below, all contacts survive, above, none.
+MIN_HAZARD, MAX_HAZARD = 1e-17, 40.0
+# Panels of the search for these ages, and maximum length of the fine ones, over f_T/(k v).
+SEARCH_PANELS, MAX_PANEL = 60, 1.0
+# Panels over the ages in which young thresholds change.
+AGEING_PANELS = 36
+# Exponents whose exponential functions are numbers.
+MAX_EXPONENT = 700.0
+
+
+class ActivatedLives:
+    """Quadratures over thresholds and ages; forces over f_s, stretches over f_s/k, times in s.
+
+    Parameters
+    ----------
+    config
+        A configuration with ``contacts.thermal``.
+    velocity
+        Positive [m/s].
+    max_panel
+        Maximum length of a panel over ages [s].
+    from_birth
+        Whether the panels are fine from birth on, and not only where contacts break: integrals over
+        later events need that.
+    coarseness
+        Length of the panels over thresholds and ages; 1 for about ten digits.
+
+    Attributes
+    ----------
+    weight
+        Weights of the thresholds, shape (thresholds, 1).
+    threshold
+        Configured thresholds, shape (thresholds, 1).
+    age, step
+        Points of the ages and their weights, shape (thresholds, points).
+    stretch, rate, hazard
+        x, h [1/s] and ∫ h dt there.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        velocity: float,
+        *,
+        max_panel: float = math.inf,
+        from_birth: bool = False,
+        coarseness: float = 1.0,
+    ) -> None:
+        contacts, thermal = config.contacts, config.contacts.thermal
+        assert thermal is not None
+        self.config = config
+        self.speed = velocity / contacts.break_stretch
+        """Stretch in a second."""
+        self.back = contacts.back_force_ratio
+        self.scale = thermal.ratio(contacts.contact_static_force)
+        """f_T/f_s."""
+        self._log_rate = math.log(thermal.rate)
+        weight, threshold = _thresholds(config, coarseness * self.scale)
+        self.weight, self.threshold = weight[:, None], threshold[:, None]
+        self.end = self._end()
+        """Ages at which contacts come to their thresholds, shape (thresholds, 1)."""
+        edges = self._edges(max_panel, from_birth, coarseness)
+        self.edges = edges
+        self._point, panel_weight = np.polynomial.legendre.leggauss(POINTS)
+        half = np.diff(edges, axis=1)[:, :, None] / 2
+        self.half = half
+        self.age = (edges[:, :-1, None] + half * (1 + self._point)).reshape(len(weight), -1)
+        self.step = (half * panel_weight).reshape(len(weight), -1)
+        self.stretch = self.back + self.speed * self.age
+        self.rate = self.rate_at(self.age, self.stretch)
+        self.hazard, self.last_hazard = self._hazards()
+        self.survival = np.exp(-self.hazard)
+
+    def rate_at(self, age: Array, stretch: Array) -> Array:
+        """h at ages, shape (thresholds, points)."""
+        exponent = (stretch - self.threshold_at(age)) / self.scale + self._log_rate
+        return np.exp(np.minimum(exponent, MAX_EXPONENT))
+
+    def threshold_at(self, age: Array) -> Array:
+        """f_s(t), shape (thresholds, points)."""
+        law = self.config.contacts.ageing
+        if law is None:
+            return np.broadcast_to(
+                self.threshold, np.broadcast_shapes(self.threshold.shape, age.shape)
+            )
+        return law.threshold(self.threshold, self.config.contacts.threshold.relative_width, age)
+
+    def mean(self, values: Array) -> float:
+        """⟨∫ values dt⟩ [s times the unit of the values]."""
+        return float(np.sum(self.weight * self.step * values))
+
+    @cached_property
+    def life(self) -> float:
+        """⟨∫ S dt⟩, the mean life [s]."""
+        return self.mean(self.survival)
+
+    @cached_property
+    def work(self) -> float:
+        """⟨∫ x S dt⟩ [s]."""
+        return self.mean(self.stretch * self.survival)
+
+    @cached_property
+    def reached(self) -> Array:
+        """Probability of coming to the threshold, shape (thresholds, 1)."""
+        return np.where(
+            self.edges[:, -1:] >= self.end * (1 - 1e-12), np.exp(-self.last_hazard[:, None]), 0.0
+        )
+
+    @cached_property
+    def approach(self) -> Array:
+        """v minus the velocity at which a threshold grows where it is reached, [1/s]."""
+        law = self.config.contacts.ageing
+        if law is None:
+            return np.full_like(self.end, self.speed)
+        change = 1e-6 * self.end
+        growth = self.threshold_at(self.end + change) - self.threshold_at(self.end - change)
+        return self.speed - growth / (2 * change)
+
+    def within(self, values: Array) -> Array:
+        """∫ values dt from the start of the panel of each point; shape (thresholds, points)."""
+        parts = values.reshape(*self.half.shape[:2], POINTS)
+        return (parts @ _cumulative().T * self.half).reshape(len(values), -1)
+
+    def _hazards(self) -> tuple[Array, Array]:
+        whole = (self.rate * self.step).reshape(*self.half.shape[:2], POINTS).sum(axis=2)
+        before = np.cumsum(whole, axis=1) - whole
+        hazard = np.repeat(before, POINTS, axis=1) + self.within(self.rate)
+        return np.minimum(hazard, MAX_EXPONENT), np.minimum(whole.sum(axis=1), MAX_EXPONENT)
+
+    def _end(self) -> Array:
+        if self.config.contacts.ageing is None:
+            return (self.threshold - self.back) / self.speed
+        return ageing.lives(self.config, self.threshold[:, 0], self.speed)[:, None]
+
+    def _edges(self, max_panel: float, from_birth: bool, coarseness: float) -> Array:
+        """Ends of the panels over ages, shape (thresholds, panels + 1)."""
+        law = self.config.contacts.ageing
+        end, start = self.end, np.zeros_like(self.end)
+        length = self.scale / self.speed
+        # The middle of a panel has less than its mean rate: contacts are broken by the age found.
+        first = np.linspace(0, 1, SEARCH_PANELS + 1) * np.ones_like(end)
+        for _ in range(3):
+            ages = start + (end - start) * first
+            steps = np.diff(ages, axis=1)
+            middle = (ages[:, 1:] + ages[:, :-1]) / 2
+            rates = self.rate_at(middle, self.back + self.speed * middle)
+            hazard = np.cumsum(rates * steps, axis=1)
+            last = np.argmax(hazard > 2 * MAX_HAZARD, axis=1)
+            is_over = hazard[:, -1] > 2 * MAX_HAZARD
+            rows = np.arange(len(end))
+            end = np.where(
+                is_over[:, None], ages[rows, np.minimum(last + 2, SEARCH_PANELS)][:, None], end
+            )
+        if not from_birth:
+            ages = np.linspace(0, 1, SEARCH_PANELS + 1) * end
+            rates = self.rate_at(ages, self.back + self.speed * ages)
+            rates = np.maximum.accumulate(rates, axis=1) * end
+            begin = np.maximum(np.sum(rates < MIN_HAZARD, axis=1) - 1, 0)
+            start = ages[np.arange(len(end)), begin][:, None]
+        longest = min(MAX_PANEL * coarseness * length, max_panel)
+        count = max(MIN_PANELS, math.ceil(float(np.max(end - start)) / longest))
+        edges = start + (end - start) * np.linspace(0, 1, count + 1)
+        if not from_birth:
+            edges = np.concatenate([np.zeros_like(end), edges], axis=1)
+        if law is not None:
+            # Young thresholds change within the ageing time: panels of equal ratios.
+            longest_age = float(np.max(end))
+            young = np.geomspace(
+                0.1 * min(law.time, longest_age), longest_age, math.ceil(AGEING_PANELS / coarseness)
+            )
+            edges = np.sort(np.concatenate([edges, np.minimum(young, end)], axis=1), axis=1)
+        return edges
+
+
+def _cumulative() -> Array:
+    """Integrals from -1 to each Gauss point, of values at these points; shape (points, points)."""
+    point, _ = np.polynomial.legendre.leggauss(POINTS)
+    vander = np.polynomial.legendre.legvander(point, POINTS - 1)
+    integrals = np.stack(
+        [
+            np.polynomial.legendre.legval(
+                point, np.polynomial.legendre.legint(np.eye(POINTS)[n], lbnd=-1)
+            )
+            for n in range(POINTS)
+        ],
+        axis=1,
+    )
+    return np.asarray(integrals @ np.linalg.inv(vander))
+
+
+def _thresholds(config: Config, scale: float) -> tuple[Array, Array]:
+    """Weights and points of a quadrature over the thresholds, as fine as f_T asks for."""
+    law = config.contacts.threshold.above(config.contacts.min_threshold)
+    weakest, strongest = law.quantile([1 - LEFT_OUT, LEFT_OUT])
+    wanted = math.ceil(float(strongest - weakest) / (THRESHOLD_PANEL * scale))
+    panels = min(MAX_PANELS, max(MIN_PANELS, wanted))
+    return threshold_quadrature(config, panels, POINTS)

@@ -1,0 +1,211 @@
+"""Friction of activated contacts: creep, holds, restarts, and the stability of steady sliding."""
+
+from __future__ import annotations
+
+import math
+
+import mesoslip
+import numpy as np
+import pytest
+from mesoslip import Config, MesoslipError, SteadySliding
+from mesoslip.theory.activated_sliding import ActivatedSliding
+from mesoslip.theory.thermal import (
+    creep_velocity,
+    hold_force,
+    restart,
+    steady_force,
+    steady_slope,
+)
+from oracles import aged
+from test_thermal import aged_force, unit
+
+LOG = {"law": "log", "time": 1.0, "growth": 0.05}
+RELAX = {"law": "relax", "time": 20.0, "young_force_ratio": 0.6, "young_relative_width": 0.3}
+
+
+@pytest.mark.parametrize("ageing", [LOG, RELAX], ids=["log", "relax"])
+def test_steady_force_of_ageing_contacts_is_that_of_a_plain_quadrature(ageing):
+    config = unit(
+        1,
+        contacts__threshold__relative_width=0.2,
+        contacts__ageing=ageing,
+        contacts__thermal__force_ratio=0.1,
+    )
+    assert steady_force(config, config.drive_speed) == pytest.approx(aged_force(config), rel=1e-3)
+
+
+@pytest.mark.parametrize("law", ["gaussian", "uniform", "weibull"])
+def test_creep_is_the_inverse_of_the_steady_force(law):
+    config = unit(1, contacts__threshold={"law": law, "relative_width": 0.2})
+    for velocity in (1e-6, 1e-2):
+        force = steady_force(config, velocity)
+        assert creep_velocity(config, force) == pytest.approx(velocity, rel=1e-8)
+    assert math.isnan(creep_velocity(config, 2.0))
+
+
+def test_damping_of_a_slider_under_a_force_slows_its_creep():
+    slider = {"kind": "force", "mass": 2.0, "damping": 3.0}
+    config = unit(1, slider=slider, drive={"force": 0.3})
+    velocity = 1e-2
+    force = steady_force(config, velocity) + 6.0 * velocity
+    assert creep_velocity(config, force) == pytest.approx(velocity, rel=1e-8)
+
+
+@pytest.mark.parametrize(("ageing", "delay"), [(None, 0.0), (None, 4.0), (LOG, 4.0)])
+def test_hold_and_restart_are_those_of_contacts_one_by_one(ageing, delay):
+    """N contacts slide, stand still and go on; within the noise of N."""
+    count, velocity, hold = 20_000, 1e-2, 300.0
+    stages = [
+        {"duration": 800.0, "velocity": velocity},
+        {"duration": hold, "velocity": 0.0},
+        {"duration": 120.0, "velocity": velocity},
+    ]
+    config = unit(
+        count,
+        run__duration=None,
+        drive={"stage": stages},
+        contacts__threshold={"law": "uniform", "relative_width": 0.3},
+        contacts__back_force_ratio=0.05,
+        contacts__delay=delay,
+        contacts__ageing=ageing,
+    )
+    tree = mesoslip.run(config)
+    time, force = tree["time"].values, tree["spring_force"].values[0] / count
+    error = 0.5 / math.sqrt(count)
+    assert abs(
+        force[(time > 700) & (time < 800)].mean() - steady_force(config, velocity) / count
+    ) < (3 * error)
+    held = time[(time > 800) & (time <= 1100)]
+    expected = hold_force(config, velocity, held[9::140] - 800) / count
+    np.testing.assert_allclose(force[np.isin(time, held[9::140])], expected, atol=4 * error)
+    predicted = restart(config, velocity, hold)
+    again = (time >= 1100) & (time <= 1200)
+    at = np.interp(velocity * (time[again] - 1100), predicted.displacement, predicted.force / count)
+    np.testing.assert_allclose(force[again], at, atol=4 * error)
+    assert predicted.peak / count > 1.02 * float(steady_force(config, velocity)) / count
+
+
+def test_a_restart_without_a_hold_is_steady():
+    config = unit(1, contacts__delay=5.0, contacts__ageing=LOG)
+    force = restart(config, 1e-2, 0.0).force
+    np.testing.assert_allclose(force, steady_force(config, 1e-2), rtol=2e-3)
+
+
+def test_holds_in_which_newborn_contacts_break_are_refused():
+    config = unit(1, contacts__back_force_ratio=0.5)
+    with pytest.raises(MesoslipError, match="attach in it with the back force"):
+        hold_force(config, 1e-2, 1e6)
+
+
+def klein_activated(rate: float, ratio: float, ageing: dict | None = None, **changes) -> Config:
+    tables = Config.load("runs/klein.toml").to_dict()
+    contacts = tables["contacts"]
+    contacts |= {"coupling": "equal", "drag_rate": 2e14, "delay": 2e-3}
+    contacts["threshold"]["relative_width"] = 0.2
+    contacts["thermal"] = {"rate": rate, "force_ratio": ratio}
+    if ageing is not None:
+        contacts["ageing"] = ageing
+    tables["drive"] = {"velocity": 1e-6}
+    return Config.from_dict(tables).replace(changes)
+
+
+def test_without_temperature_the_response_is_that_of_contacts_without():
+    warm = klein_activated(1e-3, 0.02)
+    tables = warm.to_dict()
+    del tables["contacts"]["thermal"]
+    cold = SteadySliding(Config.from_dict(tables))
+    frequency = np.array([10.0, 100.0, 400.0])
+    np.testing.assert_allclose(
+        ActivatedSliding(warm).response(frequency), cold.response(frequency), rtol=1e-5
+    )
+
+
+def test_a_slow_change_has_the_steady_slope():
+    sliding = ActivatedSliding(
+        klein_activated(1e4, 0.1, {"law": "log", "time": 1e-3, "growth": 0.02})
+    )
+    slope = steady_slope(sliding.config, 1e-6) / 1e-6
+    assert complex(sliding.response_at(1e-3)).real / 1e-3 == pytest.approx(slope, rel=1e-4)
+
+
+def test_fast_motion_joins_slower_motion():
+    sliding = ActivatedSliding(klein_activated(1e4, 0.2))
+    lives = sliding._lives_for(0.0)
+    limit = 20 * lives.speed / lives.scale
+    below, above = sliding.response(np.array([0.999, 1.001]) * limit)
+    assert abs(above / below - 1) < 0.01
+
+
+@pytest.mark.parametrize("ageing", [None, LOG], ids=["", "log"])
+@pytest.mark.parametrize("delay", [0.0, 20.0])
+def test_response_is_that_of_cohorts_in_small_steps(ageing, delay):
+    """The master equation in small steps of time, under a slider that oscillates a little."""
+    velocity, amplitude, frequency = 1e-2, 1e-3, 0.15
+    config = unit(
+        1,
+        contacts__threshold={"law": "uniform", "relative_width": 0.1},
+        contacts__thermal__force_ratio=0.1,
+        contacts__ageing=ageing,
+        contacts__delay=delay,
+    )
+    period = 2 * math.pi / frequency
+    step = period / 400
+    late = round(delay / step)
+    config = config.replace({"contacts.delay": late * step})
+    sliding = ActivatedSliding(config)
+    threshold = 1 + 0.1 * math.sqrt(3) * (2 * (np.arange(6) + 0.5) / 6 - 1)
+    ages = step * (np.arange(1700) + 0.5)
+    limit = (
+        np.array([aged(config, ages)[0] * one for one in threshold])
+        if ageing
+        else threshold[:, None]
+    )
+    rates = np.exp((velocity * ages - limit) / 0.1)
+    survival = np.exp(-np.cumsum(rates, axis=1) * step)
+    survival[velocity * ages >= limit] = 0
+    births = 1 / (survival.sum(axis=1).mean() * step + late * step)
+    # Numbers of contacts by age, and their stretches; births of the steps to come.
+    number, stretch = survival * births * step / 6, np.tile(velocity * ages, (6, 1))
+    waiting = np.full(late, births * step)
+    force, times = [], step * np.arange(1, 4401)
+    for time in times:
+        moved = velocity * step + amplitude * (
+            math.sin(frequency * time) - math.sin(frequency * (time - step))
+        )
+        before = stretch
+        stretch = stretch + moved
+        rate = np.exp(((before + stretch) / 2 - limit) / 0.1)
+        left = number * np.exp(-rate * step)
+        left[stretch >= limit] = 0
+        waiting = np.append(waiting, 1 - left.sum() - waiting.sum())
+        number = np.concatenate([np.full((6, 1), waiting[0] / 6), left[:, :-1]], axis=1)
+        stretch = np.concatenate([np.full((6, 1), moved / 2), stretch[:, :-1]], axis=1)
+        waiting = waiting[1:]
+        force.append(np.sum(number * stretch))
+    last = times > times[-1] - 2 * period + step / 2
+    found = 2j * np.mean(np.array(force)[last] * np.exp(-1j * frequency * times[last])) / amplitude
+    expected = complex(sliding.response(frequency))
+    assert abs(found - expected) < 0.02 * abs(expected)
+
+
+def test_the_critical_stiffness_divides_stable_from_unstable_springs():
+    config = klein_activated(
+        1e4, 0.1, {"law": "log", "time": 1e-3, "growth": 0.2}, **{"contacts.delay": 0.0}
+    )
+    limit = ActivatedSliding(config).critical_stiffness
+    assert limit is not None
+    stiffness, _ = limit
+    for factor, is_stable in ((0.97, False), (1.03, True)):
+        sliding = ActivatedSliding(config.replace({"slider.stiffness": factor * stiffness}))
+        assert sliding.is_stable == is_stable
+
+
+def test_rate_and_state_of_narrow_thresholds():
+    """a = N f_T, and b - a is half of what thresholds grow by, less half of f_T."""
+    config = klein_activated(1e4, 0.01, {"law": "log", "time": 1e-3, "growth": 0.02})
+    config = config.replace({"contacts.delay": 0.0, "contacts.threshold.relative_width": 0.02})
+    found = ActivatedSliding(config).rate_and_state
+    static = config.contacts.static_force
+    assert found.a == pytest.approx(0.01 * static, rel=1e-9)
+    assert (found.a - found.b) / static == pytest.approx((0.01 - 0.02) / 2, rel=0.4)
+    assert 0.15 < found.slip_distance / config.contacts.break_stretch < 0.5

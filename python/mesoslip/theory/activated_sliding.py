@@ -193,7 +193,8 @@ class ActivatedSliding(SteadySliding):
                 carried[:, panel - 1] + whole[:, panel - 1]
             )
         lagged = np.exp(-rate * since) * (carried[:, :, None] + inner)
-        return (lagged.reshape(decay.shape) - decay * lives.hazard) / lives.scale
+        broken: Complex = (lagged.reshape(decay.shape) - decay * lives.hazard) / lives.scale
+        return broken
 
     @cached_property
     def _path(self) -> Array:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mesoslip.configuration.sliders.force import ForceSlider
 from mesoslip.errors import MesoslipError
 from mesoslip.theory.activated_lives import ActivatedLives
 
@@ -346,8 +345,10 @@ def _attaching_after(
 
 def _ground_damping(config: Config) -> float:
     """Force of the slider's damping relative to the ground over its velocity [N s/m]."""
-    slider = config.slider
-    return slider.mass * slider.damping if isinstance(slider, ForceSlider) else 0.0
+    if not config.drive.is_force:
+        return 0.0
+    slider = config.slider.kernel_parameters(config)
+    return float(slider.get("mass", 0.0)) * float(slider.get("damping", 0.0))
 
 
 def _delay(config: Config) -> float:

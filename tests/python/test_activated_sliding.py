@@ -51,8 +51,8 @@ def test_damping_of_a_slider_under_a_force_slows_its_creep():
     assert creep_velocity(config, force) == pytest.approx(velocity, rel=1e-8)
 
 
-@pytest.mark.parametrize(("ageing", "delay"), [(None, 0.0), (None, 4.0), (LOG, 4.0)])
-def test_hold_and_restart_are_those_of_contacts_one_by_one(ageing, delay):
+@pytest.mark.parametrize("delay", [0.0, 4.0])
+def test_hold_and_restart_are_those_of_contacts_one_by_one(delay):
     """N contacts slide, stand still and go on; within the noise of N."""
     count, velocity, hold = 20_000, 1e-2, 300.0
     stages = [
@@ -67,7 +67,6 @@ def test_hold_and_restart_are_those_of_contacts_one_by_one(ageing, delay):
         contacts__threshold={"law": "uniform", "relative_width": 0.3},
         contacts__back_force_ratio=0.05,
         contacts__delay=delay,
-        contacts__ageing=ageing,
     )
     tree = mesoslip.run(config)
     time, force = tree["time"].values, tree["spring_force"].values[0] / count

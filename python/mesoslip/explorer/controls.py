@@ -149,7 +149,8 @@ CONTROLS = (
         "slider.kind",
         "kind",
         "Slider",
-        choices=tuple(SLIDERS),
+        # A slider under a force needs another drive, which has no knob.
+        choices=tuple(name for name, slider in SLIDERS.items() if not slider.takes_forces),
         required={"layered": {"slider.layers": "8"}},
     ),
     Control("slider.stiffness", "spring K", "Slider", 2),

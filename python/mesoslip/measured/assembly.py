@@ -73,7 +73,7 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     left_out = inside & ~whole
     if left_out.any():
         lines = table.lines[left_out].tolist()
-        notes.append(f"{len(lines)} {table.row}s without time or force, left out: {listed(lines)}")
+        notes.append(f"left out, without time or force: {table.row} {listed(lines)}")
     rows = np.flatnonzero(whole & inside)
     if len(rows) < MIN_SAMPLES:
         raise FileError(
@@ -91,7 +91,8 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
         if name in values and (count := int(np.isnan(values[name][picked]).sum())):
             notes.append(f"{WORDS[name]}: missing in {count} samples")
     if inside.sum() < len(inside):
-        notes.append(f"{int((~inside).sum())} {table.row}s before start or after end, left out")
+        outside = int((~inside).sum())
+        notes.append(f"left out, before start or after end: {outside} of {inside.size}")
     return Record(
         order.time,
         force[picked],

@@ -16,7 +16,7 @@ from mesoslip.plots.lines import line, max_size
 from mesoslip.plots.trace import UNITS, is_known
 from mesoslip.quantities import Scale, scale_for
 
-# Time from which on the axis of a short trace has the unit of its length [s].
+# Time from which on axes of short traces have the unit of their length, and starts are in s [s].
 LATE = 60.0
 
 
@@ -71,7 +71,7 @@ def time_since(window: tuple[float, float]) -> HorizontalAxis:
     scale = scale_for(length, "s")
     label = "time"
     if start != 0:
-        unit = scale_for(start, "s")
+        unit = scale_for(min(start, LATE / 2), "s")
         # Enough digits to find the window in the whole trace.
         digits = max(3, 2 + math.ceil(math.log10(max(abs(start) / max(length, 1e-300), 1.0))))
         label = f"time after {start / unit.size:.{digits}g} {unit.name}"

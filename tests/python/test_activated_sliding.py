@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 
 import mesoslip
 import numpy as np
 import pytest
+import tomli_w
 from mesoslip import Config, MesoslipError, SteadySliding
 from mesoslip.theory.activated_sliding import ActivatedSliding
 from mesoslip.theory.thermal import (
@@ -208,3 +210,23 @@ def test_rate_and_state_of_narrow_thresholds():
     assert found.a == pytest.approx(0.01 * static, rel=1e-9)
     assert (found.a - found.b) / static == pytest.approx((0.01 - 0.02) / 2, rel=0.4)
     assert 0.15 < found.slip_distance / config.contacts.break_stretch < 0.5
+
+
+def test_run_prints_the_velocity_of_creep_under_a_force(tmp_path, command):
+    """Two stages: that of the last one, which the theory gives to the noise of N contacts."""
+    tables = klein_activated(1e4, 0.04, **{"contacts.delay": 0.0}).to_dict()
+    tables["run"]["duration"] = 12.0
+    tables["slider"] = {"kind": "force", "mass": 1.47e-3, "damping": 50.0}
+    tables["drive"] = {
+        "stage": [{"duration": 4.0, "force": 7.6e-6}, {"duration": 8.0, "force": 7.8e-6}]
+    }
+    tables["contacts"] |= {"back_force_ratio": 0.0, "count": 2000}
+    tables["contacts"]["threshold"]["relative_width"] = 0.3
+    path = tmp_path / "creep.toml"
+    path.write_text(tomli_w.dumps(tables))
+    _, _, printed = command("run", path, "-o", tmp_path / "creep.nc")
+    assert "stick-slip" not in printed
+    found = re.search(r"mean velocity in the last stage: ([\d.]+) nm/s", printed)
+    assert found is not None
+    expected = creep_velocity(Config.from_dict(tables), 7.8e-6)
+    assert float(found[1]) * 1e-9 == pytest.approx(expected, rel=0.15)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 # Exit status after Ctrl-C.
 INTERRUPTED = 130
+# Rows of the trace that are read at once.
+MAX_ROWS = 400_000
 
 
 def run(
@@ -161,7 +164,10 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
         f"{path}: {', '.join(counts)}; relative energy residual "
         f"{abs(known['energy_residual']):.0e}; {known['wall_seconds']:.2f} s"
     )
-    say(f"{path}: {regime.summary(list(regime.regimes_of_results(results)))}")
+    if config.drive.is_force:
+        say(f"{path}: {_mean_velocity(results, config)}")
+    else:
+        say(f"{path}: {regime.summary(list(regime.regimes_of_results(results)))}")
     if known["break_count"] == 0:
         say(f"{path}: no contact broke: the drive did not move far enough")
     if known["audit"] != "passed":
@@ -173,6 +179,28 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
         say(f"{path}: warning: {unreached}")
     if known["ending"] != ENDINGS["drive"]:
         say(f"{path}: end of the run: {known['ending']}")
+
+
+def _mean_velocity(results: Results, config: Config) -> str:
+    """The mean velocity in the last stage of a drive by force, over all realizations."""
+    import numpy as np
+
+    from mesoslip.quantities import with_unit
+    from mesoslip.simulation.tables import TRACE_COLUMNS
+
+    wanted = [TRACE_COLUMNS.index(name) for name in ("time", "displacement")]
+    velocities = []
+    for one in results.realizations:
+        start, begin = 0.0, 0.0
+        for before, part in pairwise(config.drive_parts):
+            start += before.duration
+            if part.stage > before.stage and start < one.time:
+                begin = start
+        blocks = [block[:, wanted] for block in one.rows("trace").blocks(MAX_ROWS)]
+        time, displacement = np.concatenate(blocks).T
+        moved = displacement[-1] - np.interp(begin, time, displacement)
+        velocities.append(moved / (time[-1] - begin) if time[-1] > begin else 0.0)
+    return f"mean velocity in the last stage: {with_unit(float(np.mean(velocities)), 'm/s', 3)}"
 
 
 def _unreached_conditions(results: Results, config: Config) -> str:

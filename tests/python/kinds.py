@@ -128,6 +128,13 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},
+    # Contacts that fall and grow old leave two lists at once.
+    "rigid, ageing, some weaker": AGEING
+    | {
+        "contacts__threshold__relative_width": 0.2448,
+        "contacts__ageing": RELAX
+        | {"time": 1e-3, "young_force_ratio": 1.0, "young_relative_width": 0.1},
+    },
     "rigid, ageing, log": AGEING
     | {"contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03}},
     "rigid, ageing, me": AGEING | {"run__engine": "me"},

@@ -83,7 +83,8 @@ contains
    !> Put a contact whose threshold has fallen into the queue.
    subroutine retire(self, contact, time)
       class(ageing_contacts_type), intent(inout) :: self
-      integer, intent(in) :: contact
+      !> Number of the contact; a copy, as it comes from the lists that change here
+      integer, value :: contact
       real(wp), intent(in) :: time
 
       integer :: position

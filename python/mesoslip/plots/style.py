@@ -23,7 +23,7 @@ from mesoslip.plots.printing import current, is_narrow, size_of
 # A whole figure, or a part of one.
 Canvas = Figure | SubFigure
 
-# Paul Tol's high-contrast colours, which differ in lightness too (`mesoslip.mplstyle`).
+# Paul Tol's high-contrast colours, which differ in lightness too (the file mesoslip.mplstyle).
 RED, YELLOW, BLUE = "#bb5566", "#ddaa33", "#004488"
 # As in the source: the spring force in red and dashed, the contact force in black.
 SPRING: dict[str, Any] = {"color": RED, "linestyle": "--", "label": "spring force $F_d$"}
@@ -96,10 +96,13 @@ def headings(tree: xr.DataTree) -> list[str]:
 
 
 def filled(text: str, width: float, max_lines: int | None = None) -> str:
-    """A text in lines of a width [inch]."""
-    return textwrap.fill(
-        plain(text), max(20, characters(width)), max_lines=max_lines, placeholder=" …"
-    )
+    """A text in lines of a width [inch], without symbols of mathematics."""
+    return wrapped(plain(text), width, max_lines)
+
+
+def wrapped(text: str, width: float, max_lines: int | None = None) -> str:
+    """A text, which may have symbols such as $v_d$, in lines of a width [inch]."""
+    return textwrap.fill(text, max(20, characters(width)), max_lines=max_lines, placeholder=" …")
 
 
 def characters(width: float) -> int:

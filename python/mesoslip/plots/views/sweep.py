@@ -16,7 +16,7 @@ from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
 from mesoslip.plots.names import name_of, symbol_or_name
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, filled, styled
+from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, styled, wrapped
 from mesoslip.plots.sweep_axis import SweptKey, scale_of, spans_decades
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
@@ -115,7 +115,7 @@ def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
         for key, which in zip(keys, "xy", strict=True):
             key.label_values(axes, which)
     title = "; ".join([scale.label(name_of(name)), *fixed])
-    axes.set_title(filled(title, axes_width(axes)), loc="left")
+    axes.set_title(wrapped(title, axes_width(axes)), loc="left")
     return lines
 
 
@@ -138,7 +138,7 @@ def _value(coordinate: xr.DataArray) -> str:
     """The first value of a swept key, with the unit that suits all of them."""
     value = coordinate.values[0]
     if coordinate.dtype.kind not in "fiu":
-        return str(value)
+        return plain(str(value))
     scale = scale_of(coordinate)
     return f"{number(value / scale.size)} {scale.name}".rstrip()
 

@@ -18,7 +18,8 @@ module mesoslip_contacts_carried_law
    integer, parameter :: max_iterations = 200
    !> Relative change of a threshold below which a solution by interpolation is good enough
    real(wp), parameter :: enough = 1.0e-8_wp
-   !> Newton's steps from there, by moments that are exact to rounding, and the maximum relative change in one
+   !> Newton's steps from there, by moments that are exact to rounding, and the maximum relative
+   !> change in one
    integer, parameter :: exact_steps = 2
    real(wp), parameter :: max_change = 1.0e-3_wp
 

@@ -222,7 +222,9 @@ contains
          return
       end if
       place = 0.0_wp
-      if (threshold > self%min_threshold) place = (self%coordinate(threshold) - self%first) / self%step
+      if (threshold > self%min_threshold) then
+         place = (self%coordinate(threshold) - self%first) / self%step
+      end if
       cell = min(int(place), cells - 1) + 1
       moment = self%table(:, 1, cell + 1)
       length = max(0.0_wp, cell - place) * self%step

@@ -333,7 +333,8 @@ contains
       if (self%initial == initial_steady) back = self%back_force
       threshold = broken_threshold(self%coupling, back, max(0.0_wp, displacement))
       if (self%initial == initial_relaxed) then
-         if (threshold < self%moments%min_threshold .or. threshold > self%moments%max_threshold) return
+         if (threshold < self%moments%min_threshold &
+            & .or. threshold > self%moments%max_threshold) return
          density = self%law%density(threshold) &
             & * broken_threshold_slope(self%coupling, 0.0_wp, displacement)
          rates = density * [1.0_wp, threshold, stiffness_of(self%coupling, threshold)]

@@ -199,7 +199,7 @@ contains
          step = min(self%step, time - self%time)
          call self%try_step(step, next, error)
          self%steps = self%steps + 1
-         if (error /= error .or. maxval(abs(next)) > max_exponent) error = huge(1.0_wp)
+         if (.not. error <= huge(1.0_wp) .or. maxval(abs(next)) > max_exponent) error = huge(1.0_wp)
          error = error / tolerance
          factor = min(5.0_wp, max(0.2_wp, 0.9_wp * max(error, 1.0e-12_wp)**(-0.25_wp)))
          if (error <= 1.0_wp) then

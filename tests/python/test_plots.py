@@ -488,7 +488,7 @@ def test_titles_letters_and_styles(runs, tmp_path):
     figure = mesoslip.plot(runs["plain"], style=path, font_size=6)
     assert figure.axes[0].yaxis.label.get_fontsize() == 6
     for text, message in (
-        ("font.siez: 8\n", "no style of matplotlib: Bad key font.siez"),
+        ("font.height: 8\n", "no style of matplotlib: Bad key font.height"),
         ("font.size: large-ish\n", "no style of matplotlib: .*large-ish"),
         ("font.size 8\n", "no style of matplotlib: Missing colon"),
     ):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import ctypes
+import functools
 import gc
 import shlex
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -54,6 +56,23 @@ def test_each_position_of_a_slider_has_a_value(control, start):
         assert again == pytest.approx(scale.value(position), rel=1e-9)
     if start:
         assert scale.low <= start <= scale.high
+
+
+def alone(test):
+    """A test in a process of its own, where no other one has left memory or objects."""
+    code = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_explorer; "
+        f"test_explorer.{test.__name__}.__wrapped__()"
+    )
+
+    @functools.wraps(test)
+    def run_alone():
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, check=False, text=True
+        )
+        assert done.returncode == 0, done.stderr
+
+    return run_alone
 
 
 def brought_by(key):
@@ -444,6 +463,7 @@ def test_the_page_is_of_every_control():
         page.close()
 
 
+@alone
 def test_changes_leave_nothing_behind():
     """After many changes there is one run, and as many objects as after a few."""
     document = pytest.importorskip("bokeh.document").Document()
@@ -521,6 +541,7 @@ def test_a_start_too_large_for_a_page_is_not_run():
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not say")
+@alone
 def test_memory_of_a_run_that_was_replaced_is_returned():
     def resident():
         status = Path("/proc/self/status").read_text()
@@ -529,8 +550,6 @@ def test_memory_of_a_run_that_was_replaced_is_returned():
     large = explored(Config.load(KLEIN, ["contacts.count=1000000", "run.duration=1000 s"]))
     small = explored(Config.load(KLEIN, ["run.duration=0.1 s"]))
     worker, peaks, done = Newest(), [], threading.Event()
-    # Memory that earlier tests left to the allocator would hide the growth.
-    ctypes.CDLL(None).malloc_trim(0)
     before = resident()
     try:
         worker.submit(lambda stop: run_live(large, stop, lambda _: peaks.append(resident())))

@@ -4,9 +4,9 @@
 !> goes by the clock of a lower bound on its threshold, which gives a rate that is too high. Where
 !> it comes to its key it breaks with a probability, the ratio of its rate to that one; if it does
 !> not, it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly 26
-!> (1979) 403). No error is made, and there is no time step. The bound of a threshold that grows is
-!> what it was the last time; that of one that falls is what it will be after a while, when the
-!> contact gets another one.
+!> (1979) 403). No error is made, and there is no time step. The bound of a growing threshold is its
+!> last value; that of a falling one is its value after a time, when the contact gets another
+!> bound.
 module mesoslip_contacts_activated_ageing
    use mesoslip_contacts_activated_contacts, only: contact_activated_type, initialize_activated, &
       & offer_activated, respond_activated

@@ -130,7 +130,7 @@ contains
    end subroutine offer_activated
 
    !> Time in which the integral of exp(growth t + bend t**2/2) is expected to have a value; huge
-   !> where that is not to be told so simply.
+   !> where this estimate does not apply.
    pure function expected_time(growth, bend, wanted) result(time)
       !> Growth of the exponent [1/s] and its change [1/s2], the integral [s]
       real(wp), intent(in) :: growth, bend, wanted

@@ -426,6 +426,14 @@ def read_whole(path: Path) -> xr.DataTree:
         return tree.load()
 
 
+def inode(path):
+    """Number of a file; 0 without one. The program may rename it at any time."""
+    try:
+        return path.stat().st_ino
+    except FileNotFoundError:
+        return 0
+
+
 def test_killed_runs_go_on(long_run, tmp_path):
     """SIGKILL and SIGTERM at moments of all kinds; tests/resume/kill.py does it for hours."""
     expected, output = tmp_path / "whole.nc", tmp_path / "killed.nc"
@@ -439,10 +447,10 @@ def test_killed_runs_go_on(long_run, tmp_path):
     while not output.exists() or folder.exists():
         process = start(long_run, output, "--resume", "--checkpoint-interval", "0.05")
         state = folder / "state.npz"
-        seen = state.stat().st_ino if state.exists() else 0
+        seen = inode(state)
         wait_for(
             lambda process=process, state=state, seen=seen: (
-                process.poll() is not None or (state.exists() and state.stat().st_ino != seen)
+                process.poll() is not None or inode(state) not in {0, seen}
             )
         )
         time.sleep(float(random.uniform(0, 0.1)))

@@ -1,10 +1,10 @@
 !> Contacts one by one: their records, how one detaches and attaches, what all kinds of them do.
 !>
-!> The earthquake-like model but for when contacts break. A kind keeps them in an order of breaking
-!> by a key of its own, and answers where the first one breaks (offer), which break (respond), where
-!> a contact that has attached belongs (join), and where it breaks on the way back (behind_of).
-!> Coordinates are along a direction of motion; displacements are relative to an origin that the
-!> caller moves along.
+!> The earthquake-like model, except for the time of breaking. Each kind sorts its contacts by a key
+!> and implements: when the first contact breaks (offer), which contacts break (respond), insertion
+!> of an attached contact (join), and the displacement at which a contact breaks when the direction
+!> reverses (behind_of). Coordinates are along a direction of motion; displacements are relative to
+!> an origin that the caller shifts.
 module mesoslip_contacts_individual_base
    use mesoslip_contacts_base, only: contacts_type, exchange_contacts, extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
@@ -26,23 +26,23 @@ module mesoslip_contacts_individual_base
 
    public :: individual_contacts_type, exchange_individual, total_law, snapshot_individual
 
-   !> N contacts one by one.
+   !> N individual contacts.
    type, abstract, extends(contacts_type) :: individual_contacts_type
       !> Records of the contacts, shape (record_length, count)
       real(wp), allocatable :: record(:, :)
       !> Contacts that are detached
       type(detached_contacts_type) :: detached
-      !> Births to come
+      !> Contacts whose next thresholds are still to be drawn
       type(births_type) :: births
-      !> Totals of stiffness and of stiffness times origin of the pinned, of drag of the detached
+      !> Sums over pinned contacts (stiffness; stiffness times origin) and detached ones (drag)
       type(accumulator_type) :: stiffness, offset, drag
-      !> Contacts of the present avalanche
+      !> Contacts of the current avalanche
       type(avalanche_track_type) :: track
       !> Stiffness of all bonds of a contact to its neighbours; 0 without neighbours [N/m]
       real(wp) :: bonds = 0.0_wp
-      !> Direction of motion for which the order of breaking is kept, +1 or -1
+      !> Direction of motion by which contacts are sorted, +1 or -1
       real(wp) :: direction = 1.0_wp
-      !> Bound on the coordinates at which contacts break on the way back [m]
+      !> Upper bound of the coordinates at which contacts break after a reversal [m]
       real(wp) :: behind = -huge(1.0_wp)
    contains
       procedure :: law => total_law
@@ -52,38 +52,38 @@ module mesoslip_contacts_individual_base
       procedure :: individual_count
       procedure :: records
       procedure :: take_extent
-      !> Put a contact that has attached into the order of breaking
+      !> Insert an attached contact into the order of breaking
       procedure(join_interface), deferred :: join
-      !> Greatest coordinate at which a pinned contact breaks on the way back
+      !> Maximum coordinate at which a pinned contact breaks after a reversal
       procedure :: behind_of
-      !> Force of its neighbours on a contact that attaches
+      !> Force of the neighbours on an attaching contact
       procedure :: neighbour_force
-      !> Move what a kind knows of the origin
+      !> Shift the origin in the data of a kind
       procedure :: shift_order
-      !> Make room for the contacts
+      !> Allocate the records
       procedure, non_overridable :: allocate_records
-      !> Draw all contacts for the start of a run
+      !> Draw all contacts at the start of a run
       procedure, non_overridable :: draw
-      !> A contact breaks
+      !> Detach a contact that breaks
       procedure, non_overridable :: detach
       !> Attach all contacts that are due
       procedure, non_overridable :: attach_due
-      !> Order all contacts again, from the records
+      !> Sort all contacts again, from the records
       procedure, non_overridable :: order_anew
-      !> The greatest of the coordinates at which contacts break on the way back
+      !> Maximum coordinate at which any contact breaks after a reversal
       procedure, non_overridable :: max_behind
       !> Window between two coordinates
       procedure, non_overridable :: window_between
       !> The next attachments, for a schedule
       procedure, non_overridable :: list_attachments
-      !> Keep the books of a schedule, but for the order of breaking
+      !> Update records and sums after a schedule, without the order of breaking
       procedure, non_overridable :: detach_listed
       procedure, non_overridable :: attach_listed
       procedure, non_overridable, private :: attach_next, sum_totals
    end type individual_contacts_type
 
    abstract interface
-      !> Put a contact that has attached into the order of breaking.
+      !> Insert an attached contact into the order of breaking.
       subroutine join_interface(self, contact, pose)
          import :: individual_contacts_type, pose_type
          implicit none
@@ -91,18 +91,18 @@ module mesoslip_contacts_individual_base
          class(individual_contacts_type), intent(inout) :: self
          !> Number of the contact
          integer, intent(in) :: contact
-         !> Where the slider is
+         !> Pose of the slider
          type(pose_type), intent(in) :: pose
       end subroutine join_interface
    end interface
 
 contains
 
-   !> Make room for the contacts, and for their avalanches if they are on a lattice.
+   !> Allocate records of contacts, and of their avalanches if they are on a lattice.
    subroutine allocate_records(self, columns, rows, error)
-      !> The contacts, their parameters set
+      !> The contacts, with parameters
       class(individual_contacts_type), intent(inout) :: self
-      !> Columns and rows of the lattice; no columns when contacts are not on one
+      !> Columns and rows of the lattice; 0 columns without a lattice
       integer, intent(in) :: columns, rows
       !> Set if there is not enough memory, or the lattice does not hold the contacts
       type(error_type), allocatable, intent(inout) :: error
@@ -124,7 +124,7 @@ contains
       if (.not. allocated(error)) call new_avalanche_track(self%track, columns, rows, error)
    end subroutine allocate_records
 
-   !> Draw all contacts for the start of a run.
+   !> Draw all contacts at the start of a run.
    subroutine draw(self, state)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -135,11 +135,11 @@ contains
       call self%sum_totals()
    end subroutine draw
 
-   !> Contact force as a law.
+   !> Contact force as a linear law.
    pure function total_law(self) result(law)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> The law that holds until a contact breaks or attaches
+      !> The law, valid until a contact breaks or attaches
       type(interface_law_type) :: law
 
       law%stiffness = self%stiffness%total()
@@ -166,7 +166,7 @@ contains
       end if
    end function window_between
 
-   !> A contact breaks: it leaves its force, and waits to attach again.
+   !> Detach a contact that breaks: subtract its force, and schedule its next attachment.
    subroutine detach(self, contact, displacement, time)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -199,11 +199,11 @@ contains
       end if
    end subroutine detach
 
-   !> Attach all contacts that are due, in the order in which they broke.
+   !> Attach all contacts that are due, in the order of their attachment times.
    subroutine attach_due(self, pose)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -222,7 +222,7 @@ contains
       self%detached_count = real(self%detached%count, wp)
    end subroutine attach_due
 
-   !> Force of its neighbours on a contact that attaches: none unless a kind has neighbours.
+   !> Force of the neighbours on an attaching contact; zero for kinds without neighbours.
    pure function neighbour_force(self, contact, displacement) result(force)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
@@ -236,12 +236,12 @@ contains
       force = 0.0_wp
    end function neighbour_force
 
-   !> Attach the contact that is the next one to do so.
+   !> Attach the next contact that is due.
    subroutine attach_next(self, pose, mean_force, contact)
       class(individual_contacts_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Mean force that a contact bears when it attaches, with that of its neighbours [N]
+      !> Mean force of a contact when it attaches, including that of its neighbours [N]
       real(wp), intent(in) :: mean_force
       !> Number of the contact
       integer, intent(out) :: contact
@@ -273,7 +273,7 @@ contains
       call self%births%request(contact, self%parameters, self%record)
    end subroutine attach_next
 
-   !> List the next contacts to attach in a schedule, up to a number.
+   !> List the next contacts to attach in a schedule, up to a maximum number.
    subroutine list_attachments(self, limit, direction, schedule)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -315,11 +315,11 @@ contains
       schedule%pinned = self%parameters%count - self%detached%count
    end subroutine list_attachments
 
-   !> Keep the books of the contacts of a schedule that broke.
+   !> Update records and sums for the contacts that broke in a schedule.
    subroutine detach_listed(self, contact, schedule)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Numbers of those that broke, in their order
+      !> Numbers of the contacts that broke, in their order
       integer, intent(in) :: contact(:)
       !> The schedule
       type(schedule_type), intent(in) :: schedule
@@ -341,13 +341,13 @@ contains
       self%drag = schedule%drag
    end subroutine detach_listed
 
-   !> Keep the books of the contacts of a schedule that attached.
+   !> Update records and sums for the contacts that attached in a schedule.
    subroutine attach_listed(self, schedule, contact)
-      !> The contacts, those that broke being detached
+      !> The contacts; those that broke are detached
       class(individual_contacts_type), intent(inout) :: self
       !> The schedule
       type(schedule_type), intent(in) :: schedule
-      !> Numbers of those that attached, in their order
+      !> Numbers of the contacts that attached, in their order
       integer, intent(out) :: contact(:)
 
       integer :: event
@@ -367,7 +367,7 @@ contains
       end do
    end subroutine attach_listed
 
-   !> Order all contacts again, from the records.
+   !> Sort all contacts again, from the records.
    subroutine order_anew(self, displacement)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -378,7 +378,7 @@ contains
       self%behind = self%max_behind()
    end subroutine order_anew
 
-   !> The greatest of the coordinates at which contacts break on the way back.
+   !> Maximum coordinate at which any contact breaks after a reversal.
    pure function max_behind(self) result(coordinate)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
@@ -394,7 +394,7 @@ contains
       end do
    end function max_behind
 
-   !> Greatest coordinate at which a pinned contact breaks on the way back.
+   !> Maximum coordinate at which a pinned contact breaks after a reversal.
    pure function behind_of(self, contact) result(coordinate)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
@@ -406,7 +406,7 @@ contains
       coordinate = behind_coordinate(self%record(:, contact), self%direction)
    end function behind_of
 
-   !> Move the origin of displacements.
+   !> Shift the origin of displacements.
    subroutine shift_origin(self, shift, displacement)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -425,16 +425,16 @@ contains
       call self%order_anew(displacement)
    end subroutine shift_origin
 
-   !> Move what a kind knows of the origin besides the records: nothing unless it says so.
+   !> Shift the origin in the data of a kind other than the records; by default there are none.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
+      !> The contacts, with shifted records
       class(individual_contacts_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
    end subroutine shift_order
 
-   !> Contacts and extent of the avalanche that is over, and forget it.
+   !> Return size and extent of the finished avalanche, and clear it.
    subroutine take_extent(self, extent)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
@@ -447,14 +447,14 @@ contains
       call self%track%clear()
    end subroutine take_extent
 
-   !> How the contacts are.
+   !> State of each contact.
    pure subroutine snapshot_individual(self, displacement, values)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Of each contact its stretch, huge if it is detached [m], force over threshold, and
-      !> generation in the present avalanche, shape (snapshot_length, count)
+      !> For each contact: stretch [m] (huge if it is detached), force over threshold, generation
+      !> in the current avalanche; shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact
@@ -504,28 +504,28 @@ contains
       energy = total%total()
    end function elastic_energy
 
-   !> Number of contacts that are kept one by one.
+   !> Number of individual contacts.
    pure function individual_count(self) result(number)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> All of them
+      !> Number of contacts
       integer :: number
 
       number = self%parameters%count
    end function individual_count
 
-   !> What each contact is.
+   !> Records of all contacts.
    pure subroutine records(self, values)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch [m], number of
-      !> renewals of each contact, shape (contact_record_length, count)
+      !> For each contact: origin [m], stiffness [N/m] (0 while detached), breaking stretch [m],
+      !> number of renewals; shape (contact_record_length, count)
       real(wp), intent(out) :: values(:, :)
 
       values = self%record([row_origin, row_stiffness, row_limit, row_renewal], :)
    end subroutine records
 
-   !> Put the state into an archive or take it out.
+   !> Write the state to an archive, or read it.
    subroutine exchange_individual(self, archive)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self

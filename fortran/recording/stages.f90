@@ -18,9 +18,9 @@ module mesoslip_recording_stages
    character(len=*), parameter :: stage_columns(*) = [character(len=name_length) :: &
       & "stage_number", "stage_start_time", "stage_end_time", "drive_start_velocity", &
       & "drive_end_velocity", "start_force", "end_force", "start_displacement", &
-      & "end_displacement", "drive_start_displacement", "greatest_force", "greatest_force_time", &
-      & "greatest_force_displacement", "least_force", "least_force_time", &
-      & "least_force_displacement", "mean_force"]
+      & "end_displacement", "drive_start_displacement", "max_force", "max_force_time", &
+      & "max_force_displacement", "min_force", "min_force_time", &
+      & "min_force_displacement", "mean_force"]
    integer, parameter :: stage_length = size(stage_columns)
    !> Waiting stages at which the run pauses to have them taken away
    integer, parameter :: pausing_stages = 2000

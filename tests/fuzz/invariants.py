@@ -167,18 +167,18 @@ def _wrong_stages(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from _wrong_owners(stages, tree, "stages")
     slack = ROUNDING * max(
         config.contacts.static_force,
-        float(np.max(np.abs(stages["greatest_force"].values), initial=0.0)),
+        float(np.max(np.abs(stages["max_force"].values), initial=0.0)),
     )
     for _, mine in _owned(stages, tree):
         start, end = mine["stage_start_time"].values, mine["stage_end_time"].values
         if np.any(end < start) or np.any(start[1:] != end[:-1]):
             yield "stages: one does not follow on another"
-        least, greatest = mine["least_force"].values, mine["greatest_force"].values
+        least, greatest = mine["min_force"].values, mine["max_force"].values
         for name in ("start_force", "mean_force", "end_force"):
             force = mine[name].values
             if np.any(force < least - slack) or np.any(force > greatest + slack):
                 yield f"stages: {name} is beyond the extremes"
-        for name in ("least_force_time", "greatest_force_time"):
+        for name in ("min_force_time", "max_force_time"):
             time = mine[name].values
             if np.any(time < start) or np.any(time > end):
                 yield f"stages: {name} is outside the stage"

@@ -344,7 +344,7 @@ def test_restart_peak_is_that_of_its_formula(klein, growth, width):
         contacts__ageing=LOG | {"time": 1e-3, "growth": growth},
     )
     stages = mesoslip.run(config)["stages"].to_dataset()
-    peaks = stages["greatest_force"].values[[2, 4]]
+    peaks = stages["max_force"].values[[2, 4]]
     steady_sliding = steady_force(config, 1e-6)
     expected = np.array([restart_peak(config, 1e-6, hold) for hold in holds])
     assert restart_peak(config, 1e-6, 0.0) == pytest.approx(steady_sliding, rel=1e-9)

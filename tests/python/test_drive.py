@@ -103,10 +103,10 @@ def test_a_ramp_of_a_prescribed_slider():
     assert tree["spring_force"].values[0] == pytest.approx(2000 * way, abs=1e-19)
     stage = stages_of(tree).isel(stage=0)
     turn = -start / acceleration
-    assert stage["greatest_force_time"] == pytest.approx(turn, rel=1e-12)
-    assert stage["greatest_force_displacement"] == pytest.approx(0.5 * start * turn, rel=1e-12)
-    assert stage["greatest_force"] == pytest.approx(1000 * start * turn, rel=1e-10)
-    assert stage["least_force"] == pytest.approx(2000 * way[-1], rel=1e-10)
+    assert stage["max_force_time"] == pytest.approx(turn, rel=1e-12)
+    assert stage["max_force_displacement"] == pytest.approx(0.5 * start * turn, rel=1e-12)
+    assert stage["max_force"] == pytest.approx(1000 * start * turn, rel=1e-10)
+    assert stage["min_force"] == pytest.approx(2000 * way[-1], rel=1e-10)
     mean = start * duration / 2 + acceleration * duration**2 / 6
     assert stage["mean_force"] == pytest.approx(2000 * mean, rel=1e-10)
     assert (stage["drive_start_velocity"], stage["drive_end_velocity"]) == (start, end)
@@ -151,10 +151,10 @@ def test_extremes_of_a_spring_under_ramps():
         force = spring * (fine[3] - fine[0])
         row = stages_of(tree).isel(stage=number)
         size = np.max(np.abs(force))
-        assert row["greatest_force"] == pytest.approx(np.max(force), abs=1e-9 * size)
-        assert row["least_force"] == pytest.approx(np.min(force), abs=1e-9 * size)
+        assert row["max_force"] == pytest.approx(np.max(force), abs=1e-9 * size)
+        assert row["min_force"] == pytest.approx(np.min(force), abs=1e-9 * size)
         place = fine[0, np.argmax(force)]
-        assert row["greatest_force_displacement"] == pytest.approx(place, abs=1e-6 * size / spring)
+        assert row["max_force_displacement"] == pytest.approx(place, abs=1e-6 * size / spring)
         assert row["mean_force"] == pytest.approx(
             np.trapezoid(force, dx=stage["duration"] / 200_000) / stage["duration"],
             abs=1e-8 * size,
@@ -178,7 +178,7 @@ def test_stages_are_what_fine_samples_show(kind):
         inside = (time >= start) & (time <= end) & np.isfinite(force)
         # Of a prescribed slider the force jumps with the drive's velocity, by the drag.
         within = force[inside][1:-1]
-        greatest, least = float(stage["greatest_force"]), float(stage["least_force"])
+        greatest, least = float(stage["max_force"]), float(stage["min_force"])
         size = max(abs(greatest), abs(least))
         slack = 1e-12 * size
         assert least - slack <= within.min() <= within.max() <= greatest + slack
@@ -189,7 +189,7 @@ def test_stages_are_what_fine_samples_show(kind):
         if not {"prescribed", "quasistatic"} & set(kind.split(", ")):
             assert greatest - within.max() < 1e-2 * size
             assert within.min() - least < 1e-2 * size
-            for which in ("greatest", "least"):
+            for which in ("max", "min"):
                 at = float(stage[f"{which}_force_time"])
                 place = np.interp(at, time[inside], force[inside])
                 assert float(stage[f"{which}_force"]) == pytest.approx(place, abs=5e-3 * size)
@@ -258,7 +258,7 @@ def test_a_history_is_stages_to_the_bit(tmp_path):
     one, other = mesoslip.run(measured), run_drive({"stage": stages})
     assert_equal(one, other, [""])
     # One stage, of which the extremes are those of all.
-    assert stages_of(one)["greatest_force"].values == [stages_of(other)["greatest_force"].max()]
+    assert stages_of(one)["max_force"].values == [stages_of(other)["max_force"].max()]
     # The points go with the output: the file is not needed to repeat the run.
     (tmp_path / "moved.csv").unlink()
     assert_equal(one, mesoslip.run(Config.from_toml(one.attrs["configuration"])))

@@ -304,6 +304,20 @@ def test_files_of_earlier_versions_are_read():
     assert len(mesoslip.slips(tree)["waiting_time"]) == len(numbers)
 
 
+def test_extremes_of_stages_in_earlier_files_have_the_names_of_today(klein, tmp_path):
+    path = tmp_path / "earlier.nc"
+    writing.write(mesoslip.run(klein(contacts__count=100, run__duration=0.5)), path)
+    with netCDF4.Dataset(path, "a") as file:
+        stages = file["stages"]
+        for end in ("", "_time", "_displacement"):
+            stages.renameVariable(f"max_force{end}", f"greatest_force{end}")
+            stages.renameVariable(f"min_force{end}", f"least_force{end}")
+        expected = stages["greatest_force_time"][:]
+    stages = mesoslip.open_output(path)["stages"]
+    np.testing.assert_array_equal(stages["max_force_time"].values, expected)
+    assert not [name for name in stages.data_vars if name.startswith(("greatest", "least"))]
+
+
 def test_what_a_killed_process_left_behind_is_removed(tmp_path):
     """The part of an output that nobody writes any more, and no other file."""
     path = tmp_path / "out.nc"

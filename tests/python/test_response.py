@@ -80,8 +80,8 @@ def record(law, stages, stiffness, *, noise=0.0, realizations=1, sign=1.0, exact
                 for which, place in (
                     ("start", inside[0]),
                     ("end", inside[-1]),
-                    ("least", low),
-                    ("greatest", high),
+                    ("min", low),
+                    ("max", high),
                 ):
                     row[f"{which}_force"] = sign * force[realization, place]
                     row[f"{which}_force_time"] = times[place]
@@ -212,13 +212,13 @@ def test_the_exact_peak_is_taken_if_it_belongs_to_the_restart():
     stages = tree["stages"].to_dataset()
     rows = np.flatnonzero(stages["stage_number"].values == 2)
     before = rows_of(mesoslip.response(tree, fit=False), "holds")[0]["peak_force"]
-    stages["greatest_force"][rows] = before + 1e-7
+    stages["max_force"][rows] = before + 1e-7
     tree["stages"] = xr.DataTree(stages)
     row = rows_of(mesoslip.response(tree, fit=False), "holds")[0]
     assert row["peak_force"] == pytest.approx(before + 1e-7)
     assert row["peak_is_exact"] == 1
     # One far from the restart is a fluctuation of the sliding after it.
-    stages["greatest_force_displacement"][rows] += 4 * STRETCH
+    stages["max_force_displacement"][rows] += 4 * STRETCH
     tree["stages"] = xr.DataTree(stages)
     row = rows_of(mesoslip.response(tree, fit=False), "holds")[0]
     assert row["peak_force"] == pytest.approx(before)

@@ -42,7 +42,7 @@ def held_peaks(growth: float, width: float, engine: str) -> tuple[Config, Array]
     )
     stages = mesoslip.run(config, executor=1)["stages"].to_dataset()
     restarts = np.isin(stages["stage_number"], np.arange(2, 2 * len(HOLDS) + 1, 2))
-    return config, stages["greatest_force"].values[restarts] / config.contacts.static_force
+    return config, stages["max_force"].values[restarts] / config.contacts.static_force
 
 
 def per_decade(peaks: Array) -> float:

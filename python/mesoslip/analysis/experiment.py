@@ -363,7 +363,7 @@ class Experiment:
                 return found
         start = self.displacement_at_start(stage)
         # The recorded extremes count along the axis, whatever the direction of the drive.
-        which = "greatest" if (sign > 0) == upward else "least"
+        which = "max" if (sign > 0) == upward else "min"
         if all(f"{which}_{name}" in stage.exact for name in EXTREME):
             force, time, displacement = (stage.exact[f"{which}_{name}"] for name in EXTREME)
             if np.all(np.abs(displacement - start) <= self.peak_window):

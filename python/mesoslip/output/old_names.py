@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 OLD_NAMES = {
     "slips": {"realization": "realization_index"},
     "slip_traces": {"realization": "realization_index", "time": "sample_time"},
+    "stages": {
+        f"{before}_force{end}": f"{now}_force{end}"
+        for before, now in (("greatest", "max"), ("least", "min"))
+        for end in ("", "_time", "_displacement")
+    },
     "avalanches": {"realization": "realization_index", "time": "start_time"},
     "snapshots": {"realization": "realization_index", "time": "snapshot_time"},
     "critical": {"displacement": "critical_displacement"},

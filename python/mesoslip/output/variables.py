@@ -162,14 +162,12 @@ STAGES = Group(
     start_displacement=Meaning("m", "displacement of the slider at the start of the stage"),
     end_displacement=Meaning("m", "displacement of the slider at the end of the stage"),
     drive_start_displacement=Meaning("m", "displacement of the drive at the start of the stage"),
-    greatest_force=Meaning("N", "maximum spring force in the stage"),
-    greatest_force_time=Meaning("s", "time of the maximum spring force"),
-    greatest_force_displacement=Meaning(
-        "m", "displacement of the slider at the maximum spring force"
-    ),
-    least_force=Meaning("N", "minimum spring force in the stage"),
-    least_force_time=Meaning("s", "time of the minimum spring force"),
-    least_force_displacement=Meaning("m", "displacement of the slider at the minimum spring force"),
+    max_force=Meaning("N", "maximum spring force in the stage"),
+    max_force_time=Meaning("s", "time of the maximum spring force"),
+    max_force_displacement=Meaning("m", "displacement of the slider at the maximum spring force"),
+    min_force=Meaning("N", "minimum spring force in the stage"),
+    min_force_time=Meaning("s", "time of the minimum spring force"),
+    min_force_displacement=Meaning("m", "displacement of the slider at the minimum spring force"),
     mean_force=Meaning("N", "mean of the spring force over the time of the stage"),
 )
 

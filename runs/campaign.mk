@@ -9,16 +9,17 @@ FIGURE_RUNS := $(filter-out out/S18.nc,$(call named,S*.toml limit-*.toml sizes-*
   out/avalanche.nc out/bundle.nc
 ONSETS := out/S19a.onset.nc out/S19b.onset.nc
 FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc $(ONSETS)
-# Claims have runs of their own, with several realizations, and use some of the figures'.
-CLAIM_OUTPUTS := $(call named,claims/*.toml limit-*.toml) out/S18.curve.nc $(ONSETS)
+# Claims have runs and sweeps of their own, with several realizations, and use some of the figures'.
+CLAIM_OUTPUTS := $(call named,claims/*.toml claims/sweeps/*.toml limit-*.toml) out/S18.curve.nc \
+  $(ONSETS)
 SWEEPS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/sweeps/*.toml runs/maps/*.toml))
 MAPS := $(patsubst runs/%.toml,out/%.png,$(wildcard runs/maps/*.toml))
 
 figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/figures
 	$(VENV)/bin/python $(SOURCE)/draw.py -o out/figures
 
-claims: $(CLAIM_OUTPUTS) | $(INSTALLED) ## Judge the source's claims into out/claims.md
-	$(VENV)/bin/python $(SOURCE)/judge.py -o out/claims.md
+claims: $(CLAIM_OUTPUTS) | $(INSTALLED) ## Judge the source's claims into out/claims.md, and compare with docs/claims.md
+	$(VENV)/bin/python $(SOURCE)/judge.py -o out/claims.md --compare docs/claims.md
 
 campaign: $(SWEEPS) $(MAPS) ## Run the sweeps of runs/sweeps and runs/maps, and draw the maps
 
@@ -37,6 +38,9 @@ out/%.nc: $(SOURCE)/%.toml $$(call bases,$(SOURCE)/$$*.toml) | $(INSTALLED)
 
 # A sweep keeps its points beside its output: what was interrupted goes on.
 out/sweeps/%.nc: runs/sweeps/%.toml $$(call bases,runs/sweeps/$$*.toml) | $(INSTALLED)
+	$(MESOSLIP) sweep $< -o $@
+
+out/claims/sweeps/%.nc: $(SOURCE)/claims/sweeps/%.toml $$(call bases,$(SOURCE)/claims/sweeps/$$*.toml) | $(INSTALLED)
 	$(MESOSLIP) sweep $< -o $@
 
 out/maps/%.nc: runs/maps/%.toml $$(call bases,runs/maps/$$*.toml) | $(INSTALLED)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 
 from claims import CLAIMS, judge
+from claims.compare import differences
 from claims.page import as_markdown, as_table, as_text
 from mesoslip.output.targets import check_writable, written_whole
 from scripts import parser_of, reporting_mistakes
@@ -13,6 +16,12 @@ from scripts import parser_of, reporting_mistakes
 def main() -> None:
     parser = parser_of(__doc__, CLAIMS, "claim", "page to write", None)
     parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument(
+        "--compare",
+        type=Path,
+        metavar="PAGE",
+        help="an earlier page; exit status 1 if a judgement is another one than there",
+    )
     given = parser.parse_args()
     if given.output is not None:
         check_writable(given.output)
@@ -21,6 +30,11 @@ def main() -> None:
         with written_whole(given.output) as part:
             part.write_text(as_markdown(judgements), encoding="utf-8")
     print(json.dumps(as_table(judgements), indent=2) if given.json else as_text(judgements))
+    if given.compare is not None:
+        found = differences(judgements, given.compare)
+        for line in found:
+            print(line, file=sys.stderr)
+        sys.exit(1 if found else 0)
 
 
 if __name__ == "__main__":

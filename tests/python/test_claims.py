@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -11,10 +12,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from claims import CLAIMS, Verdict, judge
+from claims.compare import differences
 from claims.page import as_markdown, as_table
 from conftest import ROOT
 from figures import FIGURES
+from mesoslip.campaign.plan import Plan
 from mesoslip.output import files, writing
+from mesoslip.quantities import with_error
 from outputs import configuration
 
 SOURCE = ROOT / "runs" / "source"
@@ -39,8 +43,10 @@ def outputs(tmp_path_factory):
     return folder
 
 
-def test_there_are_sixteen_and_their_runs_exist():
-    assert list(CLAIMS) == [f"C{number}" for number in range(1, 17)]
+def test_each_has_a_criterion_and_its_runs_exist():
+    numbers = [int(name.removeprefix("C")) for name in CLAIMS]
+    assert numbers == sorted(set(numbers))
+    assert set(range(1, 17)) <= set(numbers) <= set(range(1, 25))
     for claim in CLAIMS.values():
         assert claim.criterion
         for run in claim.runs:
@@ -54,6 +60,38 @@ def test_every_run_of_claims_is_used():
     for path in (SOURCE / "claims").glob("*.toml"):
         assert f"claims/{path.stem}" in used
         mesoslip.Config.load(path)
+    for path in (SOURCE / "claims" / "sweeps").glob("*.toml"):
+        assert f"claims/sweeps/{path.stem}" in used
+        assert Plan.load(path).combinations
+
+
+def test_the_page_has_all_claims_as_they_are():
+    """The page of the documentation was written since claims or criteria changed."""
+    page = (ROOT / "docs" / "claims.md").read_text()
+    assert re.findall(r"^## (C\d+)", page, re.MULTILINE) == list(CLAIMS)
+    for claim in CLAIMS.values():
+        runs = ", ".join(f"`{run}`" for run in claim.runs)
+        assert f"*{claim.statement}.* Criterion: {claim.criterion}. Runs: {runs}." in page
+        assert re.search(rf"^\| \[{claim.name}\]\(#{claim.name.lower()}\) \|", page, re.MULTILINE)
+
+
+def test_differences_from_an_earlier_page(outputs, tmp_path):
+    """Numbers may differ as much as they scatter; verdicts and other numbers may not."""
+    judgements = judge(["C1", "C3"], outputs)
+    page = tmp_path / "page.md"
+    text = as_markdown(judgements)
+    page.write_text(text)
+    assert not differences(judgements, page)
+    peak = next(one for one in judgements[1].finding.measured if one.name == "first peak")
+    for errors, count in ((1.5, 0), (3.0, 1)):
+        other = with_error(peak.mean + errors * peak.spread, peak.spread, "N")
+        page.write_text(text.replace(str(peak), other))
+        found = differences(judgements, page)
+        assert len(found) == count, found
+    page.write_text(text.replace("**Holds.**", "**Fails.**").replace("## C1\n", "## C5\n"))
+    assert [one.split(":")[0] for one in differences(judgements, page)] == ["C1", "C3, verdict"]
+    page.write_text(text.replace("1166 1/s", "1170 1/s").replace("24.46 ms", "24460 µs"))
+    assert [one.split(":")[0] for one in differences(judgements, page)] == ["C1, omega_l"]
 
 
 def verdicts(outputs, *names):
@@ -120,7 +158,7 @@ def test_what_is_reported(outputs):
 
 def test_mistakes(outputs):
     with pytest.raises(mesoslip.ConfigError, match="no such claim; choose from C1"):
-        judge(["C17"], outputs)
+        judge(["C99"], outputs)
     with pytest.raises(mesoslip.FileError, match=r"make them first: make .*delay-0\.nc"):
         judge(["C6"], outputs)
 
@@ -143,6 +181,12 @@ def test_the_script_judges(outputs, tmp_path):
     assert "| [C4](#c4) |" in page.read_text()
     done = script("judge.py", "C4", "--from", outputs, "--json")
     assert json.loads(done.stdout)[0]["verdict"] == "holds with a qualification"
+    done = script("judge.py", "C4", "--from", outputs, "--compare", page)
+    assert (done.returncode, done.stderr.strip()) == (0, "")
+    page.write_text(page.read_text().replace("**Holds", "**Fails"))
+    done = script("judge.py", "C4", "--from", outputs, "--compare", page)
+    assert done.returncode == 1
+    assert "C4, verdict: Holds with a qualification" in done.stderr
 
 
 def test_the_script_draws(outputs, tmp_path):

@@ -1,6 +1,7 @@
-"""The source's claims C1 to C16, each judged from outputs of runs.
+"""The source's claims C1 to C24, each judged from outputs of runs.
 
-Adding one is a function and a line in the module of its topic, and its runs in this folder.
+Adding one is a function and a line in the module of its topic, and its runs in this folder; sweeps
+that a claim needs are in the folder ``sweeps``. A new topic is a module, and a line in `_MODULES`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,13 @@ from claims.base import Claim, Judgement, Verdict
 
 __all__ = ["CLAIMS", "Claim", "Judgement", "Verdict", "judge"]
 
-_MODULES = (numbers, curves, slips, motion, limit)
+_MODULES = (
+    numbers,
+    curves,
+    slips,
+    motion,
+    limit,
+)
 CLAIMS = {
     claim.name: claim
     for claim in sorted(

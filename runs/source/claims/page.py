@@ -60,8 +60,11 @@ def as_markdown(judgements: Sequence[Judgement]) -> str:
     lines = [
         "# The source's claims, checked",
         "",
-        "Written by `make claims`. Each claim of the source (`C1` to `C16`) is judged from runs in",
-        "`runs/source`; values are means and standard deviations over realizations.",
+        f"Written by `make claims`. Each claim of the source (`{judgements[0].claim.name}` to "
+        f"`{judgements[-1].claim.name}`) is judged from runs in",
+        "`runs/source`; values are means and standard deviations over realizations. `make claims`",
+        "compares what it finds with this page: a verdict that differs, or a number that differs",
+        "by more than it scatters, is an error.",
         "",
         f"Summary: {summary(judgements)}.",
         "",

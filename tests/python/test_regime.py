@@ -226,7 +226,7 @@ def test_command_and_run_say_the_same(klein, tmp_path, command):
 def test_long_traces_are_thinned_out(klein, monkeypatch):
     tree = mesoslip.run(klein(contacts__count=300, contacts__delay=3e-3, run__duration=20.0))
     whole = mesoslip.regime(tree)
-    monkeypatch.setattr("mesoslip.analysis.regime.MAX_SAMPLES", 1500)
+    monkeypatch.setattr("mesoslip.analysis.regime.outputs.MAX_SAMPLES", 1500)
     thin = mesoslip.regime(tree)
     assert whole["regime"].values == thin["regime"].values
     assert float(thin["period"][0]) == pytest.approx(float(whole["period"][0]), rel=0.02)

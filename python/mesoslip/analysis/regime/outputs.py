@@ -1,0 +1,174 @@
+"""Regimes of the realizations of an output, from the evaluated window of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.apparatus import Apparatus, apparatus_of
+from mesoslip.analysis.cycles import MIN_CYCLES
+from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
+from mesoslip.analysis.noise import noise_level, without_impulses
+from mesoslip.analysis.regime.result import NAMES, REGIME, RegimeResult
+from mesoslip.analysis.regime.rules import classify
+from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
+from mesoslip.output.access import group_of
+from mesoslip.output.inputs import OutputLike, opened_run
+from mesoslip.output.results import RunResults
+from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+# Maximum number of evaluated samples; longer traces are thinned out.
+MAX_SAMPLES = 400_000
+
+
+def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
+    """The regime of each realization of an output, and the statistics that determine it.
+
+    Parameters
+    ----------
+    tree
+        Output of a run, or a measured trace.
+    name
+        Name in messages.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``realization``, variables `REGIME`: ``regime`` is 0 smooth, 1 stick-slip, 2
+        irregular, 3 transient, with CF's flag attributes.
+
+    Raises
+    ------
+    FileError
+        If it has no force, or it is a run without its configuration.
+    """
+    import xarray as xr
+
+    root = tree.to_dataset()
+    apparatus = apparatus_of(tree, name)
+    owner, starts, drops = _slips(tree)
+    results = []
+    for number in range(root.sizes["realization"]):
+        mine = owner == number
+        window = _window(root.isel(realization=number), apparatus, tree)
+        results.append(classify(*window, starts[mine], drops[mine]))
+    variables = {
+        name: REGIME.variable(
+            name,
+            ("realization",),
+            np.array([getattr(one, name) for one in results], dtype=meaning.dtype),
+        )
+        for name, meaning in REGIME.items()
+    }
+    variables["regime"].attrs["flag_values"] = np.arange(len(NAMES), dtype=np.int8)
+    return xr.Dataset(variables, {"realization": root["realization"]})
+
+
+def _slips(tree: xr.DataTree) -> tuple[Array, Array, Array]:
+    """Realization, start [s] and force drop of each slip; none without a catalogue."""
+    if "slips" not in tree.children:
+        return np.empty(0), np.empty(0), np.empty(0)
+    data = group_of(tree, "slips")
+    return (
+        data["realization_index"].values,
+        data["start_time"].values,
+        data["force_drop"].values,
+    )
+
+
+def _window(
+    one: xr.Dataset, apparatus: Apparatus, tree: xr.DataTree
+) -> tuple[Scales, Array, Array, Array]:
+    """What a realization is compared with; time, force and velocity in its evaluated window."""
+    time, force = one["time"].values, one[apparatus.force_name].values
+    # Samples after the end of an interrupted run are missing.
+    reached = int(np.sum(np.isfinite(force)))
+    last_time = float(time[reached - 1]) if reached else 0.0
+    config = apparatus.config
+    stage = stage_of(config, last_time) if config else measured_stage(tree, apparatus, last_time)
+    first = int(np.searchsorted(time[:reached], stage.middle))
+    last = int(np.searchsorted(time[:reached], stage.end, side="right"))
+    inside = slice(first, last, _step(last - first))
+    velocity = np.full(len(time[inside]), np.nan)
+    if "velocity" in one:
+        velocity = one["velocity"][inside].values
+    time, force = time[inside], force[inside]
+    if config is not None:
+        return Scales.of_config(config, last_time), time, force, velocity
+    if "noise" in tree.children:
+        impulses = group_of(tree, "noise")["impulse_time"].values
+        force = without_impulses(time, force, impulses)
+    time, force, velocity = _even(time, force, velocity)
+    scales = Scales.of_measurement(apparatus, stage, force, noise_level(force))
+    return scales, time, force, velocity
+
+
+def _even(time: Array, *values: Array) -> tuple[Array, ...]:
+    """Times and values at equal intervals: several sampling rates would weight the statistics."""
+    if len(time) < 2 * MIN_CYCLES:
+        return time, *values
+    steps = np.diff(time)
+    count = min(MAX_SAMPLES, 1 + round((time[-1] - time[0]) / float(np.median(steps))))
+    if np.ptp(steps) <= INTERVAL_TOLERANCE * steps.max():
+        return time, *values
+    even = np.linspace(time[0], time[-1], count)
+    return even, *(np.interp(even, time, one) for one in values)
+
+
+def regime(output: OutputLike) -> xr.Dataset:
+    """The regime of each realization of an output: smooth, stick-slip, irregular, or transient.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or a measured trace.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``realization``; ``regime`` is 0 smooth, 1 stick-slip, 2 irregular, 3 transient.
+        The other variables are the statistics that determine it.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read, or is neither of a run nor a measured trace.
+    """
+    with opened_run(output) as (tree, name):
+        return regimes(tree, name)
+
+
+def regimes_of_results(results: RunResults) -> Iterator[RegimeResult]:
+    """The regimes of the realizations of a run; only the evaluated samples are held in memory."""
+    index = {name: number for number, name in enumerate(TRACE_COLUMNS)}
+    wanted = [index[name] for name in ("time", "spring_force", "velocity")]
+    slip_index = {name: number for number, name in enumerate(SLIP_COLUMNS)}
+    for one in results.realizations:
+        rows = one.rows("trace")
+        scales = Scales.of_config(results.config, one.time)
+        stage = scales.stage
+        step = _step(len(rows))
+        blocks, start = [np.empty((0, len(wanted)))], 0
+        for block in rows.blocks(MAX_SAMPLES):
+            chosen = block[-start % step :: step][:, wanted]
+            inside = (chosen[:, 0] >= stage.middle) & (chosen[:, 0] <= stage.end)
+            blocks.append(chosen[inside])
+            start += len(block)
+        time, force, velocity = np.concatenate(blocks).T
+        slips = np.concatenate(
+            [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
+        )
+        drops = slips[:, slip_index["force_before"]] - slips[:, slip_index["force_after"]]
+        yield classify(scales, time, force, velocity, slips[:, slip_index["start_time"]], drops)
+
+
+def _step(count: int) -> int:
+    return max(1, -(-count // MAX_SAMPLES))

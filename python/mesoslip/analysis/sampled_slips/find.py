@@ -1,0 +1,184 @@
+"""Find the slips in a trace."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.alternating_extremes import Samples
+from mesoslip.analysis.noise import TraceNoise, estimate_noise
+from mesoslip.analysis.sampled_slips.counts import SlipCounts, count_slips
+from mesoslip.analysis.sampled_slips.denoised import denoise
+from mesoslip.analysis.sampled_slips.search import SlipSearch, is_loaded
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FoundSlips:
+    """Slips in a trace, each array of shape (slips,).
+
+    Attributes
+    ----------
+    start_time, end_time
+        Times of the maximum before and of the minimum after [s].
+    force_before, force_after
+        Forces at these times, averaged over the noise as far as the trace allows [N].
+    fall_rate
+        Maximum rate of fall [N/s].
+    first, last
+        Samples of the maximum and of the minimum.
+    min_fall
+        Minimum fall of a slip [N].
+    period
+        Period of the setup that was given, or twice the duration of deep falls [s]; infinite
+        without falls.
+    counts
+        Slips by minimum fall; empty if noise or minimum fall were given.
+    """
+
+    start_time: Array
+    end_time: Array
+    force_before: Array
+    force_after: Array
+    fall_rate: Array
+    first: Samples
+    last: Samples
+    min_fall: float = 0.0
+    period: float = math.inf
+    counts: SlipCounts = field(default_factory=SlipCounts)
+
+    def __len__(self) -> int:
+        return len(self.start_time)
+
+
+def find_slips(
+    time: Array,
+    force: Array,
+    *,
+    noise: float | TraceNoise | None = None,
+    period: float | None = None,
+    direction: float = 1.0,
+    min_fall: float | None = None,
+    loading_rate: float | None = None,
+) -> FoundSlips:
+    """Find the slips in a trace.
+
+    Parameters
+    ----------
+    time
+        Increasing times [s], shape (samples,).
+    force
+        Force of the spring [N], or a friction coefficient, shape (samples,), finite.
+    noise
+        What `estimate_noise` found; by default it is called. A number is the standard deviation of
+        white noise [N]: then nothing is taken off, and the minimum fall follows from it.
+    period
+        Period of the setup, 2 pi (M/K)^1/2 [s]; by default twice the duration of deep falls.
+    direction
+        Sign of the drive's velocity.
+    min_fall
+        Minimum fall of a slip [N]; by default from the noise and the number of slips.
+    loading_rate
+        Rate at which the force of a slider at rest grows, stiffness times velocity of the drive
+        [N/s]; by default that of rises of the trace.
+    """
+    force = direction * np.asarray(force, dtype=float)
+    if len(force) < 4:
+        return _none(math.inf)
+    if noise is None:
+        noise = estimate_noise(time, force)
+        cleaned = noise.clean(time, force)
+    elif isinstance(noise, TraceNoise):
+        cleaned = direction * noise.clean(time, direction * force)
+    else:
+        cleaned = force
+    sigma = noise.total_deviation if isinstance(noise, TraceNoise) else noise
+    trace = denoise(time, cleaned, noise, period)
+    if trace is None:
+        return _none(math.inf if period is None else period)
+    search = SlipSearch(trace, loading_rate)
+    counts = SlipCounts()
+    if min_fall is None:
+        min_fall = trace.floor
+        if isinstance(noise, TraceNoise):
+            counts = count_slips(search)
+            plateau = counts.plateau
+            if plateau is not None:
+                tops, bottoms, _ = search.slips(plateau[0])
+                if is_loaded(trace, tops, bottoms) or plateau[0] <= trace.floor <= plateau[1]:
+                    min_fall = plateau[0]
+                else:
+                    counts = replace(counts, plateau=None)
+    tops, bottoms, rates = search.slips(min_fall)
+    if not (is_loaded(trace, tops, bottoms) or search.is_oscillation(tops, bottoms)):
+        tops = tops[:0]
+    if tops.size == 0:
+        return _none(math.inf if period is None else period, min_fall, counts)
+    rows = [
+        _ends(time, cleaned, top, bottom, sigma, trace.half_samples(top))
+        for top, bottom in trace.on_samples(cleaned, tops, bottoms)
+    ]
+    start, end, before, after = np.array(rows).T
+    first, last = start.astype(int), end.astype(int)
+    return FoundSlips(
+        time[first],
+        time[last],
+        direction * before,
+        direction * after,
+        rates,
+        first,
+        last,
+        min_fall,
+        trace.period,
+        counts,
+    )
+
+
+def estimated_period(time: Array, force: Array, noise: float) -> float:
+    """Period of the setup [s], estimated from the deepest falls of a trace; infinite without falls.
+
+    The force of a slider without contacts falls for half a period of a sine; contacts that attach
+    shorten the fall.
+    """
+    trace = denoise(time, np.asarray(force, dtype=float), noise, None)
+    return math.inf if trace is None else trace.period
+
+
+def _none(period: float, min_fall: float = 0.0, counts: SlipCounts | None = None) -> FoundSlips:
+    empty, no_samples = np.empty(0), np.empty(0, dtype=int)
+    counts = SlipCounts() if counts is None else counts
+    return FoundSlips(
+        empty, empty, empty, empty, empty, no_samples, no_samples, min_fall, period, counts
+    )
+
+
+def _ends(
+    time: Array, force: Array, top: int, bottom: int, noise: float, half: int
+) -> tuple[float, float, float, float]:
+    """Samples of start and end of a slip, and the forces there, averaged over the noise."""
+    # The force grows slowly before a slip, so that noise decides which sample is the maximum. The
+    # level is that of a line through the samples before, and the slip starts where means over
+    # some samples fall below it.
+    wide = max(1, min(half // 4, (bottom - top) // 3))
+    low = max(0, top - max(4, half))
+    level = force[top]
+    if noise > 0 and top - low >= 3:
+        # Without the maximum, which is biased by its noise.
+        span = slice(low, top)
+        slope, fitted = np.polyfit(time[span] - time[top], force[span], 1)
+        residual = np.std(force[span] - fitted - slope * (time[span] - time[top]))
+        # Ringing before the slip does not follow a straight line.
+        if residual < 2 * noise:
+            level = float(fitted)
+    means = np.convolve(force[top : bottom + wide], np.full(wide, 1 / wide), "valid")
+    high = np.flatnonzero(means >= level - 2 * noise / math.sqrt(wide))
+    start = min(top + (int(high[-1]) if high.size else 0), bottom - 1)
+    around = slice(max(start, bottom - max(1, half // 8)), bottom + max(1, half // 8) + 1)
+    after = float(force[bottom])
+    if noise > 0 and force[around].size >= 4:
+        after = float(np.polynomial.Polynomial.fit(time[around], force[around], 2)(time[bottom]))
+    return float(start), float(bottom), float(level), after

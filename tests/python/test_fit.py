@@ -310,6 +310,11 @@ def test_a_report_reports_the_parameters(small_fit, tmp_path):
     page = (tmp_path / "fit.html").read_text()
     assert "contacts.static_force" in page
     assert "Agreement of the model with the trace" in page
+    # Free keys are marked, with their ranges in place of values that are not used.
+    assert page.count('<tr class="marked">') == 2
+    assert "<td>contacts.delay (ms)</td><td>free, 0.2 to 4</td>" in page
+    median = float(posterior["posterior"]["contacts.delay"].median())
+    assert f"τ_d = {1e6 * median:.6g}"[:10] in page
     with pytest.raises(FileError, match="shows one output at a time"):
         mesoslip.plot([posterior, posterior])
 

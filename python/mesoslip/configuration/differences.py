@@ -8,10 +8,12 @@ from typing import Any, NamedTuple
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
-from mesoslip.quantities import with_unit
+from mesoslip.quantities import number, scale_for, with_unit
 
 # Maximum number of characters of a value.
 MAX_LENGTH = 60
+# Significant digits of numbers.
+DIGITS = 6
 MISSING = "not given"
 BOOKKEEPING = ("run.", "output.", "curve.")
 
@@ -64,18 +66,60 @@ def text_of(key: str, value: Any) -> str:
         return MISSING
     if isinstance(value, list | tuple):
         inner = ", ".join(_text_in_list(key, one) for one in value)
-        text = f"[{inner}]"
-        return (
-            text
-            if len(text) <= MAX_LENGTH
-            else f"{text[: MAX_LENGTH - 10]} … ({len(value)} in total)"
-        )
+        return _shortened(f"[{inner}]", len(value))
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and math.isfinite(value):
         kind = key_kind(key)
-        return with_unit(value, kind.unit if kind is not None and kind.unit else "1", 6)
+        return with_unit(value, kind.unit if kind is not None and kind.unit else "1", DIGITS)
     return str(value)
+
+
+def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
+    """A key with its unit, and values of it in that unit.
+
+    Parameters
+    ----------
+    key
+        Dotted key.
+    values
+        Values in SI, None where the key is not given.
+
+    Returns
+    -------
+    tuple
+        The key, such as "contacts.delay (ms)", and a text for each value. Lists of tables have
+        their units inside.
+    """
+    kind = key_kind(key)
+    numbers = [one for value in values for one in _numbers(value)]
+    if kind is None or kind.unit is None or not numbers:
+        return key, tuple(text_of(key, value) for value in values)
+    scale = scale_for(max(abs(one) for one in numbers), kind.unit)
+
+    def text(value: Any) -> str:
+        if value is None:
+            return MISSING
+        if isinstance(value, list | tuple):
+            return _shortened(f"[{', '.join(text(one) for one in value)}]", len(value))
+        return number(value / scale.size, DIGITS)
+
+    return scale.label(key), tuple(text(value) for value in values)
+
+
+def _numbers(value: Any) -> list[float]:
+    """The finite numbers of a value or of a list."""
+    inner = value if isinstance(value, list | tuple) else [value]
+    return [
+        one
+        for one in inner
+        if isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one)
+    ]
+
+
+def _shortened(text: str, count: int) -> str:
+    """A list as text, with its end cut off if it is long."""
+    return text if len(text) <= MAX_LENGTH else f"{text[: MAX_LENGTH - 10]} … ({count} in total)"
 
 
 def _text_in_list(key: str, value: Any) -> str:

@@ -59,11 +59,12 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts: its head, its rows, and a note below it."""
+    """A table of texts: its head, its rows, a note below it, and numbers of marked rows."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    marked: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

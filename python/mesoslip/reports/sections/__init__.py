@@ -11,6 +11,7 @@ from mesoslip.reports.sections.avalanches import avalanches
 from mesoslip.reports.sections.changes import changes
 from mesoslip.reports.sections.configuration import configuration
 from mesoslip.reports.sections.energy import energy
+from mesoslip.reports.sections.methods import methods
 from mesoslip.reports.sections.parameters import parameters
 from mesoslip.reports.sections.pictures import pictures
 from mesoslip.reports.sections.provenance import provenance
@@ -29,11 +30,12 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
         avalanches,
         response,
         energy,
+        methods,
         configuration,
         provenance,
     ),
-    "sweep": (sweep, maps, provenance),
-    "curve": (changes, pictures, curve, configuration, provenance),
-    "onset": (changes, pictures, onset, configuration, provenance),
-    "fit": (parameters, configuration, provenance),
+    "sweep": (sweep, maps, methods, provenance),
+    "curve": (changes, pictures, curve, methods, configuration, provenance),
+    "onset": (changes, pictures, onset, methods, configuration, provenance),
+    "fit": (parameters, methods, configuration, provenance),
 }

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from mesoslip.analysis import avalanches as catalogue
 from mesoslip.output.access import group_of
 from mesoslip.plots import draw
-from mesoslip.quantities import UNKNOWN, with_error, with_unit
+from mesoslip.quantities import column
 from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn
 
 DIGITS = 5
@@ -46,12 +46,7 @@ def _rows(statistics: Mapping[str, float | None]) -> tuple[tuple[str, ...], ...]
         if name in errors:
             continue
         unit, meaning = catalogue.SUMMARY[name]
-        error = statistics.get(f"{name}_error")
-        if value is None:
-            text = UNKNOWN
-        elif error is None:
-            text = with_unit(value, unit, DIGITS)
-        else:
-            text = with_error(value, error, unit, DIGITS)
-        rows.append((name, text, meaning))
+        shown = column([value], unit, DIGITS)
+        text = shown.text(value, statistics.get(f"{name}_error"))
+        rows.append((shown.head(name), text, meaning))
     return tuple(rows)

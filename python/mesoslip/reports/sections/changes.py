@@ -46,20 +46,27 @@ def _differences(subjects: Sequence[Subject]) -> Block:
     found = differences.differences([one.config for one in subjects])
     if not found:
         return Text("Differences: none.")
-    rows = tuple((one.key, *one.values) for one in found)
+    rows = _rows([one.config for one in subjects], [one.key for one in found])
     return Table(("key", *(one.name for one in subjects)), rows)
+
+
+def _rows(configs: Sequence[Config], keys: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    """Values of keys in configurations side by side, a row for each key."""
+    tables = [differences.flat(one) for one in configs]
+    found = [differences.in_one_unit(key, [one.get(key) for one in tables]) for key in keys]
+    return tuple((head, *texts) for head, texts in found)
 
 
 def _from_base(subjects: Sequence[Subject], subject: Subject) -> Iterator[Block]:
     """The keys that an output changes from its base."""
     base = subject.tree.attrs.get("base_configuration")
     config = None if base is None else Config.from_toml(base)
-    changed = [] if config is None else differences.differences([subject.config, config])
+    both = [] if config is None else [subject.config, config]
+    changed = [one.key for one in differences.differences(both)]
     title = f", “{config.title}”" if config is not None and config.title else ""
     text = f"Changes from the base{title}:"
     if not changed:
         yield Text(named(subjects, subject, f"{text} none."))
         return
     yield Text(named(subjects, subject, text))
-    rows = tuple((one.key, *one.values) for one in changed)
-    yield Table(("key", "value", "value in the base"), rows)
+    yield Table(("key", "value", "value in the base"), _rows(both, changed))

@@ -36,7 +36,7 @@ def sweep(subjects: Sequence[Subject]) -> Section:
         if subject.tree.attrs.get("failures"):
             blocks.append(Source("errors of failed runs", str(subject.tree.attrs["failures"])))
         keys = [(str(name), data[name].values) for name in data.coords]
-        rows = tuple((name, str(values.size), _listed(name, values)) for name, values in keys)
+        rows = tuple(_listed(name, values) for name, values in keys)
         blocks.append(Table(("key", "number of values", "values"), rows))
         ranges = tuple(_range(data[name]) for name in measures(data))
         blocks.append(Table(("measure", "minimum", "mean", "maximum"), ranges))
@@ -66,10 +66,11 @@ def _range(data: xr.DataArray) -> tuple[str, ...]:
     return row_in_one_unit(name, [values.min(), values.mean(), values.max()], unit)
 
 
-def _listed(key: str, values: NDArray[Any]) -> str:
-    """Values of a swept key: all of few, or the first and the last."""
-    texts = [differences.text_of(key, one) for one in values.tolist()]
-    return ", ".join(texts) if len(texts) <= MAX_VALUES else f"{texts[0]} … {texts[-1]}"
+def _listed(key: str, values: NDArray[Any]) -> tuple[str, ...]:
+    """A swept key, the number of its values, and these: all of few, or the first and the last."""
+    head, texts = differences.in_one_unit(key, values.tolist())
+    listed = ", ".join(texts) if len(texts) <= MAX_VALUES else f"{texts[0]} … {texts[-1]}"
+    return head, str(values.size), listed
 
 
 def maps(subjects: Sequence[Subject]) -> Section:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mesoslip.quantities import UNKNOWN, column
 from mesoslip.reports.content import Section, Subject, Table, Text
-from mesoslip.reports.sections.base import named
+from mesoslip.reports.sections.base import named, row_in_one_unit
 from mesoslip.theory import force_curve, slip_onset
 
 DIGITS = 5
@@ -31,7 +30,7 @@ def _numbers(
     for name, (unit, meaning) in summary.items():
         values = [one.tree.attrs.get(name) for one in subjects]
         if any(value is not None for value in values):
-            rows.append((name, *_texts(values, unit), meaning))
+            rows.append((*_row(name, values, unit), meaning))
     names = [one.name for one in subjects] if len(subjects) > 1 else ["value"]
     table = Table(("quantity", *names, "meaning"), tuple(rows))
     comments = (
@@ -42,16 +41,9 @@ def _numbers(
     return Section(title, (table, *comments))
 
 
-def _texts(values: Sequence[Any], unit: str) -> list[str]:
-    """Values of a quantity, all in one unit; words as they are."""
-    numbers = [float(one) for one in values if one is not None and not isinstance(one, str)]
-    shown = column(numbers, unit, DIGITS)
-
-    def text(value: Any) -> str:
-        if value is None:
-            return UNKNOWN
-        if isinstance(value, str):
-            return value
-        return f"{shown.text(float(value))} {shown.scale.name}".rstrip()
-
-    return [text(value) for value in values]
+def _row(name: str, values: Sequence[Any], unit: str) -> tuple[str, ...]:
+    """A quantity with its unit, and its values in that unit; words as they are."""
+    numbers = [None if one is None or isinstance(one, str) else float(one) for one in values]
+    head, *texts = row_in_one_unit(name, numbers, unit, DIGITS)
+    shown = [one if isinstance(one, str) else text for one, text in zip(values, texts, strict=True)]
+    return (head, *shown)

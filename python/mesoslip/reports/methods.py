@@ -1,0 +1,316 @@
+"""The method behind an output as a paragraph of a paper, with citations as in Markdown of Pandoc.
+
+Sentences about sliders have a form for each kind, chosen by the type of its table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import singledispatch
+
+import xarray as xr
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.contacts.tables import Ageing, Thermal
+from mesoslip.configuration.drive import Drive
+from mesoslip.configuration.keys import key_kind
+from mesoslip.configuration.sliders.base import SliderTable
+from mesoslip.configuration.sliders.force import ForceSlider
+from mesoslip.configuration.sliders.layered import LayeredSlider
+from mesoslip.configuration.sliders.prescribed import PrescribedSlider
+from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
+from mesoslip.configuration.sliders.rigid import RigidSlider
+from mesoslip.errors import ConfigError
+from mesoslip.inference import posterior
+from mesoslip.quantities import column, with_unit
+
+MODEL = "earthquake-like model of a multicontact interface [@braun2009; @braun2011; @braun2015]"
+INITIAL = {
+    "relaxed": "At the start no contact bears a force.",
+    "steady": "At the start contacts are in the stationary state of slow sliding.",
+    "uniform": "At the start the stretches are uniformly distributed up to breaking.",
+}
+COUPLINGS = {
+    "scaled": "the stiffness of a contact is proportional to the square root of its threshold",
+    "equal": "all contacts have the same stiffness",
+}
+# Significant digits of parameters.
+DIGITS = 6
+ENERGY = "The balance of energy closes to {residual:.0e} of the work of the drive."
+
+
+def quantity(value: float, unit: str) -> str:
+    """A parameter with its unit, in full."""
+    return with_unit(value, unit, DIGITS)
+
+
+def run_method(tree: xr.DataTree, config: Config) -> str:
+    """The method of a run."""
+    return " ".join((*_engine(config), *model(config), *_accuracy(tree, config)))
+
+
+def curve_method(_tree: xr.DataTree, config: Config) -> str:
+    """The method of a force curve."""
+    tolerance = f"{config.curve.tolerance:.0e}".replace("e-0", "e-")
+    return " ".join(
+        (
+            "The force F(X) of slow sliding was computed for infinitely many contacts of the "
+            f"{MODEL} with mesoslip [@mesoslip]: the master equation [@braun2010] is solved as a "
+            f"renewal equation, with an error of at most {tolerance} of the static force.",
+            *_contacts(config),
+        )
+    )
+
+
+def onset_method(_tree: xr.DataTree, config: Config) -> str:
+    """The method of an onset of slip."""
+    return " ".join(
+        (
+            f"The onset of slip of the {MODEL} was computed with mesoslip [@mesoslip], from the "
+            "force curve of the master equation [@braun2010], for contacts that break one after "
+            "another and for a film that melts at once.",
+            *model(config),
+        )
+    )
+
+
+def sweep_method(tree: xr.DataTree, config: Config) -> str:
+    """The method of a sweep."""
+    keys = ", ".join(str(name) for name in tree.coords if name != "realization")
+    count = tree.sizes.get("realization", 1)
+    each = f", with {count} realizations each" if count > 1 else ""
+    return " ".join(
+        (
+            *_engine(config),
+            *model(config),
+            f"Varied were {keys}{each}; values above of these keys are those of the base.",
+        )
+    )
+
+
+def fit_method(tree: xr.DataTree, config: Config) -> str:
+    """The method of a fit, with the medians of its free keys."""
+    rows = posterior.table(tree)
+    estimates = "; ".join(_estimate(one) for one in rows)
+    medians = {one.key: one.percentiles[2] for one in rows if key_kind(one.key) is not None}
+    whole = {key for key in medians if (kind := key_kind(key)) is not None and kind.is_whole}
+    values = {key: round(one) if key in whole else one for key, one in medians.items()}
+    note = "Values of free keys are medians of the posterior."
+    try:
+        config = config.replace(values)
+    except ConfigError:
+        note = f"Values above of {', '.join(values)} are not those of the fit."
+    return " ".join(
+        (
+            f"Parameters of the {MODEL} were estimated with mesoslip [@mesoslip] from a measured "
+            f"force (median, interval of 90 %): {estimates}. The trace and "
+            f"{tree.attrs['simulation_count']} simulations of it, with its sampling and noise, are "
+            "reduced to the same summaries, and parameters are drawn from a synthetic likelihood "
+            "of these [@wood2010] by an affine-invariant ensemble sampler [@foreman2013].",
+            *model(config),
+            note,
+        )
+    )
+
+
+def _estimate(row: posterior.Row) -> str:
+    """A free key with its median and interval of 90 %."""
+    shown = column(row.percentiles, row.unit, row.digits)
+    low, _, median, _, high = (shown.text(one) for one in row.percentiles)
+    return f"{row.key} {median} {shown.scale.name} ({low} to {high})".replace("  ", " ")
+
+
+def measured_method(tree: xr.DataTree) -> str:
+    """The method of a measured trace."""
+    source = tree.attrs.get("measured_file", "a file")
+    return (
+        f"The measured trace ({source}) was analysed with mesoslip [@mesoslip]: slips are falls of "
+        "the force that stand out of the noise and of ringing, by a rule that knows no model."
+    )
+
+
+def model(config: Config) -> Iterator[str]:
+    """Sentences on contacts, slider and drive."""
+    yield from _contacts(config)
+    yield INITIAL[config.contacts.initial]
+    yield slider_sentence(config.slider)
+    yield _drive(config.drive, config)
+
+
+def _engine(config: Config) -> Iterator[str]:
+    if config.contact_kind.is_discrete:
+        yield f"The {MODEL} was simulated with mesoslip [@mesoslip], from event to event."
+    else:
+        yield (
+            f"The master equation [@braun2010] of the {MODEL}, its limit of infinitely many "
+            "contacts, was solved with mesoslip [@mesoslip], in populations no wider than "
+            f"{config.run.resolution:g} standard deviations of the breaking stretch."
+        )
+
+
+def _contacts(config: Config) -> Iterator[str]:
+    contacts = config.contacts
+    count = f"N = {contacts.count}" if config.contact_kind.is_discrete else "Infinitely many"
+    law = contacts.threshold
+    yield (
+        f"{count} contacts have the total stiffness "
+        f"Nk = {quantity(contacts.stiffness, 'N/m')} and the total static force "
+        f"F_s = {quantity(contacts.static_force, 'N')}; their thresholds "
+        f"follow the {law.law} law with a relative standard deviation of "
+        f"{law.relative_width:.6g}, and {COUPLINGS[contacts.coupling]}."
+    )
+    yield _lives(config)
+    if contacts.ageing is not None:
+        yield _ageing(contacts.ageing)
+    if contacts.thermal is not None:
+        yield _thermal(contacts.thermal, contacts.contact_static_force)
+    lattice = config.interaction
+    if lattice is not None:
+        yield (
+            f"They interact with their neighbours on a periodic {lattice.lattice} lattice of "
+            f"{lattice.columns} × {lattice.rows} sites, with the strength ξ = {lattice.strength:g}."
+        )
+
+
+def _lives(config: Config) -> str:
+    """What a contact does that breaks."""
+    contacts = config.contacts
+    if not contacts.reattach:
+        return "A contact that reaches its threshold breaks for good."
+    drag = ""
+    if contacts.drag_rate and not config.slider.ignores_delay:
+        drag = f"is dragged at the rate η = {quantity(contacts.drag_rate, '1/s')}, "
+    wait = "at once"
+    if contacts.delay and not config.slider.ignores_delay:
+        delay = quantity(contacts.delay, "s")
+        drawn = " drawn from the exponential law of mean" if contacts.delay_law != "fixed" else ""
+        wait = f"after a delay{drawn} τ_d = {delay}"
+    force = "without force"
+    if contacts.back_force_ratio:
+        force = f"under the force f_b = {contacts.back_force_ratio:g} f_s"
+    width = ""
+    if contacts.newborn_width:
+        width = f", with a standard deviation of {contacts.newborn_width:g} f_s"
+    return (
+        f"A contact that reaches its threshold breaks, {drag}and attaches again {wait}, "
+        f"{force}{width} (f_s: mean threshold)."
+    )
+
+
+def _ageing(ageing: Ageing) -> str:
+    time = quantity(ageing.time, "s")
+    if ageing.law == "log":
+        return (
+            f"Thresholds grow with age as 1 + β ln(1 + t/τ_a), β = {ageing.growth:g} and "
+            f"τ_a = {time}."
+        )
+    return (
+        f"Thresholds of young contacts are {ageing.young_force_ratio:g} of those of old ones, with "
+        f"a relative standard deviation of {ageing.young_relative_width:g}, and relax within "
+        f"τ_a = {time}."
+    )
+
+
+def _thermal(thermal: Thermal, static_force: float) -> str:
+    rate = quantity(thermal.rate, "1/s")
+    return (
+        "Under a force f below its threshold a contact breaks at the rate ω_0 exp((f − f_s)/f_T) "
+        f"[@barel2010; @braun2011temperature], ω_0 = {rate}, f_T = "
+        f"{quantity(thermal.ratio(static_force), '1')} f_s."
+    )
+
+
+@singledispatch
+def slider_sentence(slider: SliderTable) -> str:
+    """A sentence on a slider."""
+    raise TypeError(f"there is no sentence on a slider of kind {slider.kind}")
+
+
+@slider_sentence.register
+def _rigid(slider: RigidSlider) -> str:
+    damping = "without damping"
+    if slider.damping_rate:
+        rate = quantity(slider.damping_rate, "1/s")
+        damping = f"with damping of its velocity relative to the running mean, η_S = {rate}"
+    return (
+        f"The slider is a rigid mass M = {quantity(slider.mass, 'kg')} on a spring "
+        f"K = {quantity(slider.stiffness, 'N/m')}, {damping}."
+    )
+
+
+@slider_sentence.register
+def _layered(slider: LayeredSlider) -> str:
+    base = damping = ""
+    if slider.layer_damping:
+        damping = (
+            f", with damping between layers at the rate {quantity(slider.layer_damping, '1/s')}"
+        )
+    if slider.base is not None:
+        base = (
+            f" It slides on a base of the mass {quantity(slider.base.mass, 'kg')} on a spring of "
+            f"{quantity(slider.base.stiffness, 'N/m')}."
+        )
+    return (
+        f"The slider is an elastic block of {slider.layers} layers, with the mass "
+        f"M = {quantity(slider.mass, 'kg')} and the static stiffness "
+        f"K = {quantity(slider.stiffness, 'N/m')}{damping}.{base}"
+    )
+
+
+@slider_sentence.register
+def _prescribed(slider: PrescribedSlider) -> str:  # noqa: ARG001
+    return "The slider moves with the drive."
+
+
+@slider_sentence.register
+def _quasistatic(slider: QuasistaticSlider) -> str:
+    if not slider.spring_stiffness:
+        return "The slider has no inertia and is in equilibrium with the force of the drive."
+    stiffness = quantity(slider.spring_stiffness, "N/m")
+    return f"The slider has no inertia and is in equilibrium with its spring K = {stiffness}."
+
+
+@slider_sentence.register
+def _under_a_force(slider: ForceSlider) -> str:
+    damping = "without damping"
+    if slider.damping:
+        damping = f"with damping at the rate η_S = {quantity(slider.damping, '1/s')}"
+    return f"The slider is a rigid mass M = {quantity(slider.mass, 'kg')} {damping}."
+
+
+def _drive(drive: Drive, config: Config) -> str:
+    run = f"for {quantity(config.duration, 's')}" if math.isfinite(config.duration) else ""
+    several = config.run.realizations
+    seeds = f" {several} realizations have the seed {config.run.seed}." if several > 1 else ""
+    return f"{_motion(drive)} {run}".rstrip() + f".{seeds}"
+
+
+def _motion(drive: Drive) -> str:
+    """A sentence on a drive, without its end."""
+    if drive.velocity is not None:
+        return f"The drive moves at v_d = {quantity(drive.velocity, 'm/s')}"
+    if drive.force_rate is not None:
+        return f"The force of the drive grows at {quantity(drive.force_rate, 'N/s')}"
+    if drive.force is not None:
+        return f"The force of the drive is {quantity(drive.force, 'N')}"
+    if drive.cycle is not None:
+        cycle = drive.cycle
+        return (
+            f"The drive oscillates between ±{quantity(cycle.amplitude, 'm')} at "
+            f"{quantity(cycle.speed, 'm/s')}"
+        )
+    if drive.history is not None:
+        return "The drive follows a measured history"
+    count = drive.parts[-1].stage + 1
+    return f"The drive has {count} stage{'s' * (count > 1)}"
+
+
+def _accuracy(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    """How the motion is computed, and how exactly."""
+    method = config.slider.solver_name(config)
+    if method in {"adams", "bdf"}:
+        yield "The slider is integrated by CVODE of SUNDIALS [@hindmarsh2005]."
+    residual = abs(float(tree.attrs.get("energy_residual", math.nan)))
+    if residual > 0:
+        yield ENERGY.format(residual=residual)

@@ -1,0 +1,96 @@
+"""Methods paragraphs of reports: what they say of a configuration, and their references."""
+
+from __future__ import annotations
+
+import re
+
+import mesoslip
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import ROOT
+from kinds import KINDS, configuration
+from mesoslip.configuration.differences import in_one_unit
+from mesoslip.reports.content import Subject
+from mesoslip.reports.methods import curve_method, onset_method, run_method
+from mesoslip.reports.references import CITATION, PROGRAM, REFERENCES, numbered
+from mesoslip.reports.sections.methods import methods
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_a_paragraph(kind):
+    config = configuration(kind)
+    tree = xr.DataTree(xr.Dataset(attrs={"energy_residual": 2.2e-13}))
+    for write in (run_method, curve_method, onset_method):
+        text = write(tree, config)
+        cited = {key.strip(" @") for found in CITATION.findall(text) for key in found.split(";")}
+        assert cited <= {PROGRAM, *REFERENCES}
+        assert {PROGRAM, "braun2011"} <= cited
+        assert "None" not in text
+        assert "  " not in text
+        assert text.endswith(".")
+    text = run_method(tree, config)
+    assert ("infinitely many" in text) == (config.run.engine == "me")
+    assert (f"N = {config.contacts.count}" in text) == (config.run.engine == "eq")
+    assert ("grow with age" in text or "of young" in text) == (config.contacts.ageing is not None)
+    assert ("ω_0" in text) == (config.contacts.thermal is not None)
+    assert ("lattice of" in text) == (config.interaction is not None)
+    assert "2e-13 of the work" in text
+
+
+def test_numbers_of_kleins_case():
+    text = run_method(xr.DataTree(), mesoslip.Config.load(ROOT / "runs" / "klein.toml"))
+    for part in ("N = 4080", "18 µN", "2 kN/m", "η = 2e11 1/s", "τ_d = 500 µs", "f_b = 0.1 f_s"):
+        assert part in text
+    for part in ("gaussian law", "of 0.01", "1.47 g", "97 N/m", "η_S = 51.3", "100 nm/s for 12 s"):
+        assert part in text
+
+
+def test_references_are_numbered_in_their_order():
+    text, keys = numbered("A [@b; @a]. B [@c] and [@a].", ["c"])
+    assert text == "A [2, 3]. B [1] and [3]."
+    assert keys == ["c", "b", "a"]
+
+
+def test_references_are_those_of_the_paper_and_of_the_citation_file():
+    """One record of each reference: titles, years, volumes and addresses agree."""
+    bib = (ROOT / "paper" / "paper.bib").read_text()
+    entries = dict(re.findall(r"@\w+\{(\w+),(.*?)\n\}", bib, re.DOTALL))
+    common = set(entries) & set(REFERENCES)
+    assert len(common) >= 4
+    for key in common:
+        for name, text in REFERENCES[key].fields.items():
+            assert f"{{{text}}}" in entries[key], (key, name)
+    citation = (ROOT / "CITATION.cff").read_text()
+    listed = re.findall(r"title: (.*)\n", citation.partition("references:")[2])
+    assert set(listed) <= {one.fields["title"] for one in REFERENCES.values()}
+    assert all(one.line.endswith(".") and "{" not in one.line for one in REFERENCES.values())
+
+
+def test_a_section_has_the_program_and_each_reference_once(klein):
+    first = mesoslip.curve(klein())
+    other = mesoslip.curve(klein(contacts__threshold__relative_width=0.02))
+    section = methods([Subject("a", first), Subject("b", other)])
+    texts = [block.text for block in section.blocks]
+    assert "The output b differs in contacts.threshold.relative_width = 0.02." in texts
+    listed = [text for text in texts if re.match(r"\[\d+\] ", text)]
+    assert [int(text[1]) for text in listed] == list(range(1, len(listed) + 1))
+    (own,) = (text for text in listed if "the mesoslip developers" in text)
+    assert f"version {first.attrs['program_version']}, commit {first.attrs['commit']}" in own
+    assert section.blocks[-1].text.count("@") == len(listed)
+
+
+def test_values_of_a_key_are_in_one_unit():
+    assert in_one_unit("contacts.delay", [1e-3, 5e-5, None]) == (
+        "contacts.delay (ms)",
+        ("1", "0.05", "not given"),
+    )
+    assert in_one_unit("contacts.count", [10, 2000]) == ("contacts.count", ("10", "2000"))
+    assert in_one_unit("slider.kind", ["rigid", None])[1] == ("rigid", "not given")
+    assert in_one_unit("output.layers", [True, False])[1] == ("true", "false")
+    assert in_one_unit("output.snapshots", [[0.25, 1.5], []]) == (
+        "output.snapshots (s)",
+        ("[0.25, 1.5]", "[]"),
+    )
+    values = np.geomspace(1e-4, 1e-2, 3).tolist()
+    assert in_one_unit("contacts.delay", values)[1] == ("0.1", "1", "10")

@@ -11,6 +11,7 @@ import pytest
 import tomli_w
 from mesoslip import Config, MesoslipError, SteadySliding
 from mesoslip.theory.activated_sliding import ActivatedSliding
+from mesoslip.theory.narrow_thresholds import rate_and_state_of_narrow_thresholds
 from mesoslip.theory.thermal import (
     creep_velocity,
     hold_force,
@@ -22,6 +23,7 @@ from oracles import aged
 from test_thermal import aged_force, unit
 
 LOG = {"law": "log", "time": 1.0, "growth": 0.05}
+SLOW_LOG = LOG | {"growth": 0.02}
 RELAX = {"law": "relax", "time": 20.0, "young_force_ratio": 0.6, "young_relative_width": 0.3}
 
 
@@ -83,7 +85,16 @@ def test_hold_and_restart_are_those_of_contacts_one_by_one(delay):
     again = (time >= 1100) & (time <= 1200)
     at = np.interp(velocity * (time[again] - 1100), predicted.displacement, predicted.force / count)
     np.testing.assert_allclose(force[again], at, atol=4 * error)
-    assert predicted.peak / count > 1.02 * float(steady_force(config, velocity)) / count
+    # What stands in the hold goes on together: the peak stands out of the noise of its mean.
+    window = np.abs(velocity * (time - 1100) - predicted.peak_displacement) < 0.05
+    height = (
+        force[window].mean()
+        - np.interp(
+            velocity * (time[window] - 1100), predicted.displacement, predicted.force / count
+        ).mean()
+    )
+    assert abs(height) < 2 * error
+    assert predicted.peak / count - steady_force(config, velocity) / count > 4 * error
 
 
 def test_a_restart_without_a_hold_is_steady():
@@ -137,56 +148,100 @@ def test_fast_motion_joins_slower_motion():
     assert abs(above / below - 1) < 0.01
 
 
+def cohort_force(config: Config, step: float, path: np.ndarray, thresholds: int) -> np.ndarray:
+    """Force over F_s of the master equation in small steps, at displacements x_s a step apart.
+
+    Uniform thresholds; contacts slide steadily before, and attach with no force. The contacts of
+    one threshold that attached in one step are a cohort, spread evenly over a step; they break at
+    the rate of its middle, and where they come to their threshold. Errors are of second order.
+    """
+    velocity, late = config.drive_speed, round(config.contacts.delay / step)
+    law = config.contacts.threshold
+    deviate = 2 * (np.arange(thresholds) + 0.5) / thresholds - 1
+    threshold = 1 + law.relative_width * math.sqrt(3) * deviate
+    count = math.ceil(1.6 * max(threshold) / (velocity * step))
+    ages = step * (np.arange(count) + 0.5)
+    limit = np.broadcast_to(threshold[:, None], (thresholds, count))
+    if config.contacts.ageing:
+        limit = np.array([aged(config, ages)[0] * one for one in threshold])
+    thermal = config.contacts.thermal
+    rates = thermal.rate * np.exp((velocity * ages - limit) / thermal.force_ratio)
+    hazard = np.cumsum(rates, axis=1) * step - rates * step / 2
+    below = np.clip((limit / velocity - ages) / step + 0.5, 0.0, 1.0)
+    survival = below * np.exp(-hazard)
+    births = 1 / (survival.sum(axis=1).mean() * step + late * step)
+    number = survival * births * step / thresholds
+    stretch = np.tile(velocity * ages, (thresholds, 1))
+    waiting, newborn = [births * step] * late, np.ones((thresholds, 1))
+    force = []
+    for moved in np.diff(path):
+        before, stretch = stretch, stretch + moved
+        rate = thermal.rate * np.exp(((before + stretch) / 2 - limit) / thermal.force_ratio)
+        last, below = below, np.clip((limit - stretch) / moved + 0.5, 0.0, 1.0)
+        left = number * np.exp(-rate * step) * below / np.maximum(last, 1e-300)
+        waiting.append(1 - left.sum() - sum(waiting))
+        number = np.concatenate([newborn * waiting[0] / thresholds, left[:, :-1]], axis=1)
+        stretch = np.concatenate([newborn * moved / 2, stretch[:, :-1]], axis=1)
+        below = np.concatenate([newborn, below[:, :-1]], axis=1)
+        waiting = waiting[1:]
+        force.append(np.sum(number * stretch))
+    return np.array(force)
+
+
 @pytest.mark.parametrize("ageing", [None, LOG], ids=["", "log"])
 @pytest.mark.parametrize("delay", [0.0, 20.0])
 def test_response_is_that_of_cohorts_in_small_steps(ageing, delay):
     """The master equation in small steps of time, under a slider that oscillates a little."""
     velocity, amplitude, frequency = 1e-2, 1e-3, 0.15
+    period = 2 * math.pi / frequency
+    step = period / 400
     config = unit(
         1,
         contacts__threshold={"law": "uniform", "relative_width": 0.1},
         contacts__thermal__force_ratio=0.1,
         contacts__ageing=ageing,
-        contacts__delay=delay,
+        contacts__delay=round(delay / step) * step,
     )
-    period = 2 * math.pi / frequency
-    step = period / 400
-    late = round(delay / step)
-    config = config.replace({"contacts.delay": late * step})
-    sliding = ActivatedSliding(config)
-    threshold = 1 + 0.1 * math.sqrt(3) * (2 * (np.arange(6) + 0.5) / 6 - 1)
-    ages = step * (np.arange(1700) + 0.5)
-    limit = (
-        np.array([aged(config, ages)[0] * one for one in threshold])
-        if ageing
-        else threshold[:, None]
-    )
-    rates = np.exp((velocity * ages - limit) / 0.1)
-    survival = np.exp(-np.cumsum(rates, axis=1) * step)
-    survival[velocity * ages >= limit] = 0
-    births = 1 / (survival.sum(axis=1).mean() * step + late * step)
-    # Numbers of contacts by age, and their stretches; births of the steps to come.
-    number, stretch = survival * births * step / 6, np.tile(velocity * ages, (6, 1))
-    waiting = np.full(late, births * step)
-    force, times = [], step * np.arange(1, 4401)
-    for time in times:
-        moved = velocity * step + amplitude * (
-            math.sin(frequency * time) - math.sin(frequency * (time - step))
-        )
-        before = stretch
-        stretch = stretch + moved
-        rate = np.exp(((before + stretch) / 2 - limit) / 0.1)
-        left = number * np.exp(-rate * step)
-        left[stretch >= limit] = 0
-        waiting = np.append(waiting, 1 - left.sum() - waiting.sum())
-        number = np.concatenate([np.full((6, 1), waiting[0] / 6), left[:, :-1]], axis=1)
-        stretch = np.concatenate([np.full((6, 1), moved / 2), stretch[:, :-1]], axis=1)
-        waiting = waiting[1:]
-        force.append(np.sum(number * stretch))
+    times = step * np.arange(4401)
+    path = velocity * times + amplitude * np.sin(frequency * times)
+    force, times = cohort_force(config, step, path, 6), times[1:]
     last = times > times[-1] - 2 * period + step / 2
-    found = 2j * np.mean(np.array(force)[last] * np.exp(-1j * frequency * times[last])) / amplitude
-    expected = complex(sliding.response(frequency))
+    found = 2j * np.mean(force[last] * np.exp(-1j * frequency * times[last])) / amplitude
+    expected = complex(ActivatedSliding(config).response(frequency))
     assert abs(found - expected) < 0.02 * abs(expected)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "ageing", "ratio"),
+    [(1e-3, LOG, 0.03), (1e-3, None, 0.03), (3e-2, LOG, 0.03), (1e-3, SLOW_LOG, 0.03)],
+    ids=["ageing", "no ageing", "thresholds reached", "strengthening"],
+)
+def test_rate_and_state_are_those_of_a_velocity_step_of_cohorts(velocity, ageing, ratio):
+    """a: the evolution continued back to the step; a - b: the end; D_c: the area between."""
+    config = unit(
+        1,
+        drive={"velocity": velocity},
+        contacts__threshold={"law": "uniform", "relative_width": 0.2},
+        contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+        contacts__ageing=ageing,
+    )
+    logarithm = 0.04
+    step = ratio / 8 / velocity
+    times = step * np.arange(math.ceil(9 / (velocity * step)))
+    up, down = (
+        cohort_force(config, step, velocity * math.exp(sign * logarithm / 2) * times, 20)
+        for sign in (1, -1)
+    )
+    change = (up - down) / logarithm
+    displacement = velocity * times[1:]
+    found = ActivatedSliding(config).rate_and_state
+    early = (displacement > 6 * ratio) & (displacement < 0.5)
+    direct = np.polyfit(displacement[early], change[early], 3)[-1]
+    assert found.a == pytest.approx(direct, rel=0.03)
+    net = change[displacement > 6].mean()
+    assert found.a - found.b == pytest.approx(net, rel=0.02, abs=2e-4)
+    area = np.trapezoid(change - net, displacement) + ratio * found.a
+    assert found.slip_distance == pytest.approx(area / (found.a - net), rel=0.04)
 
 
 def test_the_critical_stiffness_divides_stable_from_unstable_springs():
@@ -201,15 +256,25 @@ def test_the_critical_stiffness_divides_stable_from_unstable_springs():
         assert sliding.is_stable == is_stable
 
 
-def test_rate_and_state_of_narrow_thresholds():
-    """a = N f_T, and b - a is half of what thresholds grow by, less half of f_T."""
-    config = klein_activated(1e4, 0.01, {"law": "log", "time": 1e-3, "growth": 0.02})
-    config = config.replace({"contacts.delay": 0.0, "contacts.threshold.relative_width": 0.02})
-    found = ActivatedSliding(config).rate_and_state
-    static = config.contacts.static_force
-    assert found.a == pytest.approx(0.01 * static, rel=1e-9)
-    assert (found.a - found.b) / static == pytest.approx((0.01 - 0.02) / 2, rel=0.4)
-    assert 0.15 < found.slip_distance / config.contacts.break_stretch < 0.5
+@pytest.mark.parametrize("velocity", [1e-9, 1e-8, 1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize(("ratio", "growth", "back"), [(0.01, 0.02, 0.0), (0.02, 0.05, 0.2)])
+def test_rate_and_state_of_narrow_thresholds(velocity, ratio, growth, back):
+    """In closed form to the first order in f_T, also where contacts come to their thresholds."""
+    config = klein_activated(1e4, ratio, {"law": "log", "time": 1e-3, "growth": growth})
+    config = config.replace(
+        {
+            "contacts.delay": 0.0,
+            "contacts.threshold.relative_width": 0.01,
+            "contacts.back_force_ratio": back,
+        }
+    )
+    found = ActivatedSliding(config, velocity).rate_and_state
+    narrow = rate_and_state_of_narrow_thresholds(config, velocity)
+    assert found.a == pytest.approx(narrow.a, rel=0.03)
+    assert found.b == pytest.approx(narrow.b, rel=0.01)
+    assert found.a - found.b == pytest.approx(narrow.a - narrow.b, rel=0.01)
+    length = config.contacts.break_stretch
+    assert abs(found.slip_distance - narrow.slip_distance) < 0.5 * ratio * length
 
 
 def test_run_prints_the_velocity_of_creep_under_a_force(tmp_path, command):

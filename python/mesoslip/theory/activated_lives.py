@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
 Array = NDArray[np.float64]
+# Real or complex.
+Complex = NDArray[np.inexact[Any]]
 
 # Panels and points of the quadratures, over thresholds and over ages, and the probability beyond
 # either end of the former.
 MAX_PANELS, MIN_PANELS, POINTS = 60, 12, 10
 LEFT_OUT = 1e-15
-# Length of a panel over thresholds, over f_T.
-THRESHOLD_PANEL = 1.0
 # Hazards between which ages have a fine quadrature: below, all contacts survive, above, none.
-MIN_HAZARD, MAX_HAZARD = 1e-17, 40.0
+MIN_HAZARD, MAX_HAZARD = 1e-14, 40.0
 # Panels of the search for these ages, and maximum length of the fine ones, over f_T/(k v).
 SEARCH_PANELS, MAX_PANEL = 60, 1.0
 # Panels over the ages in which young thresholds change.
@@ -52,12 +52,11 @@ class ActivatedLives:
     velocity
         Positive [m/s].
     max_panel
-        Maximum length of a panel over ages [s].
-    from_birth
-        Whether the panels are fine from birth on, and not only where contacts break: integrals over
-        later events need that.
+        Maximum length of a panel over ages at which contacts break [s].
     coarseness
-        Length of the panels over thresholds and ages; 1 for about ten digits.
+        Length of the panels over ages; 1 for about ten digits.
+    threshold_panel
+        Length of the panels over thresholds, over f_T; as `coarseness` by default.
 
     Attributes
     ----------
@@ -77,8 +76,8 @@ class ActivatedLives:
         velocity: float,
         *,
         max_panel: float = math.inf,
-        from_birth: bool = False,
         coarseness: float = 1.0,
+        threshold_panel: float | None = None,
     ) -> None:
         contacts, thermal = config.contacts, config.contacts.thermal
         assert thermal is not None
@@ -89,16 +88,16 @@ class ActivatedLives:
         self.scale = thermal.ratio(contacts.contact_static_force)
         """f_T/f_s."""
         self._log_rate = math.log(thermal.rate)
-        weight, threshold = _thresholds(config, coarseness * self.scale)
+        weight, threshold = _thresholds(config, (threshold_panel or coarseness) * self.scale)
         self.weight, self.threshold = weight[:, None], threshold[:, None]
         self.end = self._end()
         """Ages at which contacts come to their thresholds, shape (thresholds, 1)."""
-        edges = self._edges(max_panel, from_birth, coarseness)
+        edges = self._edges(max_panel, coarseness)
         self.edges = edges
-        self._point, panel_weight = np.polynomial.legendre.leggauss(POINTS)
+        self.point, panel_weight = np.polynomial.legendre.leggauss(POINTS)
         half = np.diff(edges, axis=1)[:, :, None] / 2
         self.half = half
-        self.age = (edges[:, :-1, None] + half * (1 + self._point)).reshape(len(weight), -1)
+        self.age = (edges[:, :-1, None] + half * (1 + self.point)).reshape(len(weight), -1)
         self.step = (half * panel_weight).reshape(len(weight), -1)
         self.stretch = self.back + self.speed * self.age
         self.rate = self.rate_at(self.age, self.stretch)
@@ -150,24 +149,34 @@ class ActivatedLives:
         growth = self.threshold_at(self.end + change) - self.threshold_at(self.end - change)
         return self.speed - growth / (2 * change)
 
-    def within(self, values: Array) -> Array:
-        """∫ values dt from the start of the panel of each point; shape (thresholds, points)."""
-        parts = values.reshape(*self.half.shape[:2], POINTS)
-        return (parts @ _cumulative().T * self.half).reshape(len(values), -1)
+    @staticmethod
+    def within(values: Complex, half: Array) -> Complex:
+        """∫ values dt from the start of the panel of each point.
+
+        The values have the shape (thresholds, panels, points), the half lengths of the panels
+        (thresholds, panels, 1).
+        """
+        return values @ _cumulative().T * half
+
+    def accumulated(self, values: Array) -> tuple[Array, Array]:
+        """∫ values dt from birth to each point, (thresholds, points), and to the end."""
+        shape = (*self.half.shape[:2], POINTS)
+        whole = (values * self.step).reshape(shape).sum(axis=2)
+        before = np.cumsum(whole, axis=1) - whole
+        inner = self.within(values.reshape(shape), self.half)
+        return (before[:, :, None] + inner).reshape(values.shape), whole.sum(axis=1)
 
     def _hazards(self) -> tuple[Array, Array]:
-        whole = (self.rate * self.step).reshape(*self.half.shape[:2], POINTS).sum(axis=2)
-        before = np.cumsum(whole, axis=1) - whole
-        hazard = np.repeat(before, POINTS, axis=1) + self.within(self.rate)
-        return np.minimum(hazard, MAX_EXPONENT), np.minimum(whole.sum(axis=1), MAX_EXPONENT)
+        hazard, last = self.accumulated(self.rate)
+        return np.minimum(hazard, MAX_EXPONENT), np.minimum(last, MAX_EXPONENT)
 
     def _end(self) -> Array:
         if self.config.contacts.ageing is None:
             return (self.threshold - self.back) / self.speed
         return ageing.lives(self.config, self.threshold[:, 0], self.speed)[:, None]
 
-    def _edges(self, max_panel: float, from_birth: bool, coarseness: float) -> Array:
-        """Ends of the panels over ages, shape (thresholds, panels + 1)."""
+    def _edges(self, max_panel: float, coarseness: float) -> Array:
+        """Ends of the panels over ages, (thresholds, panels + 1); none breaks in the first."""
         law = self.config.contacts.ageing
         end, start = self.end, np.zeros_like(self.end)
         length = self.scale / self.speed
@@ -185,25 +194,23 @@ class ActivatedLives:
             end = np.where(
                 is_over[:, None], ages[rows, np.minimum(last + 2, SEARCH_PANELS)][:, None], end
             )
-        if not from_birth:
-            ages = np.linspace(0, 1, SEARCH_PANELS + 1) * end
-            rates = self.rate_at(ages, self.back + self.speed * ages)
-            rates = np.maximum.accumulate(rates, axis=1) * end
-            begin = np.maximum(np.sum(rates < MIN_HAZARD, axis=1) - 1, 0)
-            start = ages[np.arange(len(end)), begin][:, None]
+        ages = np.linspace(0, 1, SEARCH_PANELS + 1) * end
+        rates = self.rate_at(ages, self.back + self.speed * ages)
+        rates = np.maximum.accumulate(rates, axis=1) * end
+        begin = np.maximum(np.sum(rates < MIN_HAZARD, axis=1) - 1, 0)
+        start = ages[np.arange(len(end)), begin][:, None]
         longest = min(MAX_PANEL * coarseness * length, max_panel)
         count = max(MIN_PANELS, math.ceil(float(np.max(end - start)) / longest))
         edges = start + (end - start) * np.linspace(0, 1, count + 1)
-        if not from_birth:
-            edges = np.concatenate([np.zeros_like(end), edges], axis=1)
         if law is not None:
             # Young thresholds change within the ageing time: panels of equal ratios.
             longest_age = float(np.max(end))
             young = np.geomspace(
                 0.1 * min(law.time, longest_age), longest_age, math.ceil(AGEING_PANELS / coarseness)
             )
-            edges = np.sort(np.concatenate([edges, np.minimum(young, end)], axis=1), axis=1)
-        return edges
+            young = young[young > np.min(start)]
+            edges = np.sort(np.concatenate([edges, np.clip(young, start, end)], axis=1), axis=1)
+        return np.concatenate([np.zeros_like(end), edges], axis=1)
 
 
 def _cumulative() -> Array:
@@ -222,10 +229,10 @@ def _cumulative() -> Array:
     return np.asarray(integrals @ np.linalg.inv(vander))
 
 
-def _thresholds(config: Config, scale: float) -> tuple[Array, Array]:
-    """Weights and points of a quadrature over the thresholds, as fine as f_T asks for."""
+def _thresholds(config: Config, panel: float) -> tuple[Array, Array]:
+    """Weights and points of a quadrature over the thresholds, in panels of about a length."""
     law = config.contacts.threshold.above(config.contacts.min_threshold)
     weakest, strongest = law.quantile([1 - LEFT_OUT, LEFT_OUT])
-    wanted = math.ceil(float(strongest - weakest) / (THRESHOLD_PANEL * scale))
+    wanted = math.ceil(float(strongest - weakest) / panel)
     panels = min(MAX_PANELS, max(MIN_PANELS, wanted))
     return threshold_quadrature(config, panels, POINTS)

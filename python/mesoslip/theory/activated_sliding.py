@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,23 +24,22 @@ from mesoslip.theory.sliders import dynamic_stiffness
 from mesoslip.theory.steady_sliding import Parts, SteadySliding
 from mesoslip.theory.thermal import steady_force, steady_slope
 
-if TYPE_CHECKING:
-    pass
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Product of a rate and the length of a panel up to which its quadrature has rounding errors only,
 # and maximum number of panels over the ages.
 MAX_TURN, MAX_PANELS = 6.0, 400
-# Length of the panels, for about six digits.
-COARSENESS = 4.0
+# Length of the panels, for about six digits, and doublings of those over thresholds at low rates.
+COARSENESS, MAX_DOUBLINGS = 4.0, 3
 # Rate over k v/f_T from which contacts do not break while the slider oscillates.
 FAST = 20.0
 # Rate over that of breaking at which the response is nearly linear.
 SLOW = 1e-3
-# Points of the path for a decade of frequencies.
+# Points of the path for a decade of frequencies. From a frequency over k v/f_T on, the critical
+# stiffness is sought with fewer points.
 POINTS_A_DECADE = 15
+SMOOTH_FROM, THINNING = 1.5, 3
 
 
 class RateAndState(NamedTuple):
@@ -49,13 +48,14 @@ class RateAndState(NamedTuple):
     Attributes
     ----------
     a
-        Direct effect [N]: N f_T times the share of pinned contacts. Just after a step of the
-        velocity by a factor r contacts break at a force that is higher by f_T ln r.
+        Direct effect [N]: N f_T times the shares of contacts that are pinned, and of those that
+        break before they come to their thresholds. After a step of the velocity by a factor r they
+        break at a force that is higher by f_T ln r.
     b
         Evolution effect [N]: a - dF/d ln v.
     slip_distance
-        D_c [m]: displacement over which the force evolves, the area between the force and its new
-        steady value over the evolution of the force, for a small step.
+        D_c [m]: displacement over which the force evolves, the area between the evolving force and
+        its new steady value over the evolution of the force, for a small step.
     """
 
     a: float
@@ -86,21 +86,20 @@ class ActivatedSliding(SteadySliding):
     def _lives_for(self, rate: float) -> ActivatedLives:
         """Quadratures that resolve a rate [1/s]; panels are halved as it doubles."""
         if not self._lives:
-            self._lives[0] = ActivatedLives(
-                self.config, self.velocity, from_birth=True, coarseness=COARSENESS
-            )
-        base = self._lives[0]
-        longest = float(np.max(np.diff(base.edges, axis=1)))
-        end = float(np.max(base.edges))
-        halvings = max(0, math.ceil(math.log2(max(rate * longest / MAX_TURN, 1e-300))))
-        most = max(0, math.ceil(math.log2(MAX_PANELS * longest / end)))
-        level = min(halvings, most)
+            self._lives[0] = ActivatedLives(self.config, self.velocity, coarseness=COARSENESS)
+        # Contacts break between the ends of the first panel and of the last one.
+        edges = self._lives[0].edges[:, 1:]
+        longest = float(np.max(np.diff(edges, axis=1)))
+        whole = float(np.max(edges[:, -1] - edges[:, 0]))
+        halvings = math.ceil(math.log2(max(rate * longest / MAX_TURN, 1e-300)))
+        most = max(0, math.ceil(math.log2(MAX_PANELS * longest / whole)))
+        level = max(-MAX_DOUBLINGS, min(halvings, most))
         if level not in self._lives:
             self._lives[level] = ActivatedLives(
                 self.config,
                 self.velocity,
-                max_panel=longest / 2**level,
-                from_birth=True,
+                max_panel=longest / 2 ** max(0, level),
+                threshold_panel=COARSENESS * 2 ** max(0, -level),
                 coarseness=COARSENESS,
             )
         return self._lives[level]
@@ -120,9 +119,8 @@ class ActivatedSliding(SteadySliding):
 
     def _parts_at(self, rate: complex) -> tuple[complex, complex, complex, complex]:
         contacts = self.config.contacts
-        slow = self._lives_for(0.0)
-        is_fast = abs(rate) * slow.scale > FAST * slow.speed
-        lives = slow if is_fast else self._lives_for(abs(rate))
+        is_fast = abs(rate) > FAST * self._breaking_rate
+        lives = self._lives_for(0.0) if is_fast else self._lives_for(abs(rate))
         density = 1 / (lives.life + self.delay)
         lost, held, laplace, load = (
             self._fast_motion(lives, rate) if is_fast else self._motion(lives, rate)
@@ -146,20 +144,45 @@ class ActivatedSliding(SteadySliding):
     ) -> tuple[complex, complex, complex, complex]:
         """Breaks and force of the pinned contacts, for ε of f_s/k, and the transforms of the number
         and the force of a contact over its life [s]."""
-        decay = np.exp(-rate * lives.age)
-        missing = -np.expm1(-rate * lives.age)
-        alive = lives.weight * lives.step * lives.survival
+        ages, stretch = lives.age[:, POINTS:], lives.stretch[:, POINTS:]
+        decay = np.exp(-rate * ages)
+        missing = -np.expm1(-rate * ages)
+        alive = (lives.weight * lives.step * lives.survival)[:, POINTS:]
         broken = self._late_breaks(lives, rate, decay)
         end_missing = -np.expm1(-rate * lives.edges[:, -1:])
         ended = lives.weight * lives.reached * end_missing / lives.approach
         end_stretch = lives.back + lives.speed * lives.edges[:, -1:]
         lost = np.sum(alive * broken) + np.sum(ended)
-        held = np.sum(alive * (missing - lives.stretch * broken)) - np.sum(ended * end_stretch)
+        held = np.sum(alive * (missing - stretch * broken)) - np.sum(ended * end_stretch)
+        young_held, young, young_load = self._unbroken(lives, rate)
         return (
             complex(lost),
-            complex(held),
-            complex(np.sum(alive * decay)),
-            complex(np.sum(alive * lives.stretch * decay)),
+            complex(held) + young_held,
+            complex(np.sum(alive * decay)) + young,
+            complex(np.sum(alive * stretch * decay)) + young_load,
+        )
+
+    @staticmethod
+    def _unbroken(lives: ActivatedLives, rate: complex) -> tuple[complex, complex, complex]:
+        """Integrals of 1 - e^(-λa), e^(-λa) and x e^(-λa) while none breaks [s]."""
+        weight, start = lives.weight, lives.edges[:, 1:2]
+        if abs(rate) * float(np.max(start)) < MAX_TURN:
+            share = weight * lives.step[:, :POINTS]
+            decay = np.exp(-rate * lives.age[:, :POINTS])
+            missing = -np.expm1(-rate * lives.age[:, :POINTS])
+            loaded = share * lives.stretch[:, :POINTS]
+            return (
+                complex(np.sum(share * missing)),
+                complex(np.sum(share * decay)),
+                complex(np.sum(loaded * decay)),
+            )
+        decay = np.exp(-rate * start)
+        young = complex(np.sum(weight * -np.expm1(-rate * start))) / rate
+        moved = (young - complex(np.sum(weight * start * decay))) / rate
+        return (
+            float(np.sum(weight * start)) - young,
+            young,
+            lives.back * young + lives.speed * moved,
         )
 
     @staticmethod
@@ -178,14 +201,15 @@ class ActivatedSliding(SteadySliding):
 
     @staticmethod
     def _late_breaks(lives: ActivatedLives, rate: complex, decay: Complex) -> Complex:
-        """e^(-λa) D(a) = ∫_0^a (k h/f_T) (e^(-λ(a - a')) - e^(-λa)) da', (thresholds, points)."""
+        """e^(-λa) D(a) = ∫_0^a (k h/f_T) (e^(-λ(a - a')) - e^(-λa)) da', while contacts break;
+        shape (thresholds, points)."""
         shape = (len(lives.weight), -1, POINTS)
-        half = lives.half
+        half = lives.half[:, 1:]
         # Ages since the start of the panel.
-        since = lives.age.reshape(shape) - lives.edges[:, :-1, None]
-        growing = lives.rate.reshape(shape) * np.exp(rate * since)
-        inner = lives.within(growing.reshape(len(lives.weight), -1)).reshape(shape)
-        whole = (growing * lives.step.reshape(shape)).sum(axis=2)
+        since = half * (1 + lives.point)
+        growing = lives.rate[:, POINTS:].reshape(shape) * np.exp(rate * since)
+        inner = lives.within(growing, half)
+        whole = (growing * lives.step[:, POINTS:].reshape(shape)).sum(axis=2)
         panel_decay = np.exp(-rate * 2 * half[:, :, 0])
         carried = np.zeros(whole.shape, dtype=np.complex128)
         for panel in range(1, whole.shape[1]):
@@ -193,8 +217,8 @@ class ActivatedSliding(SteadySliding):
                 carried[:, panel - 1] + whole[:, panel - 1]
             )
         lagged = np.exp(-rate * since) * (carried[:, :, None] + inner)
-        broken: Complex = (lagged.reshape(decay.shape) - decay * lives.hazard) / lives.scale
-        return broken
+        broken: Complex = lagged.reshape(decay.shape) - decay * lives.hazard[:, POINTS:]
+        return broken / lives.scale
 
     @cached_property
     def _path(self) -> Array:
@@ -216,18 +240,30 @@ class ActivatedSliding(SteadySliding):
         spring = self.config.spring_stiffness
         return spring if math.isfinite(spring) else 0.0
 
+    @property
+    def _breaking_rate(self) -> float:
+        """k v/f_T [1/s]."""
+        lives = self._lives_for(0.0)
+        return lives.speed / lives.scale
+
     @cached_property
     def rate_and_state(self) -> RateAndState:
         """a, b and D_c near this velocity; a one-state law need not describe the contacts."""
         lives = self._lives_for(0.0)
-        contacts = self.config.contacts
-        a = contacts.static_force * lives.scale * lives.life / (lives.life + self.delay)
+        life = lives.life + self.delay
+        hazards, _ = lives.accumulated(lives.hazard)
+        # Contacts that break later bear on, and attach later with the back force.
+        later = lives.mean((lives.stretch - lives.back) * lives.survival * hazards)
+        a = self.config.contacts.static_force * self._breaking_rate * later / life
         net = self.velocity * self.slope
-        # Λ = λ Λ'(0) + λ² Λ''(0)/2 + ...: the area is v² Λ''(0)/2 for each unit of ln r.
-        rate = SLOW / (lives.life + self.delay)
+        # Λ = λ Λ'(0) + λ² Λ''(0)/2 + ...: the area is v² Λ''(0)/2 for each unit of ln r. The direct
+        # effect comes as 1 - e^(-k X/f_T), which the area has too.
+        rate = SLOW / life
         here, twice = (self.response_at(one + 0j).real / one for one in (rate, 2 * rate))
         area = self.velocity**2 * float((twice - here) / rate)
-        return RateAndState(a, a - net, area / (a - net))
+        return RateAndState(
+            a, a - net, (area + a * self.velocity / self._breaking_rate) / (a - net)
+        )
 
     @cached_property
     def critical_stiffness(self) -> tuple[float, float] | None:
@@ -240,6 +276,9 @@ class ActivatedSliding(SteadySliding):
         if not self._has_motion or not 0 < self._spring < math.inf:
             return None
         path = self._path[1:]
+        # Faster than contacts break, the response has no cycles of births any more.
+        is_slow = path < SMOOTH_FROM * self._breaking_rate
+        path = np.concatenate([path[is_slow], path[~is_slow][::THINNING]])
         values = self._without_spring(path)
         crossings = np.flatnonzero(np.diff(np.sign(values.imag)) != 0)
         found = None
@@ -250,7 +289,7 @@ class ActivatedSliding(SteadySliding):
                 lambda one: float(self._without_spring(np.array([one])).imag[0]),
                 path[at],
                 path[at + 1],
-                rtol=1e-6,
+                rtol=1e-5,
             )
             stiffness = -float(self._without_spring(np.array([frequency])).real[0])
             if stiffness > 0 and (found is None or stiffness > found[0]):

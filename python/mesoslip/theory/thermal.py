@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 SLOPE_STEP = 1e-3
 # Velocities between which creep is sought, over that of activation, ω_0 f_T/k, and their number.
 MIN_CREEP, MAX_CREEP, CREEP_POINTS = 1e-30, 1e6, 80
+# Length of the panels of the quadratures on the grid of these velocities.
+GRID_COARSENESS = 4.0
 # Probability that a contact which attaches in a hold breaks in it, beyond which its force there
 # is refused.
 MAX_NEWBORN_BREAKS = 0.01
@@ -54,7 +56,11 @@ def steady_force(config: Config, velocity: float) -> float:
     float
         The force [N].
     """
-    lives = ActivatedLives(config, velocity)
+    return _force_of(config, ActivatedLives(config, velocity), velocity)
+
+
+def _force_of(config: Config, lives: ActivatedLives, velocity: float) -> float:
+    """Force of contacts with these lives in steady sliding [N]."""
     delay = _delay(config)
     drag = config.contacts.contact_drag * config.contacts.count * velocity * delay
     return (config.contacts.static_force * lives.work + drag) / (lives.life + delay)
@@ -118,15 +124,19 @@ def creep_velocity(config: Config, force: float) -> float:
     damping = _ground_damping(config)
     scale = thermal.rate * thermal.ratio(contacts.contact_static_force) * contacts.break_stretch
 
-    def excess(logarithm: float) -> float:
+    def excess(logarithm: float, coarseness: float = 1.0) -> float:
         velocity = scale * math.exp(logarithm)
-        return steady_force(config, velocity) + damping * velocity - force
+        lives = ActivatedLives(config, velocity, coarseness=coarseness)
+        return _force_of(config, lives, velocity) + damping * velocity - force
 
     grid = np.linspace(math.log(MIN_CREEP), math.log(MAX_CREEP), CREEP_POINTS)
-    before = excess(grid[0])
+    before = excess(grid[0], GRID_COARSENESS)
     for low, high in itertools.pairwise(grid):
-        after = excess(high)
+        after = excess(high, GRID_COARSENESS)
         if before < 0 <= after:
+            if excess(low) > 0 or excess(high) < 0:
+                # A force of the grid, to its digits.
+                return scale * math.exp(low if abs(before) < after else high)
             found: float = optimize.brentq(excess, low, high, xtol=1e-10)
             return scale * math.exp(found)
         before = after
@@ -196,6 +206,11 @@ class Restart(NamedTuple):
     def peak(self) -> float:
         """Maximum of the force [N]."""
         return float(np.max(self.force))
+
+    @property
+    def peak_displacement(self) -> float:
+        """Displacement at which the force has its maximum [m]."""
+        return float(self.displacement[np.argmax(self.force)])
 
 
 def restart(config: Config, velocity: float, hold: float) -> Restart:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from mesoslip import ConfigError, SteadySliding
+from mesoslip.analysis.regime import STICK_SLIP
 from mesoslip.quantities import with_unit
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.sliders import dynamic_stiffness
@@ -205,7 +206,7 @@ def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
     file.write_text(config.to_toml())
     printed = command("curve", file)[1]
     assert f"{with_unit(found, 'N/m', 3)}  steady sliding at 100 nm/s is linearly" in printed
-    assert f"{with_unit(most, 'N/m', 3)}  the same for contacts that break out" in printed
+    assert f"{with_unit(most, 'N/m', 3)}  the same for contacts out of step" in printed
     assert "spring stiffer than" not in command("curve", file, "--set", "contacts.delay=0")[1]
 
 
@@ -231,15 +232,16 @@ def test_info_and_curve_report_steady_sliding(klein, tmp_path, command):
     for name in ("info", "curve"):
         status, printed, _ = command(name, file, *soft)
         assert status == 0
-        assert "necessary" in printed
-        assert "not sufficient" in printed
+        assert "delay and ageing" in printed.lower()
         assert "is linearly unstable, with delay" in printed
-        assert "may be self-limiting" in printed
+        assert "but not for contacts out of step" in printed
+        assert "no amplitude: only a run or mesoslip cycle shows it" in printed
     for velocity in ("1e-7", "3e-6"):
         printed = command("info", file, "--set", f"drive.velocity={velocity}")[1]
-        assert "for contacts that break out of step too" in printed
+        assert "also for contacts out of step" in printed
     status, printed, _ = command("info", file, "--set", "contacts.delay=0")
     assert "is linearly stable, as there is no delay" in printed
+    assert "A large oscillation may be possible too" in printed
     quantities = mesoslip.derived(klein())
     assert quantities["steady_growth_rate"].value == SteadySliding(klein()).growth_rate
     assert quantities["steady_frequency"].unit == "1/s"
@@ -249,6 +251,26 @@ def test_info_and_curve_report_steady_sliding(klein, tmp_path, command):
     assert "steady_growth_rate" not in mesoslip.derived(klein(contacts__delay=1e4))
     for slider in ({"kind": "prescribed"}, {"kind": "quasistatic", "stiffness": 97.0}):
         assert "steady_growth_rate" not in mesoslip.derived(klein(slider=slider))
+
+
+def test_stick_slip_above_the_stiffness_of_the_force_curve(klein, tmp_path, command):
+    """The force curve of wide thresholds does not fall, K* = 0; delay makes them slip all the same,
+    so that no sentence may call K < K* necessary."""
+    config = klein(
+        contacts__threshold__relative_width=0.5,
+        contacts__delay=2e-3,
+        contacts__initial="steady",
+        contacts__count=2000,
+        drive__velocity=1e-6,
+        run__duration=3.0,
+    )
+    assert mesoslip.curve(config).attrs["K_star"] == 0
+    assert int(mesoslip.regime(mesoslip.run(config))["regime"][0]) == STICK_SLIP
+    file = tmp_path / "wide.toml"
+    file.write_text(config.to_toml())
+    printed = command("curve", file)[1]
+    assert "with them there may be stick-slip nevertheless" in printed
+    assert "necessary" not in printed + command("info", file)[1]
 
 
 def test_overflow_is_reported(klein):

@@ -141,8 +141,8 @@ def _digits(name: str, curve: ForceCurve) -> int:
 
 def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     """Print the stiffnesses of the spring above which sliding is stable, in each sense."""
-    from mesoslip.quantities import with_unit
-    from mesoslip.theory.steady_sliding import stiffness_limits
+    from mesoslip.quantities import percent, with_unit
+    from mesoslip.theory.steady_sliding import OUT_OF_STEP, SHOWN_BY, stiffness_limits
 
     limits = stiffness_limits(config, MAX_WORK)
     if limits is None:
@@ -151,15 +151,20 @@ def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     rows = [
         (K_star, "slow sliding from this start has no instability (K*)"),
         (limits.in_step, f"steady sliding at {speed} is linearly stable, with delay"),
-        (limits.out_of_step, "the same for contacts that break out of step"),
+        (
+            limits.out_of_step,
+            f"the same for contacts out of step (thresholds of {percent(OUT_OF_STEP)})",
+        ),
     ]
     width = len(LIMITS_HEADER)
     typer.echo(f"{LIMITS_HEADER}  consequence")
     for stiffness, meaning in rows:
         if stiffness is not None:
             typer.echo(f"{with_unit(stiffness, 'N/m', 3):>{width}}  {meaning}")
-    if limits.out_of_step is not None:
-        typer.echo("between the last two an instability may be self-limiting: only a run shows it")
+    typer.echo(
+        "linear limits: above them a large oscillation may be possible too, below them a small "
+        f"one: {SHOWN_BY}"
+    )
 
 
 def _warn_of_interaction(config: Config) -> None:

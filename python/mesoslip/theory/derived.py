@@ -12,7 +12,7 @@ from mesoslip.errors import ConfigError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import quantities
-from mesoslip.theory.steady_sliding import SteadySliding, steady_sliding
+from mesoslip.theory.steady_sliding import SHOWN_BY, SteadySliding, steady_sliding
 
 # Maximum work for the stability of steady sliding, about a tenth of a second.
 MAX_WORK = 10_000
@@ -100,13 +100,13 @@ def _verdict_of_stiffness(config: Config) -> str | None:
     if spring >= estimate:
         return (
             "K is above the estimate of K*, which depends on the threshold law: mesoslip curve "
-            "computes K*. Above K* slow sliding from relaxed contacts has no slip, unless delay or "
-            "ageing weaken faster contacts"
+            "computes K*. Above K* slow sliding from relaxed contacts has no instability; with "
+            f"delay or ageing there may be stick-slip nevertheless: {SHOWN_BY}"
         )
     return (
-        "K is below the estimate of K*: relaxed contacts usually lead to a first slip. K < K* is "
-        "necessary for stick-slip, not sufficient: delay and ageing decide whether slips continue "
-        "or decay. mesoslip curve computes K*; only a run shows the motion"
+        "K is below the estimate of K*, which depends on the threshold law: mesoslip curve "
+        "computes K*. Below K* slow sliding from relaxed contacts has a first slip; delay and "
+        f"ageing decide whether slips continue or decay: {SHOWN_BY}"
     )
 
 

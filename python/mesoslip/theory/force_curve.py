@@ -412,14 +412,14 @@ class ForceCurve:
             sentences.append("the slider follows the drive, so it has no instability")
         elif self.stable:
             sentences.append(
-                "K >= K*: slow sliding from this start has no instability. The curve does not "
-                "apply to fast sliding, where delay and ageing weaken the contacts"
+                "K >= K*: slow sliding from this start has no instability. Delay and ageing are "
+                "not part of the curve: with them there may be stick-slip nevertheless"
             )
         else:
             sentences.append(
-                "K < K*: the slider becomes unstable at X_c, where the first slip starts. This is "
-                "necessary for stick-slip, not sufficient: delay and ageing, which are not part of "
-                "the curve, decide whether slips continue or decay into smooth sliding"
+                "K < K*: slow sliding from this start becomes unstable at X_c, where the first "
+                "slip starts. Delay and ageing, which are not part of the curve, decide whether "
+                "slips continue or decay into smooth sliding"
             )
         return "; ".join(sentences)
 

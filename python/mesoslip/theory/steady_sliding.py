@@ -24,7 +24,7 @@ from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.table import law_cells
 from mesoslip.errors import ConfigError, Problem, RunError
-from mesoslip.quantities import with_unit
+from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
@@ -62,6 +62,10 @@ MAX_CANDIDATES = 40
 
 # Relative width of thresholds with which contacts do not break in step.
 OUT_OF_STEP = 0.5
+# What linear theory leaves open, of a stable and of an unstable motion.
+SHOWN_BY = "only a run or mesoslip cycle shows it"
+OTHER_MOTION = f"A large oscillation may be possible too: {SHOWN_BY}"
+NO_AMPLITUDE = f"Linear theory gives no amplitude: {SHOWN_BY}"
 
 # Range of spring stiffnesses over that of all contacts in which the stable ones are sought.
 MAX_STIFFNESS, MIN_STIFFNESS = 16.0, 1e-4
@@ -481,8 +485,8 @@ class SteadySliding:
     def is_stable_out_of_step(self) -> bool:
         """Whether no perturbation grows for contacts whose lives differ by half a breaking stretch.
 
-        A large oscillation itself spreads lives by as much, so that an instability that needs
-        contacts breaking in step is self-limiting. This is a heuristic.
+        A large oscillation itself spreads lives by as much. That an instability which needs
+        contacts in step stays small is a heuristic, with exceptions (``docs/steady-sliding.md``).
         """
         if self.relative_width >= OUT_OF_STEP:
             return self.is_stable
@@ -579,40 +583,34 @@ class SteadySliding:
 
     @property
     def summary(self) -> str | None:
-        """Conclusions for the motion, and their limits; None for a slider without inertia."""
+        """What linear theory states, and what it leaves open; None for a slider without inertia."""
         if not self._has_motion:
             return None
         where = f"steady sliding at {with_unit(self.velocity, 'm/s', 3)}"
         if self.delay == 0:
             return (
                 f"{where} is linearly stable, as there is no delay: the force of steady contacts "
-                "does not depend on the motion of the slider. Oscillations from another start may "
-                "persist"
+                f"does not depend on the motion of the slider. {OTHER_MOTION}"
             )
         if self.is_stable:
+            decay = with_unit(-self.growth_rate, "1/s", 3)
             return (
-                f"{where} is linearly stable, with delay: small perturbations decay at "
-                f"{-self.growth_rate:.2g} 1/s. Large oscillations, as after the first slip, may "
-                "persist: only a run shows"
+                f"{where} is linearly stable, with delay: small perturbations decay at {decay}. "
+                f"{OTHER_MOTION}"
             )
-        grows = (
-            f"{where} is linearly unstable, with delay: {self._perturbation} grows at "
-            f"{self.growth_rate:.2g} 1/s"
-        )
-        if self.is_stable_out_of_step:
-            return (
-                f"{grows}, but not for contacts that break out of step, so that it may be "
-                "self-limiting. Linear theory gives no amplitude: only a run shows it"
-            )
+        other = "but not" if self.is_stable_out_of_step else "also"
+        growth = with_unit(self.growth_rate, "1/s", 3)
         return (
-            f"{grows}, for contacts that break out of step too: it usually develops into stick-slip"
+            f"{where} is linearly unstable, with delay: {self._perturbation} grows at {growth}, "
+            f"{other} for contacts out of step (thresholds of {percent(OUT_OF_STEP)}). "
+            f"{NO_AMPLITUDE}"
         )
 
     @property
     def _perturbation(self) -> str:
         if not self.frequency > 0:
             return "a perturbation"
-        return f"an oscillation of {self.frequency / (2 * math.pi):.3g} Hz"
+        return f"an oscillation of {with_unit(self.frequency / (2 * math.pi), 'Hz', 3)}"
 
 
 @lru_cache(maxsize=16)

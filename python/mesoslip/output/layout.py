@@ -56,6 +56,14 @@ class Entry:
         """The value for missing data; CF has none for coordinates."""
         return np.nan if self.dtype.kind == "f" and not self.is_coordinate else None
 
+    @property
+    def shrinks(self) -> bool:
+        """Whether compression pays.
+
+        Real numbers with full mantissas shrink to two thirds, at half the cost of their simulation.
+        """
+        return self.dtype.kind != "f" or self.meaning.is_regular
+
 
 @dataclass(frozen=True)
 class GroupLayout:

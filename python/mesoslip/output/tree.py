@@ -50,6 +50,8 @@ def build_tree(results: RunResults) -> xr.DataTree:
         }
         for name, entry in form.entries.items():
             made[name].encoding = {"_FillValue": entry.fill_value}
+            if not entry.shrinks:
+                made[name].encoding["zlib"] = False
         coordinates = {name: made[name] for name in made if form.entries[name].is_coordinate}
         others = {name: made[name] for name in made if name not in coordinates}
         datasets["/" + group] = xr.Dataset(others, coordinates, form.attributes)

@@ -25,6 +25,8 @@ class Meaning:
         Type of its values.
     is_fractional
         Whether it is a real number in the master equation, which has fractions of contacts.
+    is_regular
+        Whether its values lie at nearly equal distances, and shrink much by compression.
     further
         Further attributes.
     """
@@ -33,6 +35,7 @@ class Meaning:
     long_name: str
     dtype: DTypeLike = np.float64
     is_fractional: bool = False
+    is_regular: bool = False
     further: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -60,7 +63,7 @@ REALIZATION_INDEX = Meaning(
 )
 
 TRACE = Group(
-    drive_displacement=Meaning("m", "displacement of the drive"),
+    drive_displacement=Meaning("m", "displacement of the drive", is_regular=True),
     displacement=Meaning("m", "displacement of the slider"),
     velocity=Meaning("m s-1", "velocity of the slider"),
     spring_force=Meaning("N", "force of the drive on the slider"),
@@ -89,7 +92,7 @@ ROOT = Group(
     TRACE,
     **MEASURED,
     realization=Meaning("1", "number of the realization", np.int64),
-    time=Meaning("s", "time"),
+    time=Meaning("s", "time", is_regular=True),
     layer=Meaning("1", "number of the layer, 1 at the contacts", np.int64),
     layer_displacement=Meaning("m", "displacement of a layer"),
     breaks=Meaning("1", "breaks of contacts in the run", np.int64, is_fractional=True),
@@ -191,7 +194,7 @@ SLIP_TRACES = Group(
     TRACE,
     realization_index=REALIZATION_INDEX,
     slip=Meaning("1", "number of the slip within its realization, from 0", np.int32),
-    sample_time=Meaning("s", "time of the sample"),
+    sample_time=Meaning("s", "time of the sample", is_regular=True),
 )
 
 AVALANCHES = Group(

@@ -36,14 +36,19 @@ def write(tree: xr.DataTree, path: Path) -> None:
     """
     encoding = {
         group.path: {
-            str(name): COMPRESSION
-            for name, data in group.data_vars.items()
-            if data.size > MIN_COMPRESSED
+            str(name): {**COMPRESSION, **_fill_value(data)}
+            for name, data in group.to_dataset(inherit=False).variables.items()
+            if data.size > MIN_COMPRESSED and data.encoding.get("zlib", True)
         }
         for group in tree.subtree
     }
     with written_whole(path) as part, LOCK:
         tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
+
+
+def _fill_value(variable: xr.Variable) -> dict[str, Any]:
+    """Encoding of missing values, where it is known."""
+    return {key: variable.encoding[key] for key in ("_FillValue",) if key in variable.encoding}
 
 
 def write_results(results: RunResults, path: Path) -> None:
@@ -97,12 +102,13 @@ def _create_group(
 
 
 def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
-    """Compression of a variable, and chunks that hold a block of rows."""
-    if math.prod(shape) <= MIN_COMPRESSED or entry.is_coordinate:
+    """Chunks of a variable that hold a block of rows, and compression where it pays."""
+    if math.prod(shape) <= MIN_COMPRESSED or not entry.table:
         return {}
     # One realization at a time; of long dimensions after the first no more than a block's worth.
     chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
     along = 1 if entry.is_padded else 0
     most = min(filling.BLOCK_ROWS, filling.BLOCK_NUMBERS // math.prod(shape[along + 1 :]))
     chunks[along] = max(1, min(shape[along], most))
-    return {**COMPRESSION, "chunksizes": chunks}
+    return {"chunksizes": chunks, **(COMPRESSION if entry.shrinks else {})}
+

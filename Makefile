@@ -49,12 +49,12 @@ setup: $(INSTALLED) ## Install missing packages, and build
 demo: out/klein.nc out/klein.png ## Simulate Klein's experiment, and draw it
 	@:
 
-test: test-fortran test-debug test-python ## Build, and pass all tests
+test: test-debug test-python ## Build, and pass all tests
 
 test-python: $(INSTALLED)
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 --dist worksteal -q
 
-test-fortran: build/release/build.ninja
+test-fortran: build/release/build.ninja ## Run the Fortran unit tests as optimized
 	@ninja --quiet -C build/release
 	$(VENV)/bin/meson test -C build/release --no-rebuild --print-errorlogs
 
@@ -75,7 +75,7 @@ bench: $(INSTALLED) ## Measure the cost of a contact event
 
 # Some cases of some attacks: make fuzz FUZZ="signals=20 --seed 7"; one of them: FUZZ="--only signals:7:3".
 FUZZ ?=
-fuzz: $(INSTALLED) ## Attack the program with some thousand random cases
+fuzz: $(INSTALLED) $(if $(FUZZ),,test-fortran) ## Attack the program with some thousand random cases
 	$(VENV)/bin/python tests/fuzz/fuzz.py $(FUZZ)
 	$(if $(FUZZ),,OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 -q -m long \
 	  --ignore=tests/python/test_documentation.py)

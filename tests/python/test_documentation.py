@@ -40,6 +40,8 @@ LEFT_OUT = re.compile(r"^(?:<!--|%)\s*not run: \S.*$")
 FILE = re.compile(r"# (?P<path>[\w/.-]+\.toml)")
 # Commands whose arguments are parsed and no more: they take long, or what no other has made.
 PARSED_ONLY = {"explore", "fit"}
+# Movies have tests of their own.
+MOVIES = (".gif", ".mp4")
 # Names that stand for those of a reader's own.
 PLACEHOLDER = re.compile(r"[A-Z]{3,}\b|…|\.\.\.")
 # What makes files of the documentation short enough for a test.
@@ -154,7 +156,7 @@ def run_command(words, comment, command):
     """Run a command, unless it takes long or names what a reader has to give."""
     _, name, *arguments = words
     is_placeholder = any(PLACEHOLDER.search(one) for one in arguments)
-    if name in PARSED_ONLY or is_placeholder or any(one.endswith(".gif") for one in arguments):
+    if name in PARSED_ONLY or is_placeholder or any(one.endswith(MOVIES) for one in arguments):
         return
     if name == "example":
         Path(f"{Path(arguments[-1]).name}.toml").unlink(missing_ok=True)

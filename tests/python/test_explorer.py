@@ -463,6 +463,7 @@ def test_the_page_is_of_every_control():
         page.close()
 
 
+@pytest.mark.long
 @alone
 def test_changes_leave_nothing_behind():
     """After many changes there is one run, and as many objects as after a few."""

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import kill_fit
 import numpy as np
+import pytest
 
 
+@pytest.mark.long
+@pytest.mark.timeout(0)
 def test_killed_fits_go_on(tmp_path):
     """A short version of tests/resume/kill_fit.py."""
     folder = tmp_path / "folder"

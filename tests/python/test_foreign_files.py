@@ -128,6 +128,7 @@ print(errors)
 """
 
 
+@pytest.mark.long
 def test_outputs_are_read_on_many_threads(output):
     done = subprocess.run(
         [sys.executable, "-c", THREADS, output],

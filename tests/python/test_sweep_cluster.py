@@ -125,6 +125,7 @@ def test_a_cluster_gives_the_same(cluster, tmp_path):
         )
 
 
+@pytest.mark.long
 def test_lost_workers_and_a_lost_scheduler(cluster, tmp_path):
     """Workers that are killed lose nothing; without a scheduler the sweep ends, and goes on."""
     started = cluster(2)

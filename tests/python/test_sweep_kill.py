@@ -24,7 +24,7 @@ def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     """A short version of tests/resume/kill_sweep.py."""
     study = Study(tmp_path, 4, np.random.default_rng(3))
     whole = study.expected()
-    study.attack("killed", whole, 6)
+    study.attack("killed", whole, 3)
     assert study.wrong == []
     assert study.sweep_kills + study.worker_kills > 1
 

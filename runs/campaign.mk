@@ -10,16 +10,21 @@ FIGURE_RUNS := $(filter-out out/S18.nc,$(call named,S*.toml limit-*.toml sizes-*
 ONSETS := out/S19a.onset.nc out/S19b.onset.nc
 FIGURE_OUTPUTS := $(FIGURE_RUNS) out/S18.curve.nc $(ONSETS)
 # Claims have runs and sweeps of their own, with several realizations, and use some of the figures'.
-CLAIM_OUTPUTS := $(call named,claims/*.toml claims/sweeps/*.toml limit-*.toml) out/S18.curve.nc \
-  $(ONSETS)
+# The longest come first, so that two at a time end together.
+CLAIM_OUTPUTS := $(sort $(call named,claims/delay-*.toml limit-6.toml)) \
+  $(call named,claims/sweeps/*.toml claims/*.toml limit-*.toml) out/S18.curve.nc $(ONSETS)
 SWEEPS := $(patsubst runs/%.toml,out/%.nc,$(wildcard runs/sweeps/*.toml runs/maps/*.toml))
 MAPS := $(patsubst runs/%.toml,out/%.png,$(wildcard runs/maps/*.toml))
 
 figures: $(FIGURE_OUTPUTS) | $(INSTALLED) ## Draw the source's figures into out/figures
 	$(VENV)/bin/python $(SOURCE)/draw.py -o out/figures
 
-claims: $(CLAIM_OUTPUTS) | $(INSTALLED) ## Judge the source's claims into out/claims.md, and compare with docs/claims.md
+claims: | $(INSTALLED) ## Judge the source's claims into out/claims.md, and compare with docs/claims.md
+	@$(MAKE) --no-print-directory $(if $(findstring j,$(MAKEFLAGS)),,-j2) claim-outputs
 	$(VENV)/bin/python $(SOURCE)/judge.py -o out/claims.md --compare docs/claims.md
+
+.PHONY: claim-outputs
+claim-outputs: $(CLAIM_OUTPUTS)
 
 campaign: $(SWEEPS) $(MAPS) ## Run the sweeps of runs/sweeps and runs/maps, and draw the maps
 

@@ -145,6 +145,52 @@ def test_what_is_otherwise_fails(outputs):
     assert judged("C14", quadratic, onsets[1]) is Verdict.FAILS
 
 
+def simulated(name, *changes):
+    """A cheaper run of a claim."""
+    return mesoslip.run(mesoslip.Config.load(SOURCE / "claims" / f"{name}.toml", changes))
+
+
+def test_claims_of_layers_and_a_base():
+    base = simulated("base-250", "contacts.count=200", "run.realizations=1")
+    assert judged("C20", base) is Verdict.HOLDS
+    times = base["time"].values
+    faster = changed(base, "/", "base_displacement", lambda _: np.sin(400 * times)[None])
+    assert judged("C20", faster) is Verdict.FAILS
+    few = ["contacts.count=100", "run.realizations=1"]
+    slowed, slip = (simulated(name, *few) for name in ("stopping-16", "stopping-slip"))
+    assert judged("C23", slowed, slip) is Verdict.QUALIFIED
+    down = changed(slowed, "/", "layer_displacement", lambda values: values[..., ::-1])
+    assert judged("C23", down, slip) is Verdict.FAILS
+
+
+def test_claims_of_avalanches_and_of_two_motions():
+    small = ["interaction.columns=12", "interaction.rows=12", "contacts.count=144"]
+    names = ("interaction-0", "interaction-0.1", "interaction-0.3")
+    weak, middle, strong = (
+        simulated(name, *small, "run.duration=3s", "run.realizations=2") for name in names
+    )
+    assert judged("C19", weak, middle, strong) is Verdict.HOLDS
+    assert judged("C19", weak, strong, middle) is Verdict.FAILS
+    both = simulated("up-and-down", "contacts.count=400", "run.realizations=1")
+    assert judged("C24", both) is Verdict.HOLDS
+    falling = np.diff(both["stages"]["drive_start_velocity"].values).argmin()
+    turn = both["stages"]["stage_end_time"].values[falling - 1]
+    late = both["time"].values > turn
+    for part in (late, ~late):
+        one_motion = changed(
+            both, "/", "spring_force", lambda values, part=part: np.where(part, 0.0, values)
+        )
+        expected = Verdict.HOLDS if part is late else Verdict.FAILS
+        assert judged("C24", one_motion) is expected
+
+
+def test_a_viscous_film_is_judged_by_durations_and_drops():
+    short = ["run.realizations=2", "contacts.count=500", "run.duration=2.4s"]
+    thin, thick = (simulated(f"drag-{one}", *short) for one in ("2e11", "2e16"))
+    assert judged("C11", thin, thin) is Verdict.HOLDS
+    assert judged("C11", thin, thick) is Verdict.FAILS
+
+
 def test_what_is_reported(outputs):
     judgements = judge(["C4", "C14"], outputs)
     page = as_markdown(judgements)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from outputs import chosen, opened
 
-from claims import curves, limit, motion, numbers, slips
+from claims import coexistence, curves, layered, limit, motion, numbers, slips
 from claims.base import Claim, Judgement, Verdict
 
 __all__ = ["CLAIMS", "Claim", "Judgement", "Verdict", "judge"]
@@ -22,6 +22,8 @@ _MODULES = (
     slips,
     motion,
     limit,
+    layered,
+    coexistence,
 )
 CLAIMS = {
     claim.name: claim

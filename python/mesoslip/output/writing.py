@@ -111,4 +111,3 @@ def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
     most = min(filling.BLOCK_ROWS, filling.BLOCK_NUMBERS // math.prod(shape[along + 1 :]))
     chunks[along] = max(1, min(shape[along], most))
     return {"chunksizes": chunks, **(COMPRESSION if entry.shrinks else {})}
-

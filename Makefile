@@ -13,6 +13,8 @@ INSTALLED := $(VENV)/.installed
 # Packages that only the documentation needs, and only wheels.
 DOCUMENTATION := $(VENV)/.documentation
 WHEEL_TOOLS := $(VENV)/.wheel-tools
+# Other programs that read outputs.
+FORMATS := $(VENV)/.formats
 # Stamp: a wheel of these sources in dist.
 WHEEL := build/wheel/.built
 
@@ -33,7 +35,7 @@ export UV_COMPILE_BYTECODE := 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
-.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser figures \
+.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
   claims campaign docs bench fuzz mutants reference lint wheel test-wheel test-sdist clean
 
 help: ## Show the targets
@@ -70,6 +72,9 @@ test-browser: $(INSTALLED) ## Test the explorer in a real Chromium, installed if
 	@PYTHON=$(PYTHON) tools/system-packages chromium chromium-driver
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -q -s tests/browser
 
+test-formats: $(INSTALLED) $(FORMATS) ## Read and check outputs with other programs: CF, ArviZ, Zarr, ObsPy
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -q tests/formats
+
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py
 
@@ -96,7 +101,7 @@ lint: $(INSTALLED) ## Check the style of all sources
 	$(VENV)/bin/codespell
 
 # Every warning is an error, and what browsers would load from elsewhere is one.
-docs: $(INSTALLED) $(DOCUMENTATION) ## Build the documentation into out/docs, and run its long pages
+docs: $(INSTALLED) $(DOCUMENTATION) test-formats ## Build the documentation into out/docs, and run its long pages
 	$(VENV)/bin/pytest -q -m long tests/python/test_documentation.py
 	$(VENV)/bin/python -m sphinx -b html -W --keep-going -q -d build/docs docs out/docs
 	$(VENV)/bin/python tools/self-contained out/docs
@@ -132,6 +137,11 @@ $(INSTALLED): $(ENVIRONMENT) $(SOURCES)
 $(DOCUMENTATION): $(ENVIRONMENT)
 	@echo "Installing what builds the documentation"
 	@$(UV) sync --quiet --locked --inexact --no-install-project --group docs
+	@touch $@
+
+$(FORMATS): $(ENVIRONMENT)
+	@echo "Installing other programs that read outputs"
+	@$(UV) sync --quiet --locked --inexact --no-install-project --group formats
 	@touch $@
 
 $(WHEEL_TOOLS): $(ENVIRONMENT)

@@ -1,4 +1,5 @@
 from .analysis.avalanches import avalanche_summary, avalanches
+from .analysis.export import export
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
@@ -39,6 +40,7 @@ __all__ = [
     "curve",
     "derived",
     "example",
+    "export",
     "fit",
     "onset",
     "open_output",

@@ -93,7 +93,7 @@ class Assembly:
             "configuration": tomli_w.dumps(plan.tables),
             "sweep": tomli_w.dumps(plan.sweep.model_dump(exclude_none=True)),
             "complete": "false" if np.any(self._status == MISSING) else "true",
-            "comment": ending,
+            **({"comment": ending} if ending else {}),
             "failures": "\n".join(reported),
         }
 

@@ -16,6 +16,7 @@ from mesoslip.command_line import (
     catalogues,
     example,
     explore,
+    export,
     fit,
     pictures,
     report,
@@ -42,6 +43,7 @@ COMMANDS = (
     response.response,
     pictures.plot,
     report.report,
+    export.export,
     explore.explore,
     example.example,
 )

@@ -129,7 +129,7 @@ def trace(
     tree = trace_of(understood)
     writing.write(tree, path)
     typer.echo(f"{path}: {', '.join(_summary(tree))}", err=True)
-    if tree.attrs["comment"]:
+    if tree.attrs.get("comment"):
         typer.echo(f"{path}: {tree.attrs['comment']}", err=True)
 
 

@@ -117,7 +117,6 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     attributes: dict[str, Any] = {
         "seed": plan.seed,
         "complete": "true",
-        "comment": "",
         "noise": first.noise.deviation,
         "setup_period": first.summarizer.period,
         "simulation_count": fitted.simulations,

@@ -301,13 +301,14 @@ def trace_of(understood: Understood) -> xr.DataTree:
         loading_rate=loading_rate,
     )
     level = noise.deviation if isinstance(noise, TraceNoise) else noise
+    comment = "; ".join(_comments(direction * record.force, level, found.period))
     details = {
         "origin": "measured",
         "measured_file": understood.path.name,
         "trace": understood.experiment.trace.to_toml(),
         "understood": "\n".join(understood.report),
         "complete": "true",
-        "comment": "; ".join(_comments(direction * record.force, level, found.period)),
+        **({"comment": comment} if comment else {}),
         "noise": level,
         "min_fall": found.min_fall,
         "setup_period": found.period,

@@ -58,6 +58,17 @@ def open_output(path: PathLike) -> xr.DataTree:
     return files.read(as_path(path))
 
 
+def as_output(output: OutputLike) -> xr.DataTree:
+    """An output of any command in memory.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is not an output.
+    """
+    return open_output(output) if isinstance(output, str | os.PathLike) else _tree(output)
+
+
 def as_run(output: OutputLike) -> xr.DataTree:
     """An output of a run in memory.
 

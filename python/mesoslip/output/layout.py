@@ -306,6 +306,14 @@ def _energy(results: RunResults) -> GroupLayout:
     return GroupLayout({}, writer.entries, {})
 
 
+def _comment(results: RunResults, reached: float) -> dict[str, str]:
+    """How far an interrupted run came; CF wants no empty comment of others."""
+    if results.complete:
+        return {}
+    each = "it" if len(results.realizations) == 1 else "every realization"
+    return {"comment": f"interrupted; {each} came to {reached:.6g} s"}
+
+
 def attributes(results: RunResults) -> dict[str, Any]:
     """Attributes of an output: configuration, program, and state of the run."""
     config, realizations = results.config, results.realizations
@@ -327,10 +335,7 @@ def attributes(results: RunResults) -> dict[str, Any]:
         | {
             "seed": config.run.seed,
             "complete": "true" if results.complete else "false",
-            "comment": ""
-            if results.complete
-            else f"interrupted; {'it' if len(realizations) == 1 else 'every realization'} came to "
-            f"{reached:.6g} s",
+            **_comment(results, reached),
             "break_count": sum(one.breaks for one in realizations),
             "ending": "; ".join(sorted({one.ending for one in realizations})),
             "advance_count": sum(one.advances for one in realizations),

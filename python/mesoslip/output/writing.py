@@ -34,16 +34,21 @@ def write(tree: xr.DataTree, path: Path) -> None:
     FileError
         If it cannot be written.
     """
-    encoding = {
-        group.path: {
-            str(name): {**COMPRESSION, **_fill_value(data)}
-            for name, data in group.to_dataset(inherit=False).variables.items()
-            if data.size > MIN_COMPRESSED and data.encoding.get("zlib", True)
-        }
-        for group in tree.subtree
-    }
+    encoding = {group.path: _encoding(group.to_dataset(inherit=False)) for group in tree.subtree}
     with written_whole(path) as part, LOCK:
         tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
+
+
+def _encoding(data: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Compression of large variables, and missing values of what is no coordinate, as in CF."""
+    encoding: dict[str, dict[str, Any]] = {}
+    for name, one in data.variables.items():
+        is_large = one.size > MIN_COMPRESSED and one.encoding.get("zlib", True)
+        if name in data.coords:
+            encoding[str(name)] = {**(COMPRESSION if is_large else {}), "_FillValue": None}
+        elif is_large:
+            encoding[str(name)] = {**COMPRESSION, **_fill_value(one)}
+    return encoding
 
 
 def _fill_value(variable: xr.Variable) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from .api import run
 from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
+from .cycles.cycle import Cycle, cycle
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
 from .execution.executors import Dask, Processes, Threads
@@ -25,6 +26,7 @@ from .theory.steady_sliding import SteadySliding
 __all__ = [
     "Config",
     "ConfigError",
+    "Cycle",
     "Dask",
     "FileError",
     "MesoslipError",
@@ -38,6 +40,7 @@ __all__ = [
     "avalanches",
     "compare_fits",
     "curve",
+    "cycle",
     "derived",
     "example",
     "export",

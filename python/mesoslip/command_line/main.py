@@ -14,6 +14,7 @@ import typer
 
 from mesoslip.command_line import (
     catalogues,
+    cycle,
     example,
     explore,
     export,
@@ -35,6 +36,7 @@ COMMANDS = (
     theory.info,
     theory.curve,
     theory.onset,
+    cycle.cycle,
     trace.trace,
     fit.fit,
     catalogues.slips,

@@ -22,6 +22,8 @@ SUMMARIES = {
     "that moves forward slowly, from the master equation of multicontact friction",
     "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
     "contacts that break one after another and for a film that melts at once",
+    "cycle": "The motion that a slider on infinitely many contacts settles to, from the master "
+    "equation of multicontact friction",
     "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
     "over a range of parameters",
     "trace": "A measured trace of the spring force of a slider, with the slips found in it",

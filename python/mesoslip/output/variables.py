@@ -284,3 +284,21 @@ ONSET = Group(
     ),
     asymptote=Meaning("1", "change of the spring force at short times over static force"),
 )
+
+CYCLE = Group(
+    duration=Meaning("s", "time from a passage of the section to the next"),
+    peak_force=Meaning("N", "maximum of the spring force between two passages"),
+    low_force=Meaning("N", "minimum of the spring force between two passages"),
+    multiplier_real=Meaning("1", "real part of the multipliers of the cycle"),
+    multiplier_imaginary=Meaning("1", "imaginary part of the multipliers of the cycle"),
+)
+
+CYCLE_TRACE = Group(
+    time=Meaning("s", "time since the first passage of the section"),
+    spring_force=Meaning("N", "force of the spring of the drive"),
+    contact_force=Meaning("N", "force of the slider on the contacts"),
+    velocity=Meaning("m s-1", "velocity of the slider"),
+    drive_displacement=Meaning("m", "displacement of the drive"),
+    displacement=Meaning("m", "displacement of the slider"),
+    detached_contacts=Meaning("1", "number of detached contacts"),
+)

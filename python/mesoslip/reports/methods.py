@@ -63,6 +63,18 @@ def curve_method(_tree: xr.DataTree, config: Config) -> str:
     )
 
 
+def cycle_method(_tree: xr.DataTree, config: Config) -> str:
+    """The method of a settled cycle."""
+    return " ".join(
+        (
+            *_engine(config),
+            "It was iterated from one passage of the spring force through a section to the next, "
+            "until period and peaks did not change any more.",
+            *model(config),
+        )
+    )
+
+
 def onset_method(_tree: xr.DataTree, config: Config) -> str:
     """The method of an onset of slip."""
     return " ".join(

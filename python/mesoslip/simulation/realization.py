@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import RunError
+from mesoslip.simulation.assembly import assemble
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
@@ -49,9 +50,6 @@ ENDINGS = {
 
 # Minimum scale of energy residuals, over the energy of all contacts about to break.
 MIN_ENERGY_RATIO = 1e-9
-
-# The end of a drive that does not end: the maximum double.
-NEVER = float(np.finfo(np.float64).max)
 
 # Wall time of a segment, between two looks at progress and signals [s]; work of the first one.
 SEGMENT_SECONDS = 0.25
@@ -206,51 +204,12 @@ class Realization:
         """The kernel with its parts, started or restored."""
         if self._kernel is not None:
             return self._kernel
-        config = self.config
-        slider, contacts, output = config.slider, config.contact_kind, config.output
-        kernel = Kernel()
-        kernel.set_contacts(
-            contacts.kernel_kind,
-            self._parameters,
-            config.run.seed,
-            self.number,
-        )
-        kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
-        durations, start_velocities, end_velocities, stages = (
-            np.array(numbers) for numbers in zip(*config.drive_parts, strict=True)
-        )
-        ends = np.minimum(np.cumsum(durations), NEVER)
-        kernel.set_drive(ends, start_velocities, end_velocities, stages)
-        forces = config.drive.start_forces(config.drive_parts)
-        if forces is not None:
-            kernel.set_drive_values(np.array(forces))
-        stop = config.run.stops
-        kernel.set_stop(
-            slips=stop.slips or 0,
-            displacement=stop.displacement or 0.0,
-            block_distance=config.steady_block,
-            blocks=stop.steady.blocks if stop.steady else 1,
-            tolerance=stop.steady.tolerance * config.contacts.static_force if stop.steady else 0.0,
-        )
-        kernel.set_recorder(
-            interval=config.output_interval,
-            slip_interval=output.slip_interval or 0.0,
-            slip_velocity=slider.slip_velocity(config),
-            quiet_time=slider.quiet_time,
-            duration=float(ends[-1]),
-            layers=slider.layers_recorded(config),
-        )
-        kernel.set_avalanches(
-            min_size=float(output.avalanche_size or 1) * config.has_avalanches,
-            snapshot_size=float(output.snapshot_size or 0),
-            max_avalanches=config.run.avalanches or 0,
-            snapshot_times=np.array(output.snapshots, dtype=float),
-        )
+        kernel = assemble(self.config, self._parameters, self.number)
         if self._words is not None:
             kernel.restore(self._words)
             self._words = None
         else:
-            kernel.start(config.contacts.initial)
+            kernel.start(self.config.contacts.initial)
         self._kernel = kernel
         return kernel
 

@@ -19,7 +19,7 @@ from mesoslip.reports.sections.regime import regime
 from mesoslip.reports.sections.response import response
 from mesoslip.reports.sections.slips import slips
 from mesoslip.reports.sections.sweep import maps, sweep
-from mesoslip.reports.sections.theory import curve, onset
+from mesoslip.reports.sections.theory import curve, cycle, onset
 
 SECTIONS: dict[str, tuple[Writer, ...]] = {
     "run": (
@@ -35,6 +35,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
         provenance,
     ),
     "sweep": (sweep, maps, methods, provenance),
+    "cycle": (changes, pictures, cycle, methods, configuration, provenance),
     "curve": (changes, pictures, curve, methods, configuration, provenance),
     "onset": (changes, pictures, onset, methods, configuration, provenance),
     "fit": (parameters, methods, configuration, provenance),

@@ -13,6 +13,7 @@ from mesoslip.output.kinds import kind_of
 from mesoslip.reports.content import Block, Section, Source, Subject, Text
 from mesoslip.reports.methods import (
     curve_method,
+    cycle_method,
     fit_method,
     measured_method,
     onset_method,
@@ -25,6 +26,7 @@ from mesoslip.reports.references import PROGRAM, REFERENCES, numbered, program
 METHODS: dict[str, Callable[[xr.DataTree, Config], str]] = {
     "run": run_method,
     "sweep": sweep_method,
+    "cycle": cycle_method,
     "curve": curve_method,
     "onset": onset_method,
     "fit": fit_method,

@@ -1,10 +1,11 @@
-"""Derived numbers of force curves and of onsets of slip."""
+"""Derived numbers of force curves, onsets of slip and settled cycles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mesoslip.cycles import cycle as cycles
 from mesoslip.reports.content import Section, Subject, Table, Text
 from mesoslip.reports.sections.base import named, row_in_one_unit
 from mesoslip.theory import force_curve, slip_onset
@@ -15,6 +16,11 @@ DIGITS = 5
 def curve(subjects: Sequence[Subject]) -> Section:
     """Numbers of force curves."""
     return _numbers("Force curve", subjects, force_curve.SUMMARY)
+
+
+def cycle(subjects: Sequence[Subject]) -> Section:
+    """Numbers of settled cycles."""
+    return _numbers("Settled motion", subjects, cycles.SUMMARY)
 
 
 def onset(subjects: Sequence[Subject]) -> Section:

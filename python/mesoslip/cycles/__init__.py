@@ -1,0 +1,1 @@
+"""Settled cycles of the master equation, and their branches over a parameter."""

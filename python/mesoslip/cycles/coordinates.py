@@ -1,0 +1,206 @@
+"""A state of the master equation at a section, as a vector; and small changes of the state by it.
+
+The vector has the velocity and the damper of the slider, the number of pinned contacts over their
+stretch, and that of detached ones over the time since they broke, both as hat functions. A change
+multiplies the populations by a smooth function of these. What is finer than the hat functions
+stays; it decays within one life of a contact, as thresholds blur it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from mesoslip.cycles.section import mass_of
+from mesoslip.simulation.archive import Archive
+from mesoslip.simulation.kernel import Array, Words
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+# Distance of hat functions over the spread of the breaking stretches, and their maximum number.
+CELL_PART, MAX_CELLS = 0.5, 2000
+# Widest spread that matters for the distance.
+MAX_SPREAD = 0.35
+# Range of stretches in mean breaking stretches; spreads beyond the mean.
+MIN_STRETCH, MAX_STRETCH, SPREADS = -0.3, 1.2, 4.0
+# Hat functions of the time since breaking.
+DELAY_CELLS = 8
+# Contacts of a cell over all below which it is not changed.
+EMPTY = 1e-10
+# Range of the factor by which a population may change.
+MIN_FACTOR, MAX_FACTOR = 0.05, 5.0
+
+# Columns of a population, rows of its moments and of a packet: fortran/contacts/populations.
+ORIGIN, FORCE, WEIGHT = 0, 1, 2
+NUMBER, STIFF = 0, 1
+PACKET_START, PACKET_END, PACKET_NUMBER = 0, 1, 2
+SLIDER, PINNED, DETACHED = "rigid slider", "pinned populations", "detached packets"
+
+
+class Hats:
+    """Hat functions at evenly spaced points."""
+
+    def __init__(self, low: float, high: float, cells: int) -> None:
+        self.low, self.step, self.count = low, (high - low) / cells, cells + 1
+
+    def _place(self, points: Array) -> tuple[np.ndarray, Array]:
+        place = np.clip((points - self.low) / self.step, 0, self.count - 1 - 1e-9)
+        cell = place.astype(int)
+        return cell, place - cell
+
+    def sums(self, points: Array, amounts: Array) -> Array:
+        """Sums of amounts at points, times each hat function."""
+        cell, part = self._place(points)
+        total = np.zeros(self.count)
+        np.add.at(total, cell, amounts * (1 - part))
+        np.add.at(total, cell + 1, amounts * part)
+        return total
+
+    def factors(self, points: Array, amounts: Array, change: Array) -> Array:
+        """Factors of the amounts, smooth over the points, that change their sums by so much."""
+        cell, part = self._place(points)
+        bands = np.zeros((2, self.count))
+        np.add.at(bands[1], cell, amounts * (1 - part) ** 2)
+        np.add.at(bands[1], cell + 1, amounts * part**2)
+        np.add.at(bands[0], cell + 1, amounts * part * (1 - part))
+        is_empty = bands[1] <= EMPTY * np.sum(amounts)
+        bands[1] += EMPTY * np.sum(amounts)
+        values = solveh_banded(bands, np.where(is_empty, 0.0, change))
+        factor = 1 + values[cell] * (1 - part) + values[cell + 1] * part
+        clipped: Array = np.clip(factor, MIN_FACTOR, MAX_FACTOR)
+        return clipped
+
+
+class Coordinates:
+    """States of a rigid slider on populations as vectors.
+
+    Forces are in units of F_s, numbers in units of N.
+    """
+
+    def __init__(self, config: Config, velocity: float) -> None:
+        contacts = config.contacts
+        self._config = config
+        self._sign = math.copysign(1.0, velocity)
+        self._mass, self._spring = mass_of(config), config.spring_stiffness
+        self._count = contacts.count
+        self._stretch = contacts.static_force / contacts.stiffness
+        spread = min(contacts.threshold.relative_width, MAX_SPREAD)
+        power = 0.5 if contacts.coupling == "scaled" else 1.0
+        high = MAX_STRETCH + SPREADS * contacts.threshold.relative_width * power
+        cells = (high - MIN_STRETCH) / (CELL_PART * spread * power)
+        self._pinned = Hats(MIN_STRETCH, high, min(MAX_CELLS, math.ceil(cells)))
+        self._detached = Hats(0.0, 1.0, DELAY_CELLS)
+        self._velocity = math.sqrt(contacts.stiffness / self._mass) * self._stretch
+        self._acceleration = contacts.static_force / self._mass
+
+    def of(self, words: Words) -> Array:
+        """The vector of a state."""
+        archive = Archive(words)
+        rows, left = self._rows(archive)
+        since, numbers, _ = self._packets(archive)
+        return np.concatenate(
+            [
+                [archive.number(SLIDER, "velocity") / self._velocity],
+                [archive.number(SLIDER, "damper") / self._acceleration],
+                self._pinned.sums(self._stretches(archive, rows), left[NUMBER]) / self._count,
+                self._detached.sums(since, numbers) / self._count,
+            ]
+        )
+
+    def weigh(self, vector: Array) -> Array:
+        """A vector whose length measures a change: densities as distributions, so that a peak that
+        shifts changes by how far."""
+        slider, pinned, detached = np.split(vector, [2, 2 + self._pinned.count])
+        step = self._pinned.step
+        return np.concatenate([slider, step**1.5 * np.cumsum(pinned), step * detached])
+
+    def _rows(self, archive: Archive) -> tuple[Array, Array]:
+        count = int(archive.number(PINNED, "count"))
+        return archive.matrix(PINNED, "population")[:count], archive.matrix(PINNED, "left")[
+            :, :count
+        ]
+
+    def _stretches(self, archive: Archive, rows: Array) -> Array:
+        here = archive.number(SLIDER, "displacement")
+        stretches: Array = self._sign * (here - rows[:, ORIGIN]) / self._stretch
+        return stretches
+
+    def _packets(self, archive: Archive) -> tuple[Array, Array, slice]:
+        """Time since breaking over the delay, numbers, and where they are in the archive."""
+        packets = archive.matrix(DETACHED, "packet")
+        first, last = (int(archive.number(DETACHED, name)) for name in ("first", "last"))
+        there = slice(first - 1, last)
+        packets = packets[:, there]
+        numbers = packets[PACKET_NUMBER].copy()
+        if numbers.size:
+            numbers[0] *= 1 - archive.number(DETACHED, "attached_part")
+        middle = 0.5 * (packets[PACKET_START] + packets[PACKET_END])
+        delay = self._config.contacts.delay or 1.0
+        return (archive.number(SLIDER, "time") - middle) / delay, numbers, there
+
+    def changed(self, words: Words, change: Array) -> Words:
+        """A state that is changed by a vector, which is small."""
+        archive = Archive(words)
+        rows, left = self._rows(archive)
+        since, numbers, there = self._packets(archive)
+        parts = np.split(change, [1, 2, 2 + self._pinned.count])
+        factor = self._pinned.factors(
+            self._stretches(archive, rows), left[NUMBER], parts[2] * self._count
+        )
+        pinned = float(factor @ left[NUMBER])
+        detached = archive.number(DETACHED, "number")
+        if numbers.size:
+            packets = archive.matrix(DETACHED, "packet")
+            factors = self._detached.factors(since, numbers, parts[3] * self._count)
+            for name, row in (("number", PACKET_NUMBER), ("mass", PACKET_NUMBER + 1)):
+                more = float((factors - 1) @ (numbers * packets[row, there] / packets[2, there]))
+                archive.set_number(DETACHED, name, archive.number(DETACHED, name) + more)
+            packets[PACKET_NUMBER:, there] *= factors
+            archive.set_matrix(DETACHED, "packet", packets)
+            detached = archive.number(DETACHED, "number")
+        factor *= (self._count - detached) / pinned
+        self._set_rows(archive, rows, left, factor)
+        self._set_slider(
+            archive,
+            self._velocity * float(parts[0][0]),
+            self._acceleration * float(parts[1][0]),
+        )
+        return archive.words()
+
+    def _set_rows(self, archive: Archive, rows: Array, left: Array, factor: Array) -> None:
+        """Multiply populations."""
+        count = len(rows)
+        everything = archive.matrix(PINNED, "population")
+        everything[:count, WEIGHT] *= factor
+        archive.set_matrix(PINNED, "population", everything)
+        moments = archive.matrix(PINNED, "left")
+        moments[:, :count] *= factor
+        archive.set_matrix(PINNED, "left", moments)
+        contacts, left = self._config.contacts, left * factor
+        stiffness = contacts.stiffness / self._count * left[STIFF]
+        force = contacts.static_force / self._count * left[NUMBER] * rows[:, FORCE]
+        archive.set_number(PINNED, "stiffness", math.fsum(stiffness))
+        archive.set_number(
+            PINNED, "offset", math.fsum(stiffness * rows[:, ORIGIN]) - math.fsum(force)
+        )
+
+    def _set_slider(self, archive: Archive, velocity: float, damper: float) -> None:
+        """Change velocity and damper of the slider, and let its acceleration follow."""
+        velocity += archive.number(SLIDER, "velocity")
+        damper += archive.number(SLIDER, "damper")
+        here, time = (archive.number(SLIDER, name) for name in ("displacement", "time"))
+        drive = archive.number(SLIDER, "drive value") + archive.number(SLIDER, "drive rate") * (
+            time - archive.number(SLIDER, "drive time")
+        )
+        stiffness, offset = (archive.number(PINNED, name) for name in ("stiffness", "offset"))
+        drag = self._config.contacts.contact_drag * archive.number(DETACHED, "mass")
+        force = stiffness * here - offset + drag * velocity
+        archive.set_number(SLIDER, "velocity", velocity)
+        archive.set_number(SLIDER, "damper", damper)
+        archive.set_number(
+            SLIDER, "acceleration", (self._spring * (drive - here) - force) / self._mass - damper
+        )

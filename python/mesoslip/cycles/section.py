@@ -1,0 +1,275 @@
+"""The master equation as a map: from one passage of the spring force through a level to the next.
+
+The section is where the rising force passes a level high in its cycle. There most contacts are
+pinned and the slider sticks. The run is cut exactly there, so that the map is smooth.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.simulation.archive import Archive, entries
+from mesoslip.simulation.assembly import NEVER, assemble
+from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+# Samples of the trace in a period of the pinned slider's ringing.
+SAMPLES_OF_RINGING = 32
+# Advances between two looks at the trace.
+CHUNK = 256
+# The level, and the one below which the force must fall before it, in parts of the range.
+LEVEL, RESET = 0.8, 0.5
+# Parts of the range between which a level may lie before it is chosen anew.
+MIN_LEVEL, MAX_LEVEL = 0.65, 0.93
+# Time in which the next passage is sought, in times of loading to the static force and periods of
+# the setup.
+MAX_LOADINGS, MAX_PERIODS = 12.0, 100.0
+# No bound on the work of a chunk.
+ANY_WORK = 1e18
+# Steps of Newton's method for the time of a passage.
+NEWTON_STEPS = 6
+
+TIME, DRIVE, DISPLACEMENT, VELOCITY, FORCE = (
+    TRACE_COLUMNS.index(name)
+    for name in ("time", "drive_displacement", "displacement", "velocity", "spring_force")
+)
+
+Trace = NDArray[np.void]
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of the spring force [N], and the one below which it must have been [N]."""
+
+    force: float
+    reset: float
+
+    @classmethod
+    def of(cls, force: Array) -> Level:
+        """The levels for a force over time."""
+        low, high = float(np.min(force)), float(np.max(force))
+        return cls(low + LEVEL * (high - low), low + RESET * (high - low))
+
+    def fits(self, force: Array) -> bool:
+        """Whether the level is still high in the range of a force, and not at its top."""
+        low, high = float(np.min(force)), float(np.max(force))
+        return MIN_LEVEL <= (self.force - low) / max(high - low, 1e-300) <= MAX_LEVEL
+
+
+@dataclass(frozen=True)
+class Passage:
+    """From one passage through the section to the next.
+
+    Attributes
+    ----------
+    words
+        State at the end.
+    start_time, time
+        When it starts and ends [s].
+    trace
+        Samples in between, with the columns of a trace.
+    slips
+        Slips that ended in between, with the columns of the catalogue.
+    """
+
+    words: Words
+    start_time: float
+    time: float
+    trace: Trace
+    slips: Trace
+
+    @property
+    def period(self) -> float:
+        """Its duration [s]."""
+        return self.time - self.start_time
+
+    @property
+    def peak(self) -> float:
+        """Maximum of the spring force [N]."""
+        return extreme(self.trace["spring_force"])
+
+    @property
+    def low(self) -> float:
+        """Minimum of the spring force [N]."""
+        return -extreme(-self.trace["spring_force"])
+
+    @property
+    def slip_duration(self) -> float:
+        """Time in slips [s]."""
+        return float(np.sum(self.slips["end_time"] - self.slips["start_time"]))
+
+
+def extreme(values: Array) -> float:
+    """Maximum of samples of a smooth function, by a parabola."""
+    at = int(np.argmax(values))
+    if not 0 < at < len(values) - 1:
+        return float(values[at])
+    before, peak, after = (float(one) for one in values[at - 1 : at + 2])
+    bend = before - 2 * peak + after
+    return peak if bend >= 0 else peak - (after - before) ** 2 / (8 * bend)
+
+
+class Motion:
+    """Runs of the master equation under a constant drive, cut at will.
+
+    Parameters
+    ----------
+    config
+        The configuration, of engine "me" and with a constant velocity of the drive.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        contacts = config.contacts
+        self.velocity = config.drive_parts[-1].start_velocity
+        spring, mass = config.spring_stiffness, mass_of(config)
+        ringing = 2 * math.pi * math.sqrt(mass / (spring + contacts.stiffness))
+        self.interval = ringing / SAMPLES_OF_RINGING
+        force = contacts.static_force
+        self.loading_time = force * (1 / spring + 2 / contacts.stiffness) / abs(self.velocity)
+        self.setup_period = 2 * math.pi * math.sqrt(mass / spring)
+        self._parameters = config.contact_kind.kernel_parameters(config)
+
+    def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
+        """A kernel at a state, or at the start; the drive ends at a time [s]."""
+        kernel = assemble(self.config, self._parameters, end_time=end_time, interval=self.interval)
+        if words is None:
+            kernel.start(self.config.contacts.initial)
+        else:
+            kernel.restore(words)
+        return kernel
+
+    def go_on(self, words: Words | None, duration: float) -> tuple[Words, Trace]:
+        """The state after a time [s], and the trace until then."""
+        start = 0.0 if words is None else time_of(words)
+        kernel = self.open(words, start + duration)
+        rows = []
+        while not kernel.ask().ending:
+            kernel.advance(CHUNK * CHUNK, ANY_WORK)
+            rows.append(kernel.drain("trace"))
+            kernel.drain("slips")
+        return self._saved(kernel), structured(np.concatenate(rows), TRACE_COLUMNS)
+
+    def _saved(self, kernel: Kernel) -> Words:
+        """The state of a kernel that can go on, though its drive has ended."""
+        archive = Archive(kernel.save())
+        archive.set_number("simulation", "ending", 0)
+        kernel.close()
+        return archive.words()
+
+    def next_passage(self, words: Words, level: Level) -> Passage | None:
+        """Go on from a state to the next passage through a level; None if there is none in a long
+        time."""
+        start = time_of(words)
+        kernel = self.open(words)
+        pieces: list[_Piece] = []
+        limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
+        watch = _Watch(level, np.sign(self.velocity))
+        now = start
+        while now < limit:
+            kernel.advance(CHUNK, ANY_WORK)
+            pieces.append(_Piece(words, now, kernel.drain("trace"), kernel.drain("slips")))
+            found = watch.crossing(pieces[-1].trace)
+            if found is not None:
+                kernel.close()
+                while pieces[-1].time >= found:
+                    pieces.pop()
+                return self._cut(start, found, pieces)
+            words, now = kernel.save(), kernel.ask().time
+        kernel.close()
+        return None
+
+    def _cut(self, start: float, time: float, pieces: list[_Piece]) -> Passage:
+        """Repeat the last piece of a passage up to a time [s]."""
+        last = pieces.pop()
+        kernel = self.open(last.words, time)
+        while not kernel.ask().ending:
+            kernel.advance(CHUNK, ANY_WORK)
+        pieces.append(_Piece(last.words, last.time, kernel.drain("trace"), kernel.drain("slips")))
+        return Passage(
+            self._saved(kernel),
+            start,
+            time,
+            structured(np.concatenate([one.trace for one in pieces]), TRACE_COLUMNS),
+            structured(np.concatenate([one.slips for one in pieces]), SLIP_COLUMNS),
+        )
+
+
+class _Piece(NamedTuple):
+    """Some advances: the state at their start and when that is, samples and slips."""
+
+    words: Words
+    time: float
+    trace: Array
+    slips: Array
+
+
+class _Watch:
+    """Looks for the passage of the force in its samples."""
+
+    def __init__(self, level: Level, direction: float) -> None:
+        self._level, self._direction = level, direction
+        self._was_low = False
+        self._last: Array = np.empty((0, len(TRACE_COLUMNS)))
+
+    def crossing(self, rows: Array) -> float | None:
+        """Time of the passage [s] in further samples; None if there is none."""
+        rows = np.concatenate([self._last, rows])
+        self._last = rows[-1:]
+        force = rows[:, FORCE]
+        first = 0
+        if not self._was_low:
+            low = np.flatnonzero(force < self._level.reset)
+            if not low.size:
+                return None
+            self._was_low, first = True, int(low[0])
+        above = np.flatnonzero(force[first:] >= self._level.force)
+        if not above.size:
+            return None
+        at = first + int(above[0])
+        return self._between(rows[at - 1], rows[at])
+
+    def _between(self, early: Array, late: Array) -> float:
+        """Time of the passage between two samples, by cubic interpolation of the force."""
+        duration = late[TIME] - early[TIME]
+        force = np.array([early[FORCE], late[FORCE]])
+        rise = force[1] - force[0]
+        drive = late[DRIVE] - early[DRIVE]
+        spring = rise / (drive - (late[DISPLACEMENT] - early[DISPLACEMENT]))
+        slope = spring * (drive - duration * np.array([early[VELOCITY], late[VELOCITY]]))
+        part = (self._level.force - force[0]) / rise
+        for _ in range(NEWTON_STEPS):
+            value = (
+                force[0]
+                + part * slope[0]
+                + part**2 * (3 * rise - 2 * slope[0] - slope[1])
+                + part**3 * (slope[0] + slope[1] - 2 * rise)
+            )
+            change = (
+                slope[0]
+                + 2 * part * (3 * rise - 2 * slope[0] - slope[1])
+                + 3 * part**2 * (slope[0] + slope[1] - 2 * rise)
+            )
+            if change <= 0:
+                break
+            part = min(1.0, max(0.0, part - (value - self._level.force) / change))
+        return float(early[TIME] + part * duration)
+
+
+def mass_of(config: Config) -> float:
+    """Mass of the slider [kg], which has one."""
+    assert config.slider.oscillator is not None
+    return config.slider.oscillator.mass
+
+
+def time_of(words: Words) -> float:
+    """Time of a state [s]."""
+    return next(float(one.values[0]) for one in entries(words) if one.name == "time")

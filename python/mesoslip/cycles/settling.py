@@ -1,0 +1,382 @@
+"""A motion of the master equation is brought to its settled cycle.
+
+The map from section to section is iterated. Where it converges, it does so within some ten cycles
+as a rule: contacts forget within a few lives. Where the last changes shrink by one slow factor, the
+limit of their geometric series is taken as the next state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.cycles.coordinates import Coordinates
+from mesoslip.cycles.section import Level, Motion, Passage, Trace
+from mesoslip.errors import RunError
+from mesoslip.simulation.kernel import Array, Words
+
+# Maximum number of sections that a settled cycle passes.
+MAX_MULTIPLE = 4
+# Relative error of period and peaks at which a cycle is settled, and maximum number of cycles.
+TOLERANCE, MAX_CYCLES = 1e-5, 80
+# Relative spread of period and peaks over the last cycles below which a motion is periodic all the
+# same, and number of these passages: steps of the solver, or a fine structure, may keep it from
+# settling any further.
+MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
+# Ratio of successive changes below which they shrink.
+SHRINKING = 0.98
+# Ratio of spreads that are equal: the shorter cycle is taken.
+EQUAL_SPREAD = 1.5
+# Amplitude over F_s below which sliding is smooth.
+MIN_AMPLITUDE = 1e-3
+# Time before the first section, in times of loading and in periods of the setup.
+LOADINGS, PERIODS = 2.0, 10.0
+# Times the run goes on before sections are sought again, where there are none.
+MAX_WINDOWS = 40
+# Factor by which changes must go on shrinking to be extrapolated, its variation, cycles between.
+SLOW, MAX_VARIATION, MIN_BETWEEN = 0.6, 0.15, 4
+# Ratio of successive amplitudes, and part of the amplitude left in the end, of a decay to rest.
+DECAYED = 0.1
+
+
+@dataclass
+class Settled:
+    """How a motion came to its settled state.
+
+    Attributes
+    ----------
+    motion
+        "periodic", "smooth", or "irregular": not settled.
+    multiple
+        Sections that a settled cycle passes, 1 to 4.
+    passages
+        The last passages, the latest last; those of one settled cycle, if it is periodic.
+    level
+        The section.
+    words
+        State at the end.
+    cycles
+        Passages that were computed.
+    extrapolations
+        How often the state was extrapolated.
+    error
+        Estimated relative error of period and peaks.
+    changes
+        Differences of the vectors of the last states, after a cycle of ``multiple`` passages.
+    rows
+        Duration [s], maximum and minimum of the spring force [N] of all passages of this section,
+        shape (passages, 3).
+    """
+
+    motion: str
+    multiple: int
+    passages: list[Passage]
+    level: Level | None
+    words: Words
+    cycles: int
+    extrapolations: int = 0
+    error: float = math.nan
+    changes: list[Array] = field(default_factory=list)
+    rows: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+
+def settle(
+    motion: Motion,
+    words: Words | None = None,
+    level: Level | None = None,
+    *,
+    is_stable: bool | None = None,
+    tolerance: float = TOLERANCE,
+    max_cycles: int = MAX_CYCLES,
+    progress: Callable[[float], None] | None = None,
+) -> Settled:
+    """Bring a motion to its settled state.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    words, level
+        State to start from, and a section that may fit; the start of a run by default.
+    is_stable
+        Whether smooth sliding is linearly stable, if that is known.
+    tolerance
+        Relative error of period and peaks.
+    max_cycles
+        Maximum number of passages.
+    progress
+        Called after each passage with the part of the maximum that is done.
+    """
+    run = _Settling(motion, is_stable, tolerance)
+    if words is None or level is None:
+        words, trace = motion.go_on(words, run.window)
+        level = run.level_of(trace)
+    for _ in range(MAX_WINDOWS):
+        if level is None:
+            if is_stable:
+                return run.result("smooth", words)
+            words, trace = motion.go_on(words, run.window)
+            level = run.level_of(trace)
+            continue
+        words, level, verdict = run.iterate(words, level, max_cycles, progress)
+        if verdict:
+            return run.result(verdict, words)
+    return run.result("smooth" if level is None else "irregular", words)
+
+
+class _Settling:
+    """Passages so far."""
+
+    def __init__(self, motion: Motion, is_stable: bool | None, tolerance: float) -> None:
+        self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
+        self._force = motion.config.contacts.static_force
+        self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
+        self._coordinates = Coordinates(motion.config, motion.velocity)
+        self._count = self._extrapolations = 0
+        self._level: Level | None = None
+        self._restart()
+
+    def _restart(self) -> None:
+        """Forget earlier passages: the section or the state is another one."""
+        self._rows: list[Array] = []
+        self._vectors: list[Array] = []
+        self._recent: list[Passage] = []
+
+    def level_of(self, trace: Trace) -> Level | None:
+        """The section for the later half of a trace; None if it hardly oscillates."""
+        force = trace["spring_force"][len(trace) // 2 :]
+        if float(np.ptp(force)) < MIN_AMPLITUDE * self._force:
+            return None
+        return Level.of(force)
+
+    def iterate(
+        self,
+        words: Words,
+        level: Level,
+        max_cycles: int,
+        progress: Callable[[float], None] | None,
+    ) -> tuple[Words, Level | None, str]:
+        """Iterate with one section: state, next section, and what the motion is if it is known."""
+        self._restart()
+        self._level = level
+        while self._count < max_cycles:
+            passage = self._motion.next_passage(words, level)
+            self._count += 1
+            if progress is not None:
+                progress(self._count / max_cycles)
+            if passage is None:
+                words, trace = self._motion.go_on(words, self.window)
+                return words, self.level_of(trace), ""
+            words = passage.words
+            self._take(passage)
+            if self._decays():
+                return words, None, "smooth"
+            force = passage.trace["spring_force"]
+            if len(self._rows) <= 2 and not level.fits(force):
+                if float(np.ptp(force)) < MIN_AMPLITUDE * self._force:
+                    return words, None, ""
+                return words, Level.of(force), ""
+            multiple, error = self._multiple()
+            if error < self._tolerance and len(self._rows) > 2 * multiple:
+                if not self._fits(multiple):
+                    return words, self._new_level(multiple), ""
+                return words, level, "periodic"
+            words = self._extrapolated(words, multiple)
+        return words, level, "periodic" if self._spread()[1] < MAX_SPREAD else "irregular"
+
+    def _spread(self) -> tuple[int, float]:
+        """Passages of a cycle, and the relative spread of the last ones, the least of all."""
+        last = np.array(self._rows[-SPREAD_PASSAGES:])
+        found = [(1, math.inf)]
+        if len(last) == SPREAD_PASSAGES:
+            amplitude = float(np.mean(last[:, 1] - last[:, 2]))
+            last /= np.array([float(np.mean(last[:, 0])), amplitude, amplitude])
+            for multiple in range(1, MAX_MULTIPLE + 1):
+                spread = max(
+                    float(np.std(last[one::multiple], axis=0).max()) for one in range(multiple)
+                )
+                found.append((multiple, spread))
+        best = min(spread for _, spread in found)
+        return next(one for one in found if one[1] <= EQUAL_SPREAD * best)
+
+    def _take(self, passage: Passage) -> None:
+        self._recent = [*self._recent[1 - 2 * MAX_MULTIPLE :], passage]
+        self._rows.append(np.array([passage.period, passage.peak, passage.low]))
+        self._vectors.append(self._coordinates.of(passage.words))
+
+    def _fits(self, multiple: int) -> bool:
+        """Whether the section is high in the range of the cycle."""
+        assert self._level is not None
+        return self._level.fits(self._force_of(multiple))
+
+    def _new_level(self, multiple: int) -> Level:
+        return Level.of(self._force_of(multiple))
+
+    def _force_of(self, multiple: int) -> Array:
+        force: Array = np.concatenate(
+            [one.trace["spring_force"] for one in self._recent[-multiple:]]
+        )
+        return force
+
+    def _differences(self, multiple: int) -> Array:
+        """Relative changes over a cycle of some passages, of period, peak and low; shape (n, 3)."""
+        rows = np.array(self._rows)
+        changes: Array = rows[multiple:] - rows[:-multiple]
+        amplitude = max(float(rows[-1, 1] - rows[-1, 2]), 1e-9 * self._force)
+        changes /= np.array([float(rows[-1, 0]), amplitude, amplitude])
+        return changes
+
+    def _multiple(self) -> tuple[int, float]:
+        """Passages of a cycle, and the estimated error of its period and peaks.
+
+        A cycle of several passages is one whose passages stay different.
+        """
+        found = []
+        is_shrinking = False
+        for multiple in range(1, MAX_MULTIPLE + 1):
+            if len(self._rows) < 2 * multiple + 1 or (multiple > 1 and is_shrinking):
+                break
+            sizes = np.max(np.abs(self._differences(multiple)), axis=1)
+            last = float(np.max(sizes[-multiple:]))
+            before = float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
+            is_shrinking = is_shrinking or last < SHRINKING * before
+            factor = min(0.99, last / before) if before > 0 else 0.9
+            found.append((max(1.0, factor / (1 - factor)) * last, multiple))
+        if not found:
+            return 1, math.inf
+        settled = [one for one in found if one[0] < self._tolerance]
+        error, multiple = min(settled, key=lambda one: one[1]) if settled else min(found)
+        return multiple, error
+
+    def _decays(self) -> bool:
+        """Whether the amplitude goes to zero, by its geometric series, where that is possible."""
+        rows = np.array(self._rows)
+        if len(rows) < 6 or self._is_stable is False:
+            return False
+        sizes = rows[-5:, 1] - rows[-5:, 2]
+        if sizes[-1] < MIN_AMPLITUDE * self._force:
+            return bool(np.all(np.diff(sizes) < 0))
+        ratios = sizes[1:] / sizes[:-1]
+        falls = np.diff(sizes)
+        if not (np.all(ratios < 1) and np.ptp(ratios) < 0.02 * (1 - np.mean(ratios))):
+            return False
+        factor = falls[1:] / falls[:-1]
+        left = sizes[-1] + falls[-1] * float(np.mean(factor)) / (1 - float(np.mean(factor)))
+        return bool(np.all(factor < 1) and left < DECAYED * sizes[-1])
+
+    def _extrapolated(self, words: Words, multiple: int) -> Words:
+        """The limit of a geometric series of changes, where they are one; else the state."""
+        vectors = self._vectors
+        if len(vectors) < 3 * multiple + MIN_BETWEEN:
+            return words
+        changes = self._differences(multiple)[::-multiple][:3]
+        sizes = np.linalg.norm(changes, axis=1)
+        if not sizes[0] > 0 or not sizes[1] > 0 or not sizes[2] > 0:
+            return words
+        factors = np.sum(changes[:-1] * changes[1:], axis=1) / sizes[1:] ** 2
+        factor = float(np.mean(factors))
+        if not SLOW < abs(factor) < 1 or float(np.ptp(factors)) > MAX_VARIATION * (1 - abs(factor)):
+            return words
+        step = factor / (1 - factor) * (vectors[-1] - vectors[-1 - multiple])
+        self._extrapolations += 1
+        words = self._coordinates.changed(words, step)
+        self._restart()
+        return words
+
+    def result(self, motion: str, words: Words) -> Settled:
+        multiple, error = self._multiple()
+        if motion == "periodic" and error > self._tolerance:
+            multiple, error = self._spread()
+        elif motion != "periodic":
+            multiple = 1
+        changes = [
+            late - early
+            for late, early in zip(self._vectors[multiple:], self._vectors[:-multiple], strict=True)
+        ]
+        passages = self._recent[-multiple:] if motion == "periodic" else self._recent
+        return Settled(
+            motion,
+            multiple,
+            passages,
+            self._level,
+            words,
+            self._count,
+            self._extrapolations,
+            error if motion == "periodic" else math.nan,
+            changes[-4 * MAX_MULTIPLE :],
+            np.array(self._rows).reshape(-1, 3),
+        )
+
+
+def multipliers(
+    motion: Motion, settled: Settled, *, max_steps: int, size: float, tolerance: float
+) -> tuple[Sequence[complex], int]:
+    """Leading multipliers of a settled cycle, from Arnoldi's method on differences of the map.
+
+    Parameters
+    ----------
+    motion, settled
+        The motion and its settled cycle.
+    max_steps
+        Maximum number of steps, each of which computes a cycle.
+    size
+        Maximum change of a number of the vector.
+    tolerance
+        Change of the leading multiplier in a step below which it is found.
+
+    Returns
+    -------
+    multipliers, steps
+        The leading ones, by modulus; and cycles that were computed.
+    """
+    coordinates = Coordinates(motion.config, motion.velocity)
+    if not settled.changes or settled.level is None:
+        return (), 0
+
+    def image(words: Words) -> Array:
+        for _ in range(settled.multiple):
+            assert settled.level is not None
+            passage = motion.next_passage(words, settled.level)
+            if passage is None:
+                raise RunError("a cycle next to the settled one does not come back to its section")
+            words = passage.words
+        return coordinates.of(words)
+
+    start, end = coordinates.of(settled.words), image(settled.words)
+    # The latest changes that are not rounding errors have the leading modes.
+    weigh = coordinates.weigh
+    sizes = [float(np.max(np.abs(one))) for one in settled.changes]
+    chosen = next(
+        (one for one, big in zip(settled.changes[::-1], sizes[::-1], strict=True) if big > size),
+        settled.changes[0],
+    )
+    basis = [chosen / np.linalg.norm(weigh(chosen))]
+    matrix = np.zeros((max_steps + 1, max_steps))
+    found: NDArray[np.complex128] = np.zeros(0, dtype=complex)
+    for step in range(max_steps):
+        part = size / float(np.max(np.abs(basis[-1])))
+        changed = coordinates.changed(settled.words, part * basis[-1])
+        applied = (coordinates.of(changed) - start) / part
+        # What could not be applied, in empty cells, is left out of the basis too.
+        scale = float(np.linalg.norm(weigh(applied)))
+        basis[-1] = applied / scale
+        column = (image(changed) - end) / part / scale
+        for _ in range(2):
+            for row, vector in enumerate(basis):
+                overlap = float(weigh(vector) @ weigh(column))
+                matrix[row, step] += overlap
+                column = column - overlap * vector
+        before = found
+        found = np.linalg.eigvals(matrix[: step + 1, : step + 1]).astype(complex)
+        found = found[np.argsort(-np.abs(found))]
+        rest = float(np.linalg.norm(weigh(column)))
+        matrix[step + 1, step] = rest
+        close = len(before) > 1 and abs(abs(found[0]) - abs(before[0])) < tolerance
+        if close or not rest > 0 or step == max_steps - 1:
+            break
+        basis.append(column / rest)
+    return tuple(complex(one) for one in found), step + 2

@@ -1,0 +1,78 @@
+"""A kernel with all its parts, made from a configuration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.simulation.kernel import Kernel
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+# The end of a drive that does not end: the maximum double.
+NEVER = float(np.finfo(np.float64).max)
+
+
+def assemble(
+    config: Config,
+    parameters: Parameters,
+    number: int = 0,
+    *,
+    end_time: float | None = None,
+    interval: float | None = None,
+) -> Kernel:
+    """A kernel that can be started or restored.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    parameters
+        Parameters of the contacts.
+    number
+        Number of the realization.
+    end_time
+        When the last part of the drive ends [s]; by default, at the end of the run.
+    interval
+        Interval of the trace [s]; that of the configuration by default.
+    """
+    slider, contacts, output = config.slider, config.contact_kind, config.output
+    kernel = Kernel()
+    kernel.set_contacts(contacts.kernel_kind, parameters, config.run.seed, number)
+    kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
+    durations, start_velocities, end_velocities, stages = (
+        np.array(numbers) for numbers in zip(*config.drive_parts, strict=True)
+    )
+    ends = np.minimum(np.cumsum(durations), NEVER)
+    if end_time is not None:
+        ends[-1] = min(end_time, NEVER)
+    kernel.set_drive(ends, start_velocities, end_velocities, stages)
+    forces = config.drive.start_forces(config.drive_parts)
+    if forces is not None:
+        kernel.set_drive_values(np.array(forces))
+    stop = config.run.stops
+    kernel.set_stop(
+        slips=stop.slips or 0,
+        displacement=stop.displacement or 0.0,
+        block_distance=config.steady_block,
+        blocks=stop.steady.blocks if stop.steady else 1,
+        tolerance=stop.steady.tolerance * config.contacts.static_force if stop.steady else 0.0,
+    )
+    kernel.set_recorder(
+        interval=interval or config.output_interval,
+        slip_interval=output.slip_interval or 0.0,
+        slip_velocity=slider.slip_velocity(config),
+        quiet_time=slider.quiet_time,
+        duration=float(ends[-1]),
+        layers=slider.layers_recorded(config),
+    )
+    kernel.set_avalanches(
+        min_size=float(output.avalanche_size or 1) * config.has_avalanches,
+        snapshot_size=float(output.snapshot_size or 0),
+        max_avalanches=config.run.avalanches or 0,
+        snapshot_times=np.array(output.snapshots, dtype=float),
+    )
+    return kernel

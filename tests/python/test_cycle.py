@@ -1,0 +1,145 @@
+"""The settled cycle of the master equation."""
+
+from __future__ import annotations
+
+import json
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import ROOT
+from mesoslip.cycles.coordinates import Coordinates
+from mesoslip.cycles.cycle import master_equation
+from mesoslip.cycles.section import Motion
+from mesoslip.simulation.archive import Archive
+
+# Klein's case with broad thresholds, strong damping and a long delay: regular stick-slip.
+REGULAR = (
+    "run.engine=me",
+    "contacts.delay=2ms",
+    "contacts.threshold.relative_width=0.1",
+    "slider.damping_ratio=1",
+    "drive.velocity=3um/s",
+    "output.slip_interval=none",
+)
+
+
+def configuration(*changes: str) -> mesoslip.Config:
+    return mesoslip.Config.load(ROOT / "runs" / "klein.toml", [*REGULAR, *changes])
+
+
+@pytest.fixture(scope="module")
+def regular() -> mesoslip.Cycle:
+    return mesoslip.cycle(configuration())
+
+
+def test_cycle_agrees_with_a_long_run(regular):
+    config = configuration("run.duration=4s", "output.interval=4s")
+    with mesoslip.Realization(config, estimates_errors=False) as run:
+        while not run.finished:
+            run.advance()
+        slips = run.table("slips")[-11:]
+    assert regular.motion == "periodic"
+    assert regular.multiple == 1
+    assert regular.period == pytest.approx(np.mean(np.diff(slips["start_time"])), rel=1e-4)
+    assert regular.peak_force == pytest.approx(np.mean(slips["force_before"]), rel=1e-4)
+    assert regular.low_force == pytest.approx(np.mean(slips["force_after"]), rel=1e-4)
+    duration = np.mean(slips["end_time"] - slips["start_time"])
+    assert regular.slips == 1
+    assert regular.slip_share == pytest.approx(duration / regular.period, rel=1e-3)
+
+
+def test_the_start_does_not_matter(regular):
+    other = mesoslip.cycle(configuration(), start="steady", find_multipliers=False)
+    assert other.period == pytest.approx(regular.period, rel=1e-4)
+    again = mesoslip.cycle(configuration(), start=regular, find_multipliers=False)
+    assert again.period == pytest.approx(regular.period, rel=2e-5)
+    assert again.cycles < regular.cycles
+
+
+def test_multiplier_is_the_decay_of_a_perturbation(regular):
+    motion = Motion(regular.config)
+    coordinates = Coordinates(regular.config, motion.velocity)
+    vector = coordinates.of(regular.state)
+    # A tenth of the detached contacts, and of the velocity, beside what a sine adds to the pinned.
+    change = 2e-3 * np.sin(np.arange(len(vector))) * vector / np.max(vector)
+    change[2:] -= vector[2:] * change[2:].sum()
+    words, changed, sizes = regular.state, coordinates.changed(regular.state, change), []
+    for _ in range(6):
+        one, two = (motion.next_passage(state, regular.section) for state in (words, changed))
+        words, changed = one.words, two.words
+        sizes.append(
+            np.linalg.norm(coordinates.weigh(coordinates.of(changed) - coordinates.of(words)))
+        )
+    factor = (sizes[5] / sizes[1]) ** 0.25
+    assert regular.is_stable
+    assert factor == pytest.approx(abs(regular.multipliers[0]), rel=0.3)
+
+
+def test_smooth_sliding_and_irregular_motion_are_told_apart():
+    smooth = mesoslip.cycle(configuration("contacts.delay=0"))
+    assert smooth.motion == "smooth"
+    assert smooth.smooth_stable
+    assert smooth.amplitude == 0
+    assert "smooth sliding" in smooth.verdict
+    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2"), max_cycles=30)
+    assert irregular.motion == "irregular"
+    assert irregular.spread > 0.02
+    assert irregular.is_stable is None
+
+
+def test_a_state_is_the_same_after_taking_it_apart(regular):
+    assert np.array_equal(Archive(regular.state).words(), regular.state)
+
+
+def test_changes_of_a_state_are_those_asked_for(regular):
+    coordinates = Coordinates(regular.config, Motion(regular.config).velocity)
+    vector = coordinates.of(regular.state)
+    assert vector[2:].sum() == pytest.approx(1, rel=1e-9)
+    change = 1e-2 * vector * np.cos(np.arange(len(vector)))
+    change[2:] -= vector[2:] * change[2:].sum()
+    got = coordinates.of(coordinates.changed(regular.state, change)) - vector
+    assert got == pytest.approx(change, abs=1e-7)
+
+
+def test_command(command, tmp_path):
+    file = tmp_path / "regular.toml"
+    file.write_text(configuration().to_toml())
+    output = tmp_path / "cycle.nc"
+    status, printed, _ = command("cycle", file, "-o", output)
+    assert status == 0
+    assert "periodic" in printed
+    assert "smooth sliding is linearly unstable" in printed
+    status, printed, _ = command("cycle", file, "--start", output, "--json")
+    summary = json.loads(printed)
+    assert summary["smooth_stable"] is False
+    tree = mesoslip.open_output(output)
+    assert summary["period"] == pytest.approx(tree.attrs["period"], rel=2e-5)
+    trace = tree["trace"].to_dataset()
+    assert float(trace["time"][-1]) == pytest.approx(tree.attrs["period"], rel=0.01)
+    assert command("plot", output, "-o", tmp_path / "cycle.png")[0] == 0
+    assert command("report", output, "-o", tmp_path / "cycle.html")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("slider.kind=prescribed", ["slider.kind", "rigid"]),
+        ("contacts.reattach=false", ["contacts.reattach"]),
+        ("drive.velocity=0", ["drive", "constant velocity"]),
+    ],
+)
+def test_what_has_no_cycle(command, tmp_path, change, words):
+    file = tmp_path / "regular.toml"
+    file.write_text(configuration().to_toml())
+    status, _, errors = command("cycle", file, "--set", change)
+    assert status == 2
+    assert all(word in errors for word in words)
+
+
+def test_interaction_is_left_out():
+    config = mesoslip.Config.load(
+        ROOT / "runs" / "klein.toml",
+        ["interaction.strength=0.1", "interaction.columns=60", "interaction.rows=68"],
+    )
+    assert master_equation(config).interaction is None

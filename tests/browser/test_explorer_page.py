@@ -144,7 +144,13 @@ def test_a_program_that_has_ended_is_reported(browser):
     browser.driver.get_log("browser")
 
 
-@pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
+# Keys that no choice brings: only a file that has them.
+OF_A_FILE = {"slider.damping", "slider.layer_damping"}
+
+
+@pytest.mark.parametrize(
+    "control", [one for one in CONTROLS if one.key not in OF_A_FILE], ids=lambda one: one.key
+)
 def test_each_control_draws_a_new_picture(server, browser, control):
     """Each by itself on a page of its own; what it changes to can be run."""
     browser.open(server.address)
@@ -158,7 +164,9 @@ def test_each_control_draws_a_new_picture(server, browser, control):
             if control.key in keys
         )
         assert browser.change(first, choice)[1] == "drawn"
-    if control.choices:
+    if control.is_text:
+        assert browser.change(control.key, "2 s at 0.1 um/s; 1 s at 1 um/s")[1] == "drawn"
+    elif control.choices:
         now = browser.value(control.key, "value")
         other = next(one for one in control.choices if one != now)
         assert browser.change(control.key, other)[1] == "drawn"
@@ -182,6 +190,9 @@ def test_a_wrong_value_is_reported_at_its_control(server, browser):
     assert browser.value("contacts.delay:message", "visible")
     assert "<b>" not in browser.value("contacts.delay:message", "text")
     assert browser.data("force:force") == before
+    # The field shows what is run.
+    assert browser.value("contacts.delay", "value") == "500 µs"
+    assert browser.element("contacts.delay", "input").get_attribute("value") == "500 µs"
     assert browser.change("contacts.delay", "1 ms")[1] == "drawn"
     assert not browser.value("contacts.delay:message", "visible")
 
@@ -202,6 +213,68 @@ def test_infinitely_many_contacts_beside(server, browser):
     assert browser.change("interaction.lattice", "square")[1] == "drawn"
     assert "no neighbours" in browser.value("limit:message", "text")
     assert "beside" not in browser.driver.execute_script(CLASSES)
+
+
+# Ten knobs, one after another, on pages of two widths.
+TEN = (
+    ("contacts.delay", "0.7 ms"),
+    ("slider.stiffness", "80 N/m"),
+    ("slider.damping_ratio", "0.3"),
+    ("contacts.count", "3000"),
+    ("contacts.static_force", "20 uN"),
+    ("contacts.threshold.relative_width", "0.02"),
+    ("drive.velocity", "0.2 um/s"),
+    ("drive.stage", "2 s at 0.1 um/s; hold 1 s; 1 s at 1 um/s"),
+    ("run.duration", "5 s"),
+    ("interaction.lattice", "triangular"),
+)
+WIDE, NARROW = 1280, 420
+
+
+@pytest.mark.parametrize("width", [WIDE, NARROW])
+def test_ten_knobs_at_a_width(server, browser, tmp_path, width):
+    """Nothing is wider than the page, and knobs, picture and messages are where a hand gets."""
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        browser.open(server.address)
+        browser.driver.execute_script(
+            "document.querySelectorAll('details').forEach((group) => { group.open = true })"
+        )
+        for key, value in TEN:
+            assert browser.change(key, value)[1] == "drawn", key
+            assert "●" in browser.value(key, "title") or key == "drive.velocity", key
+        browser.wait_until_done()
+        assert "N is kept" in browser.value("interaction.lattice:message", "text")
+        assert browser.change("run.engine", "me")[1] == "refused"
+        assert browser.value("run.engine", "value") == "eq"
+        wide = browser.driver.execute_script(
+            "return [document.documentElement.scrollWidth, window.innerWidth]"
+        )
+        assert wide[0] <= wide[1]
+        force, knob = (
+            browser.driver.execute_script(
+                "const one = Bokeh.index.find_one("
+                "Bokeh.documents[0].get_model_by_name(arguments[0])).el.getBoundingClientRect();"
+                "return [one.left, one.right, one.width]",
+                name,
+            )
+            for name in ("force", "contacts.delay:control")
+        )
+        for left, right, _ in (force, knob):
+            assert 0 <= left < right <= wide[1]
+        # Beside each other, or one column.
+        assert (knob[1] < force[0]) == (width == WIDE)
+        assert force[2] > (450 if width == WIDE else 340)
+        if width == NARROW:
+            # The picture of the force stays in sight while knobs are turned.
+            browser.driver.execute_script("window.scrollTo(0, 1500)")
+            script = "return document.querySelector('.force').getBoundingClientRect().top"
+            assert browser.driver.execute_script(script) == pytest.approx(0, abs=1)
+        browser.driver.save_screenshot(str(tmp_path / f"{width}.png"))
+        assert browser.errors() == []
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_a_lattice_moves(server, browser):
@@ -380,7 +453,7 @@ def test_many_changes_at_random():
                 """,
                 [one.key for one in CONTROLS],
             )
-            shown = [one for one in CONTROLS if one.key in keys]
+            shown = [one for one in CONTROLS if one.key in keys and not one.is_text]
             control = chance.choice(shown)
             if control.choices:
                 options = browser.value(control.key, "options")
@@ -397,8 +470,8 @@ def test_many_changes_at_random():
                 drawn.append(seconds)
             else:
                 refused += 1
-                browser.element("reset", "button").click()
-                browser.wait("return Bokeh.documents[0].get_model_by_name('status').tags[1] >= 0")
+                # What is shown is as it was.
+                assert now == browser.value(control.key if control.choices else name, "value")
             assert browser.errors() == []
             if number % 25 == 24:
                 # Runs differ in size: memory is compared with the same one shown.

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +21,21 @@ from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.execution.newest import Newest
 from mesoslip.execution.stop import Stop
-from mesoslip.explorer.controls import CONTROLS, STEPS, values
+from mesoslip.explorer.controls import CONTROLS, ROW_HEIGHTS, STEPS, lattice_size, values
 from mesoslip.explorer.live_run import Pace, explored, run_live
 from mesoslip.explorer.pictures import Theories, motion, theory
 from mesoslip.explorer.session import Session
+from mesoslip.explorer.stages import read_stages
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results, run_realizations
 
 KLEIN = str(ROOT / "runs" / "klein.toml")
+RANGES = [one for one in CONTROLS if not one.choices and not one.is_text]
+# Starts with keys that no choice brings.
+STARTS = {
+    "slider.layer_damping": ("slider.kind=layered", "slider.layers=4"),
+    "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
+}
 
 
 @pytest.fixture
@@ -39,10 +47,12 @@ def session():
 def test_controls_are_keys_of_the_configuration(control):
     kind = key_kind(control.key)
     assert kind is not None
-    assert bool(control.choices) == (kind.unit is None and not kind.is_whole)
+    is_number = kind.unit is not None or kind.is_whole
+    assert [bool(control.choices), control.is_text, is_number].count(True) == 1
+    assert control.is_text == (not kind.is_single)
 
 
-@pytest.mark.parametrize("control", [one for one in CONTROLS if not one.choices], ids=str)
+@pytest.mark.parametrize("control", RANGES, ids=str)
 @pytest.mark.parametrize("start", [None, 0.0, 3.0])
 def test_each_position_of_a_slider_has_a_value(control, start):
     """From end to end values grow, and lie at the positions that they are shown at."""
@@ -86,20 +96,24 @@ def brought_by(key):
 
 
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
-def test_each_control_changes_the_configuration_as_the_command_line_does(session, control):
+def test_each_control_changes_the_configuration_as_the_command_line_does(control):
+    start = STARTS.get(control.key, ())
+    session = Session(Config.load(KLEIN, start), KLEIN)
     before = session.text(control.key)
-    if control.choices:
+    if control.is_text:
+        text = "2 s at 0.1 um/s; hold 1 s"
+    elif control.choices:
         text = next(one for one in control.choices[::-1] if one != before)
     else:
         text = control.text(control.scale(session.values.get(control.key)).value(0.7 * STEPS))
-    if not session.text(control.key):
+    if control.key not in session.shown:
         assert session.change(*brought_by(control.key))
     assert session.change(control.key, text), session.problems
     assert session.is_changed(control.key)
     words = shlex.split(session.command)
     assert words[:3] == ["mesoslip", "run", KLEIN]
     assert words[3::2] == ["--set"] * len(words[4::2])
-    assert Config.load(KLEIN, words[4::2]) == session.config
+    assert Config.load(KLEIN, (*start, *words[4::2])) == session.config
     assert Config.from_toml(session.config.to_toml()) == session.config
 
 
@@ -111,25 +125,51 @@ def test_a_value_as_at_the_start_is_no_change(session):
     assert session.config == session.start
 
 
-def test_what_is_wrong_is_reported_at_its_control_until_it_is_right(session):
-    good = session.config
+def test_a_refused_change_is_reported_at_its_control_and_taken_back(session):
+    assert session.change("slider.stiffness", "90 N/m")
+    good, command = session.config, session.command
     assert not session.change("contacts.delay", "1 kg")
+    assert "“1 kg” refused" in session.problems["contacts.delay"]
     assert "expected a quantity" in session.problems["contacts.delay"]
-    assert session.text("contacts.delay") == "1 kg"
-    # What is right by itself waits for it.
-    assert not session.change("slider.stiffness", "100 N/m")
-    assert list(session.problems) == ["contacts.delay"]
+    assert session.text("contacts.delay") == "500 µs"
     assert session.config is good
-    assert session.change("contacts.delay", "1 ms")
+    assert session.command == command
+    assert session.is_runnable
+    assert session.change("slider.stiffness", "100 N/m")
     assert session.problems == {}
     assert session.config.slider.spring_stiffness == 100.0
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
+def test_what_a_control_refuses_leaves_everything_as_it_was(control):
+    """Whatever keys a change would have brought, or dropped."""
+    session = Session(Config.load(KLEIN, STARTS.get(control.key, ())), KLEIN)
+    assert session.change("contacts.delay", "0.4 ms")
+    if control.key not in session.shown:
+        assert session.change(*brought_by(control.key))
+    before = (session.config, dict(session.changes), dict(session.values), session.command)
+    assert not session.change(control.key, "nonsense")
+    assert session.problems[control.key]
+    assert (session.config, session.changes, session.values, session.command) == before
+
+
+def test_a_change_whose_run_fails_is_taken_back(session):
+    assert session.change("contacts.delay", "0.4 ms")
+    command, config = session.command, session.config
+    assert session.change("slider.kind", "layered")
+    assert session.take_back("the solver failed")
+    assert session.problems == {"slider.kind": "the solver failed"}
+    assert session.command == command
+    assert session.config == config
+    # There is nothing more to take back.
+    assert not session.take_back("again")
 
 
 def test_a_combination_is_reported_at_the_control_that_brought_it_about(session):
     assert session.change("interaction.lattice", "triangular")
     assert not session.change("run.engine", "me")
     assert "no neighbours" in session.problems["run.engine"]
-    assert session.change("run.engine", "eq")
+    assert session.text("run.engine") == "eq"
     assert not session.change("interaction.rows", "7")
     assert "even" in session.problems["interaction.rows"]
 
@@ -137,14 +177,80 @@ def test_a_combination_is_reported_at_the_control_that_brought_it_about(session)
 def test_a_problem_of_a_key_without_a_control_is_reported_at_the_one_that_was_changed(session):
     """A duration below the interval of the trace, which has no control."""
     assert not session.change("run.duration", "0.1 ms")
-    assert session.problems["run.duration"].startswith("output.interval")
+    assert session.problems["run.duration"].startswith("“0.1 ms” refused: output.interval")
 
 
 @pytest.mark.parametrize("text", ["", "'", "1\nx = 2", "[1]", "{}", "nan", "1e999", "\x00", "∞"])
 @pytest.mark.parametrize("key", ["contacts.delay", "contacts.count", "slider.kind"])
 def test_nonsense_is_reported(session, key, text):
+    before = session.text(key)
     assert not session.change(key, text)
     assert session.problems[key]
+    assert session.text(key) == before
+
+
+@pytest.mark.parametrize("lattice", ["triangular", "square"])
+@pytest.mark.parametrize("count", [2, 7, 10, 48, 997, 1000, 4080, 4093, 100_000, 1_000_003])
+def test_a_lattice_keeps_n_or_says_what_it_makes_of_it(lattice, count):
+    columns, rows = lattice_size(count, lattice)
+    assert min(columns, rows) >= 2
+    assert lattice == "square" or rows % 2 == 0
+    if count >= 48:
+        # A lattice of the model, not a chain; N within a per cent.
+        assert 0.45 < columns / (rows * ROW_HEIGHTS[lattice]) < 2.3
+        assert abs(columns * rows - count) < 0.01 * count + 1
+    if count in {48, 1000, 4080, 100_000}:
+        assert columns * rows == count
+    session = Session(Config.load(KLEIN, [f"contacts.count={count}"]), KLEIN)
+    assert session.change("interaction.lattice", lattice)
+    assert session.config.contacts.count == columns * rows
+    note = session.notes["interaction.lattice"]
+    assert note.startswith(f"{columns} columns × {rows} rows")
+    assert ("N is kept" in note) == (columns * rows == count)
+    assert str(columns * rows) in note or "kept" in note
+
+
+def test_damping_is_as_the_file_gives_it():
+    rate = ["slider.damping_ratio=none", "slider.damping=20 1/s"]
+    for start, shown in (([], "slider.damping_ratio"), (rate, "slider.damping")):
+        session = Session(Config.load(KLEIN, start), KLEIN)
+        assert [one for one in session.shown if one.startswith("slider.damping")] == [shown]
+    session = Session(Config.load(KLEIN, rate[:1]), KLEIN)
+    assert session.text("slider.damping_ratio") == "0"
+    assert session.change("slider.damping_ratio", "0.1")
+    assert session.config.slider.damping_ratio == 0.1
+
+
+STAGES = "2 s at 100 nm/s; hold 1 s; 200 nm at 1 µm/s; 1 s from 1 µm/s to -2 µm/s"
+
+
+def test_a_drive_has_stages_and_one_velocity_again(session):
+    assert session.change("drive.stage", STAGES)
+    assert "drive.velocity" not in session.shown
+    assert session.text("drive.stage") == STAGES
+    parts = session.config.drive.parts
+    assert [one.duration for one in parts] == pytest.approx([2, 1, 0.2, 1])
+    assert [one.start_velocity for one in parts] == pytest.approx([1e-7, 0, 1e-6, 1e-6])
+    assert parts[-1].end_velocity == pytest.approx(-2e-6)
+    assert not session.change("drive.stage", "2 s at 1 kg")
+    assert not session.change("drive.stage", "quickly")
+    assert "stages are such as" in session.problems["drive.stage"]
+    assert session.text("drive.stage") == STAGES
+    assert session.change("drive.stage", "")
+    assert session.changes == {}
+    assert session.config == session.start
+
+
+def test_stages_of_a_file_are_written_as_they_are_read():
+    for name in ("steady-force", "velocity-step", "slide-hold-slide"):
+        start = Config.load(ROOT / "runs" / f"{name}.toml")
+        session = Session(start, "file.toml")
+        words = session.text("drive.stage")
+        assert words.count(";") == len(start.drive.stage) - 1
+        tables = tomllib.loads(f"stage = {read_stages(words)}")["stage"]
+        again = start.replace({"drive.stage": tables}).drive.parts
+        for ours, theirs in zip(again, start.drive.parts, strict=True):
+            assert ours == pytest.approx(theirs, rel=1e-5)
 
 
 def test_a_lattice_counts_its_contacts_and_goes_again(session):
@@ -181,6 +287,7 @@ def test_what_the_kernel_refuses_is_reported_too(session):
     ):
         session.change(key, text)
     assert list(session.problems) == ["contacts.back_force_ratio"]
+    assert session.text("contacts.back_force_ratio") == "0.1"
     assert session.change("contacts.back_force_ratio", "0.1")
 
 

@@ -46,6 +46,8 @@ class Control:
         Names of choices on the page, if other than in a file.
     required
         Keys that a choice requires, with their default values.
+    is_text
+        Whether it is a list, which is written in words.
     """
 
     key: str
@@ -57,6 +59,7 @@ class Control:
     choices: tuple[str, ...] = ()
     choice_labels: Mapping[str, str] = field(default_factory=dict)
     required: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    is_text: bool = False
 
     @property
     def unit(self) -> str:
@@ -76,10 +79,10 @@ class Control:
         Raises
         ------
         TypeError
-            If it has choices.
+            If it has choices, or is a text.
         """
-        if self.choices:
-            raise TypeError(f"{self.key} has choices, not a range")
+        if self.choices or self.is_text:
+            raise TypeError(f"{self.key} has no range")
         given = float(start) if isinstance(start, int | float) and start else self.usual
         low, high = self.range
         if self.decades:
@@ -125,17 +128,39 @@ class Scale:
         return round(STEPS * part)
 
 
-def _lattice(columns: int, rows: int) -> dict[str, str]:
-    return {
-        "interaction.columns": str(columns),
-        "interaction.rows": str(rows),
-        "interaction.strength": "0.1",
-        "contacts.count": str(columns * rows),
-    }
+# Keys that the size of a lattice determines, or that determine it.
+LATTICE_SIZE = ("interaction.columns", "interaction.rows", "contacts.count")
+# Height of a row of a lattice over the distance of its columns.
+ROW_HEIGHTS = {"triangular": math.sqrt(0.75), "square": 1.0}
+# Maximum ratio of the sides of a lattice that keeps N, and of one that changes it.
+MAX_RATIO_KEPT, MAX_RATIO = 2.0, 1.2
+
+
+def lattice_size(count: int, lattice: str) -> tuple[int, int]:
+    """Columns and rows of a lattice of N contacts, or of the nearest number that has one.
+
+    Its sides differ by a factor of 2 at most. Where N has no such lattice they are nearly equal.
+    """
+    height = ROW_HEIGHTS[lattice]
+    step = 2 if lattice == "triangular" else 1
+
+    def ratio(columns: int, rows: int) -> float:
+        return abs(math.log(columns / (rows * height)))
+
+    middle = math.sqrt(count / height)
+    all_rows = [one for one in range(2, int(2 * middle) + 4) if one % step == 0]
+    pairs = [(count // rows, rows) for rows in all_rows if count % rows == 0 and count // rows > 1]
+    kept = [one for one in pairs if ratio(*one) <= math.log(MAX_RATIO_KEPT)]
+    if kept:
+        return min(kept, key=lambda pair: (round(ratio(*pair), 9), pair[0]))
+    others = [(max(2, round(count / rows)), rows) for rows in all_rows]
+    nearly = [one for one in others if ratio(*one) <= math.log(MAX_RATIO)] or others
+    return min(nearly, key=lambda pair: (abs(pair[0] * pair[1] - count), ratio(*pair)))
 
 
 CONTROLS = (
     Control("drive.velocity", "drive velocity", "Drive and run", 3),
+    Control("drive.stage", "stages of the drive", "Drive and run", is_text=True),
     Control("run.duration", "duration", "Drive and run", 1),
     Control("run.seed", "seed", "Drive and run", range=(1, 100)),
     Control(
@@ -156,6 +181,8 @@ CONTROLS = (
     Control("slider.stiffness", "spring K", "Slider", 2),
     Control("slider.mass", "mass M", "Slider", 2),
     Control("slider.damping_ratio", "damping η_S/Ω_S", "Slider", range=(0, 2)),
+    Control("slider.damping", "damping rate η_S", "Slider", 2, usual=10.0),
+    Control("slider.layer_damping", "damping of layers", "Slider", 2, usual=10.0),
     Control("slider.layers", "layers", "Slider", range=(1, 64)),
     Control("contacts.count", "number N", "Contacts", 2, (10, 1e6)),
     Control("contacts.static_force", "static force F_s", "Contacts", 1),
@@ -200,7 +227,11 @@ CONTROLS = (
         "lattice",
         "Interaction",
         choices=(NONE, *LATTICES),
-        required={name: _lattice(60, 68) for name in LATTICES},
+        # Columns, rows and N follow from the number of contacts, see `lattice_size`.
+        required={
+            name: dict.fromkeys(LATTICE_SIZE, "") | {"interaction.strength": "0.1"}
+            for name in LATTICES
+        },
     ),
     Control("interaction.strength", "strength ξ", "Interaction", range=(0, 1)),
     Control("interaction.columns", "columns", "Interaction", range=(4, 200)),
@@ -210,8 +241,6 @@ BY_KEY = {control.key: control for control in CONTROLS}
 
 # Controls of whole tables: they are shown without the table too.
 TABLE_CONTROLS = ("contacts.ageing.law", "interaction.lattice")
-# Keys that the size of a lattice determines, or that determine it.
-LATTICE_SIZE = ("interaction.columns", "interaction.rows", "contacts.count")
 
 
 def values(config: Config) -> dict[str, object]:
@@ -219,6 +248,10 @@ def values(config: Config) -> dict[str, object]:
     given = flat(config)
     for key in TABLE_CONTROLS:
         given.setdefault(key, NONE)
+    if config.drive.velocity is not None:
+        given["drive.stage"] = ()
+    if "damping_ratio" in type(config.slider).model_fields and "slider.damping" not in given:
+        given.setdefault("slider.damping_ratio", 0.0)
     if config.interaction is not None:
         given.pop("contacts.count")
     return {control.key: given[control.key] for control in CONTROLS if control.key in given}

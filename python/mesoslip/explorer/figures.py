@@ -226,7 +226,8 @@ class LatticeView:
             name="lattice",
             title="Load of the contacts: force over threshold",
             height=400,
-            width=420,
+            max_width=420,
+            sizing_mode="stretch_width",
             match_aspect=True,
             tools="pan,wheel_zoom,reset,save",
         )
@@ -236,12 +237,12 @@ class LatticeView:
         self._figure.image(source=self._source, **look)
         self._figure.add_layout(ColorBar(color_mapper=mapper, width=8), "right")
         self._snapshot = Slider(
-            start=0, end=1, step=1, value=0, title="snapshot", name="snapshot", width=280
+            start=0, end=1, step=1, value=0, title="snapshot", name="snapshot", width=240
         )
         self._snapshot.on_change("value", lambda _a, _o, number: self._draw(int(number)))
         self._moving = Toggle(label="▶ play", name="moving", width=90)
         self._moving.on_change("active", lambda _a, _o, is_active: self._move(is_active))
-        self._caption = Div(text="", name="lattice:caption", width=400)
+        self._caption = Div(text="", name="lattice:caption", sizing_mode="stretch_width")
         self.roots: list[UIElement] = [
             self._figure,
             self._caption,

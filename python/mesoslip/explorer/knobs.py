@@ -12,6 +12,7 @@ from bokeh.models.widgets import Div, Select, Slider, TextInput
 
 from mesoslip.explorer.controls import NONE, STEPS, Control
 from mesoslip.explorer.session import Session
+from mesoslip.explorer.stages import EXAMPLE
 
 # Widths of a knob, and of its field [px].
 WIDTH, FIELD_WIDTH = 260, 104
@@ -21,6 +22,7 @@ FLAT = """
 label, .bk-input-group > label { white-space: nowrap; overflow: visible; }
 """
 CHANGED: dict[str, str | None] = {"background-color": "#fff3cd", "border-radius": "4px"}
+REFUSED: dict[str, str | None] = {"background-color": "#fde8ea", "border-radius": "4px"}
 # A style that is omitted stays in the browser.
 UNCHANGED: dict[str, str | None] = {"background-color": "transparent", "border-radius": "4px"}
 RED: dict[str, str | None] = {"color": "#b00020"}
@@ -43,13 +45,15 @@ class ControlView:
         self.control, self._session, self._change = control, session, change
         # Values that the page itself sets: a change to them is not one by the user.
         self._text, self._position = "", 0.0
-        self._scale = None if control.choices else control.scale(_number(session, control.key))
+        has_range = not control.choices and not control.is_text
+        self._scale = control.scale(_number(session, control.key)) if has_range else None
         self.message = Div(
             visible=False, styles=RED, name=f"{control.key}:message", width=WIDTH - 10
         )
         self._field: Select | TextInput
         self._slider: Slider | None = None
-        if self._scale is None:
+        parts: list[UIElement]
+        if control.choices:
             options: list[Any] = [
                 (one, control.choice_labels.get(one, one))
                 for one in control.choices
@@ -62,7 +66,16 @@ class ControlView:
                 margin=0,
                 stylesheets=[FLAT],
             )
-            parts: list[UIElement] = [self._field]
+            parts = [self._field]
+        elif self._scale is None:
+            self._field = TextInput(
+                name=control.key,
+                placeholder=EXAMPLE,
+                width=WIDTH,
+                margin=0,
+                stylesheets=[FLAT],
+            )
+            parts = [self._field]
         else:
             self._field = TextInput(
                 name=control.key, width=FIELD_WIDTH, margin=0, stylesheets=[FLAT]
@@ -98,24 +111,27 @@ class ControlView:
             self._change(self.control.key, text)
 
     def show(self) -> None:
-        """Show the value, whether it is changed, and its error."""
+        """Show the value, whether it is changed, and its error or a note on it."""
         session, key = self._session, self.control.key
         is_changed = session.is_changed(key)
         before = session.start_text(key) or "not given"
         self._text = session.text(key)
         set_changed(self._field, title=self.control.label + (f" ● was {before}" * is_changed))
         set_changed(self._field, value=self._text)
-        set_changed(self.layout, styles=CHANGED if is_changed else UNCHANGED)
+        style = CHANGED if is_changed else UNCHANGED
+        set_changed(self.layout, styles=REFUSED if key in session.problems else style)
         value = _number(session, key)
-        if self._slider is not None and self._scale is not None and key not in session.problems:
+        if self._slider is not None and self._scale is not None:
             self._position = self._slider.value
             # A slider stays where the user moved it: the text is rounded, and may lag behind.
             is_there = self.control.text(self._scale.value(self._position)) == self._text
             if isinstance(value, int | float) and not is_there:
                 self._position = self._scale.position(float(value))
             set_changed(self._slider, value=self._position)
-        message = session.problems.get(key, "")
+        problem = session.problems.get(key, "")
+        message = problem or session.notes.get(key, "")
         set_changed(self.message, text=html.escape(message), visible=bool(message))
+        set_changed(self.message, styles=RED if problem else PLAIN)
         set_changed(self.layout, visible=key in session.shown)
 
 

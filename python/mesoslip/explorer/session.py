@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import shlex
+from typing import Any
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.contacts.tables import LATTICES
 from mesoslip.configuration.differences import text_of
 from mesoslip.configuration.sliders import SLIDERS
-from mesoslip.errors import ConfigError, MesoslipError, Problem
-from mesoslip.explorer.controls import BY_KEY, LATTICE_SIZE, NONE, TABLE_CONTROLS, values
+from mesoslip.errors import ConfigError, FileError, MesoslipError, Problem
+from mesoslip.explorer.controls import (
+    BY_KEY,
+    LATTICE_SIZE,
+    NONE,
+    TABLE_CONTROLS,
+    Control,
+    lattice_size,
+    values,
+)
 from mesoslip.explorer.live_run import runnable
+from mesoslip.explorer.stages import EXAMPLE, read_stages, write_stages
 
 
 class Session:
@@ -26,7 +37,12 @@ class Session:
     config
         The latest configuration that can be run; all changes are in it unless there are problems.
     problems
-        Errors, by the key of the control that shows them.
+        Errors of the last change, by the key of the control that shows them. A change with errors
+        is taken back, unless there was nothing yet that can be run.
+    notes
+        What the last change brought about besides, by the key of the control that shows it.
+    is_runnable
+        Whether the start with the changes can be run.
     values
         Values of the controls that apply to ``config``, in SI, by key.
     """
@@ -36,11 +52,15 @@ class Session:
         self.source = source
         self.changes: dict[str, str] = {}
         self.problems: dict[str, str] = {}
+        self.notes: dict[str, str] = {}
+        self._before: dict[str, str] = {}
+        self._last = ""
         self.values = self._at_start = values(start)
-        self._check("")
+        self.is_runnable = self._check("")
 
     def change(self, key: str, text: str) -> bool:
-        """Change a key; returns whether the configuration can be run with all changes.
+        """Change a key; returns whether the configuration can be run with all changes. If not, the
+        change is taken back.
 
         Parameters
         ----------
@@ -55,32 +75,92 @@ class Session:
             If there is no such control.
         """
         control = BY_KEY[key]
+        self._before, self._last = dict(self.changes), key
+        self.notes = {}
         text = " ".join(text.split())
+        try:
+            self._lay_over(control, text)
+        except MesoslipError as error:
+            self.problems = {key: str(error)}
+            self.changes = dict(self._before)
+            return False
+        is_right = self._check(key)
+        if is_right or not self.is_runnable:
+            self.is_runnable = is_right
+        else:
+            self.changes = dict(self._before)
+            self.notes = {}
+            if key in self.problems and not control.is_text:
+                # The field shows the value as it was.
+                self.problems[key] = f"“{text}” refused: {self.problems[key]}"
+        return is_right
+
+    def take_back(self, message: str) -> bool:
+        """Take the last change back, as its run has failed; returns whether there was one.
+
+        Parameters
+        ----------
+        message
+            The error of the run.
+        """
+        if self.changes == self._before:
+            return False
+        self.changes = dict(self._before)
+        self._check("")
+        self.notes = {}
+        self.problems = {self._last: message}
+        return True
+
+    def reset(self) -> bool:
+        """Remove all changes."""
+        self._before, self._last = {}, ""
+        self.changes.clear()
+        self.notes = {}
+        self.is_runnable = self._check("")
+        return self.is_runnable
+
+    def _lay_over(self, control: Control, text: str) -> None:
+        """Lay a change over the others, with the keys that it requires."""
+        key = control.key
+        if control.is_text:
+            self._set_stages(text)
+            return
         if text in {self.start_text(key), NONE}:
             self.changes.pop(key, None)
         else:
             self.changes[key] = text
         if control.required:
             self._set_required(key, text)
+        if key == "interaction.lattice" and text in LATTICES:
+            self._fit_lattice(text)
         if key in LATTICE_SIZE:
             self._count_lattice()
-        return self._check(key)
 
-    def reset(self) -> bool:
-        """Remove all changes."""
-        self.changes.clear()
-        return self._check("")
+    def _set_stages(self, text: str) -> None:
+        """Drive in stages, or with one velocity again."""
+        for one in ("drive.stage", "drive.velocity"):
+            self.changes.pop(one, None)
+        if text != self.start_text("drive.stage"):
+            if not text:
+                raise FileError(f"give at least one stage, such as: {EXAMPLE}")
+            self.changes["drive.stage"] = read_stages(text)
+            if self.start.drive.velocity is not None:
+                self.changes["drive.velocity"] = NONE
 
     def start_text(self, key: str) -> str:
         """Value of a key at the start; empty if it was not given."""
-        return text_of(key, self._at_start[key]) if key in self._at_start else ""
+        return self._text_of(key, self._at_start[key]) if key in self._at_start else ""
 
     def text(self, key: str) -> str:
         """Current value of a key, valid or not."""
-        if key in self.changes:
+        if key in self.changes and not BY_KEY[key].is_text:
             return self.changes[key]
         value = self.values.get(key)
-        return "" if value is None else text_of(key, value)
+        return "" if value is None else self._text_of(key, value)
+
+    @staticmethod
+    def _text_of(key: str, value: Any) -> str:
+        return write_stages(value) if BY_KEY[key].is_text else text_of(key, value)
 
     def is_changed(self, key: str) -> bool:
         """Whether a key differs from the start."""
@@ -116,10 +196,27 @@ class Session:
                     del self.changes[one]
         if key in self.changes:
             for one, value in needed.get(text, {}).items():
+                if one in LATTICE_SIZE:
+                    continue
                 # Keys of a table are given only if the table is.
                 is_given = one in known and (key not in TABLE_CONTROLS or known[key] != NONE)
                 if not is_given:
                     self.changes.setdefault(one, value)
+
+    def _fit_lattice(self, lattice: str) -> None:
+        """Set columns and rows to those of N contacts, unless those that are there fit."""
+        sizes = [self.values.get(one) for one in LATTICE_SIZE[:2]]
+        rows = sizes[1]
+        if isinstance(rows, int) and not (lattice == "triangular" and rows % 2):
+            return
+        count = self.config.contacts.count
+        columns, rows = lattice_size(count, lattice)
+        for key, size in zip(LATTICE_SIZE[:2], (columns, rows), strict=True):
+            self.changes[key] = str(size)
+        self._count_lattice()
+        sites = columns * rows
+        kept = "N is kept" if sites == count else f"N is {sites}, as {count} contacts have none"
+        self.notes["interaction.lattice"] = f"{columns} columns × {rows} rows: {kept}"
 
     def _count_lattice(self) -> None:
         """Set the number of contacts to that of the sites of the lattice."""

@@ -150,7 +150,7 @@ class Page:
         self._arrangement = arrangement
         held = {"files": self._files, "arrangement": arrangement}
         self._status.js_on_change("tags", CustomJS(args=held, code=""))
-        yield row(*made, copy, self._limit, name="buttons")
+        yield row(*made, copy, self._limit, name="buttons", styles={"flex-wrap": "wrap"})
         yield from (self._error, self._limit_message, self._command, self._status)
         for view in (self._motion, self._limit_motion, self._theory, self._lattice):
             yield from view.roots
@@ -179,15 +179,23 @@ class Page:
         set_changed(self._error, text=html.escape(elsewhere), visible=bool(elsewhere))
         set_changed(self._command, value=self.session.command)
 
-    def _update(self) -> None:
+    def _update(self, is_back: bool = False) -> None:
         """Show the controls as they are, and run the configuration if it can be run; otherwise the
         run that is shown goes on.
+
+        Parameters
+        ----------
+        is_back
+            Whether the last change was taken back, because its run has failed.
         """
         self._change_count += 1
         with self._together():
             self._show_controls()
-            if self.session.problems:
+            if not self.session.is_runnable:
                 self._refuse("not run: correct the values marked in red")
+                return
+            if self.session.problems and not is_back:
+                self._refuse("refused, see the message in red: the run is as it was")
                 return
             self._results = None
             self._turn = self._change_count
@@ -287,7 +295,11 @@ class Page:
         self._status.tags = [self._change_count, REFUSED]
 
     def _fail(self, turn: int, message: str) -> None:
-        if turn == self._turn:
+        if turn != self._turn:
+            return
+        if self.session.take_back(message):
+            self._update(is_back=True)
+        else:
             self._refuse(message)
 
     def _show_motion(self, turn: int, shown: tuple[Motion, Results | None]) -> None:
@@ -312,7 +324,7 @@ class Page:
             self._theory.show(shown)
 
     def _save(self) -> None:
-        if self.session.problems:
+        if not self.session.is_runnable:
             self._report("not saved: correct the values marked in red")
             return
         self._send(f"{self._stem}.toml", self.session.config.to_toml().encode())

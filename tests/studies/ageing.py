@@ -112,7 +112,8 @@ def compare_steps() -> None:
                     "duration": sum(one["duration"] for one in stages),
                 }
                 tables["output"] = {"interval": 0.02 * 9e-9 / max(before, after)}
-                tables["contacts"] |= {"delay": 0.0}
+                tables["contacts"] |= {"delay": 0.0, "back_force_ratio": 0.1}
+                del tables["contacts"]["thermal"]
                 tables["contacts"]["threshold"]["relative_width"] = width
                 tables["contacts"]["ageing"]["growth"] = growth
                 config = Config.from_dict(tables)

@@ -42,12 +42,14 @@ class Stage:
     start, end
         Times [s].
     start_velocity, end_velocity
-        Velocities of the drive [m/s].
+        Velocities of the drive [m/s]; of a drive by force, its rates [N/s].
     is_uniform
         Whether the velocity is constant or changes linearly, as in no measured history.
     exact
         Values from the motion itself, recorded in the output's group ``stages``, each of shape
         (realizations,); empty if the output has no such group.
+    is_force
+        Whether the drive prescribes a force.
     """
 
     number: int
@@ -57,6 +59,7 @@ class Stage:
     end_velocity: float
     is_uniform: bool
     exact: Mapping[str, Array]
+    is_force: bool = False
 
     @property
     def duration(self) -> float:
@@ -66,12 +69,22 @@ class Stage:
     @property
     def is_hold(self) -> bool:
         """Whether the drive is at rest."""
+        return self._is_at_rest and not self.is_force
+
+    @property
+    def is_constant_force(self) -> bool:
+        """Whether the force on the slider is constant."""
+        return self._is_at_rest and self.is_force
+
+    @property
+    def _is_at_rest(self) -> bool:
         return self.is_uniform and self.start_velocity == 0 and self.end_velocity == 0
 
     @property
     def is_steady(self) -> bool:
         """Whether the drive moves at constant velocity."""
-        return self.is_uniform and self.start_velocity == self.end_velocity != 0
+        is_constant = self.is_uniform and self.start_velocity == self.end_velocity != 0
+        return is_constant and not self.is_force
 
     @property
     def velocity(self) -> float:
@@ -123,6 +136,10 @@ class Experiment:
     force, displacement
         Force of the spring, in the unit of the apparatus, and displacement of the slider [m],
         shape (realizations, samples).
+    contact_force
+        Force of the contacts of a slider under a force [N]; else that of the spring.
+    is_forced
+        Whether the drive prescribes a force, which then is the force of the spring.
     drive
         Displacement of the load point [m], shape (samples,).
     stages
@@ -131,16 +148,17 @@ class Experiment:
     Raises
     ------
     FileError
-        If it has no force, or its drive is unknown or a force.
+        If it has no force, its drive is unknown, or a force acts on a slider without mass.
     """
 
     def __init__(self, tree: xr.DataTree, name: str = "the output") -> None:
         self.apparatus = apparatus_of(tree, name)
         self.config = self.apparatus.config
-        if self.config is not None and self.config.drive.force_rate is not None:
+        self.is_forced = self.config is not None and self.config.drive.is_force
+        if self.is_forced and self.config is not None and self.config.slider.jumps:
             raise FileError(
-                f"{name}: is driven by a force (drive.force_rate); steady forces, velocity steps "
-                "and holds need a drive with velocities"
+                f"{name}: is driven by a force without inertia (drive.force_rate); its response is "
+                "known for sliders with a mass"
             )
         self.name = name
         self.tree = tree
@@ -154,6 +172,9 @@ class Experiment:
         self.force: Array = force[:, :count]
         self.drive: Array = self._drive(root)[:count]
         self.displacement: Array = self._displacement(root, count)
+        self.contact_force: Array = (
+            root["contact_force"].values[:, :count] if self.is_forced else self.force
+        )
         self.stages = self._stages()
 
     def _drive(self, root: xr.Dataset) -> Array:
@@ -236,7 +257,11 @@ class Experiment:
         for number, parts in self._parts().items():
             end = start + math.fsum(one.duration for one in parts)
             speeds = (parts[0].start_velocity, parts[-1].end_velocity)
-            found.append(Stage(number, start, min(end, last), *speeds, _is_uniform(parts), {}))
+            found.append(
+                Stage(
+                    number, start, min(end, last), *speeds, _is_uniform(parts), {}, self.is_forced
+                )
+            )
             start = end
         return found
 
@@ -268,7 +293,9 @@ class Experiment:
             )
             exact = {name: values[mine] for name, values in rows.items()}
             is_uniform = _is_uniform(parts.get(int(number), []))
-            found.append(Stage(int(number), start, end, first, last, is_uniform, exact))
+            found.append(
+                Stage(int(number), start, end, first, last, is_uniform, exact, self.is_forced)
+            )
         return found
 
     def samples(self, stage: Stage) -> slice:

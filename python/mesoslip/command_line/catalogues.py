@@ -216,6 +216,14 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         print_json([{**row, "regime": name} for row, name in zip(rows, names, strict=True)])
         return
+    if "motion" in data.attrs:
+        typer.echo(
+            f"a slider under a force has no cycles; in its last stage it {data.attrs['motion']}"
+        )
+        typer.echo(
+            "Under a force there are no cycles: mesoslip response prints creep and static friction."
+        )
+        return
     for index, one in zip(data["realization"].values.tolist(), results, strict=True):
         if len(results) > 1:
             typer.echo(f"realization {index}")

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.cycles import MIN_CYCLES
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
+from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.noise import noise_level, without_impulses
-from mesoslip.analysis.regime.result import NAMES, REGIME, RegimeResult
+from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
+from mesoslip.analysis.response.forces import motion_under_force
 from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.results import RunResults
@@ -43,7 +45,8 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     -------
     xarray.Dataset
         Dimension ``realization``, variables `REGIME`: ``regime`` is 0 smooth, 1 stick-slip, 2
-        irregular, 3 transient, with CF's flag attributes.
+        irregular, 3 transient, with CF's flag attributes. Of a slider under a force 0 if it creeps
+        steadily in the last stage, otherwise 3, and the attribute ``motion`` describes it.
 
     Raises
     ------
@@ -60,6 +63,11 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
         mine = owner == number
         window = _window(root.isel(realization=number), apparatus, tree)
         results.append(classify(*window, starts[mine], drops[mine]))
+    motion = None
+    config = apparatus.config
+    if config is not None and config.drive.is_force and not config.slider.jumps:
+        motion, is_creep = motion_under_force(Experiment(tree, name))
+        results = [RegimeResult(SMOOTH if is_creep else TRANSIENT)] * len(results)
     variables = {
         name: REGIME.variable(
             name,
@@ -69,7 +77,8 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
         for name, meaning in REGIME.items()
     }
     variables["regime"].attrs["flag_values"] = np.arange(len(NAMES), dtype=np.int8)
-    return xr.Dataset(variables, {"realization": root["realization"]})
+    attributes = {} if motion is None else {"motion": motion}
+    return xr.Dataset(variables, {"realization": root["realization"]}, attributes)
 
 
 def _slips(tree: xr.DataTree) -> tuple[Array, Array, Array]:

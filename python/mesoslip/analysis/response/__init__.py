@@ -1,6 +1,7 @@
 """Steady forces, velocity steps, holds and rate-and-state parameters of outputs.
 
 Forces are those of the spring along the drive: positive against its motion, in either direction.
+Of a slider under a force: creep velocities and static friction.
 """
 
 from mesoslip.analysis.response.dataset import (
@@ -10,6 +11,7 @@ from mesoslip.analysis.response.dataset import (
     scalars_of,
     write_csv,
 )
+from mesoslip.analysis.response.forces import creep_line, friction_line
 from mesoslip.analysis.response.holds import healing_line
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.steady import steady_line
@@ -22,7 +24,9 @@ from mesoslip.analysis.response.tables import (
 __all__ = [
     "Line",
     "ResponseTable",
+    "creep_line",
     "force_scale",
+    "friction_line",
     "healing_line",
     "line",
     "response",

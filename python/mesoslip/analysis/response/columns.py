@@ -91,6 +91,35 @@ HOLDS = Group(
     note=_NOTE,
 )
 
+CREEP = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    stage_start_time=Meaning("s", "start of the stage"),
+    duration=Meaning("s", "duration of the stage"),
+    force=Meaning("N", "constant force on the slider"),
+    displacement=Meaning("m", "displacement of the slider in the stage"),
+    velocity=Meaning("m s-1", "mean velocity after the transient"),
+    velocity_error=Meaning("m s-1", "standard error of the velocity"),
+    transient_time=Meaning("s", "duration of the discarded transient"),
+    is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
+    note=_NOTE,
+)
+
+RAMPS = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    stage_start_time=Meaning("s", "start of the stage"),
+    force_rate=Meaning("N s-1", "rate at which the force grows"),
+    hold_time=Meaning("s", "duration of the constant force before the ramp"),
+    hold_force=Meaning("N", "constant force before the ramp"),
+    end_force=Meaning("N", "force at the end of the ramp"),
+    static_friction=Meaning("N", "maximum force of the contacts, from which the slider slides"),
+    static_friction_error=Meaning("N", "standard error of the static friction"),
+    slide_time=Meaning("s", "time from the start of the ramp to the maximum"),
+    displacement=Meaning("m", "displacement of the slider from the start to the maximum"),
+    note=_NOTE,
+)
+
 # Scalars of a group: those of the line through its rows.
 STEADY_LINE = Group(
     rate_dependence=Meaning("N", "slope of the steady force over ln V, a - b"),
@@ -103,6 +132,19 @@ HEALING_LINE = Group(
     healing_per_decade_error=Meaning("N", "standard error of the healing per decade"),
     healing_per_decade_chi_square=Meaning("1", "chi square of the line"),
     healing_per_decade_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
+)
+
+CREEP_LINE = Group(
+    creep_rate_dependence=Meaning("N", "slope of the force over ln V, a - b"),
+    creep_rate_dependence_error=Meaning("N", "standard error of the creep rate dependence"),
+    creep_rate_dependence_chi_square=Meaning("1", "chi square of the line"),
+    creep_rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
+)
+FRICTION_LINE = Group(
+    friction_rate_dependence=Meaning("N", "slope of the static friction over ln of the force rate"),
+    friction_rate_dependence_error=Meaning("N", "standard error of the friction rate dependence"),
+    friction_rate_dependence_chi_square=Meaning("1", "chi square of the line"),
+    friction_rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
 )
 
 

@@ -14,7 +14,18 @@ import xarray as xr
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state.measured import fitted_trend, measured_rows
 from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows
-from mesoslip.analysis.response.columns import HEALING_LINE, HOLDS, STEADY, STEADY_LINE, STEPS
+from mesoslip.analysis.response.columns import (
+    CREEP,
+    CREEP_LINE,
+    FRICTION_LINE,
+    HEALING_LINE,
+    HOLDS,
+    RAMPS,
+    STEADY,
+    STEADY_LINE,
+    STEPS,
+)
+from mesoslip.analysis.response.forces import creep_line, creep_rows, friction_line, ramp_rows
 from mesoslip.analysis.response.holds import healing_line, hold_rows
 from mesoslip.analysis.response.line import Line
 from mesoslip.analysis.response.steady import steady_line, steady_rows
@@ -53,13 +64,15 @@ def response(
         Groups ``steady``: the mean force of each stage at constant velocity, with its error;
         ``steps``: direct change, evolution change and relaxation displacement of each velocity
         step; ``holds``: relaxation, restart peak and healing of each hold; ``rate_and_state``:
-        a, b, D_c of each law, and whether the law describes the output. Variables have units and
-        long names.
+        a, b, D_c of each law, and whether the law describes the output; ``creep`` and ``ramps``: of
+        a slider under a force, its velocity in each stage of constant force, and the static
+        friction in each stage in which the force grows. Variables have units and long names.
 
     Raises
     ------
     FileError
-        If an output cannot be read, is not of a run, or is driven by a force.
+        If an output cannot be read, is not of a run, or is of a slider without mass under
+        a force.
     """
     experiments = [
         Experiment(
@@ -98,12 +111,14 @@ def response_of(
     -------
     xarray.DataTree
         Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
-        (``hold``), and ``rate_and_state`` (``fit``, one for each output and law).
+        (``hold``), ``rate_and_state`` (``fit``, one for each output and law), ``creep``
+        (``force_stage``) and ``ramps`` (``ramp``).
     """
     fits: list[dict[str, Any]] = []
     analysed = []
     for number, one in enumerate(experiments):
-        mine = _fits(one, number, free_stiffness) if with_fit else []
+        has_fit = with_fit and not one.is_forced
+        mine = _fits(one, number, free_stiffness) if has_fit else []
         fits += mine
         analysed.append(one.without_trend(fitted_trend(mine)) if one.is_measured else one)
     numbered = list(enumerate(analysed))
@@ -111,9 +126,13 @@ def response_of(
         "steady": [row for number, one in numbered for row in steady_rows(one, number)],
         "steps": [row for number, one in numbered for row in step_rows(one, number)],
         "holds": [row for number, one in numbered for row in hold_rows(one, number)],
+        "creep": [row for number, one in numbered for row in creep_rows(one, number)],
+        "ramps": [row for number, one in numbered for row in ramp_rows(one, number)],
     }
     steady = _dataset(STEADY, "velocity_stage", rows["steady"])
     holds = _dataset(HOLDS, "hold", rows["holds"])
+    creep = _dataset(CREEP, "force_stage", rows["creep"])
+    ramps = _dataset(RAMPS, "ramp", rows["ramps"])
     names = {one.apparatus.force_name for one in experiments}
     if len(names) > 1:
         raise FileError(
@@ -132,6 +151,14 @@ def response_of(
             Group(HOLDS, **HEALING_LINE),
         ),
         "rate_and_state": (_dataset(FIT, "fit", fits), FIT),
+        "creep": (
+            creep.assign(_line_variables(CREEP_LINE, creep_line(creep))),
+            Group(CREEP, **CREEP_LINE),
+        ),
+        "ramps": (
+            ramps.assign(_line_variables(FRICTION_LINE, friction_line(ramps))),
+            Group(RAMPS, **FRICTION_LINE),
+        ),
     }
     # Unknown without a configuration.
     static = {one.static_force for one in experiments if not math.isnan(one.static_force)}
@@ -239,7 +266,8 @@ def write_csv(tree: xr.DataTree, path: Path) -> None:
     """Write a response as one table with a row for each stage.
 
     A stage at constant velocity has the columns of ``steady``, and those of ``steps`` if it starts
-    with a step; a hold has those of ``holds``. The notes on steps have a column of their own.
+    with a step; a hold has those of ``holds``, a constant force those of ``creep``, a growing one
+    those of ``ramps``. The notes on steps have a column of their own.
 
     Raises
     ------
@@ -248,7 +276,7 @@ def write_csv(tree: xr.DataTree, path: Path) -> None:
     """
     units: dict[str, str] = {}
     table: dict[tuple[int, int], dict[str, Any]] = {}
-    for name in ("steady", "holds", "steps"):
+    for name in ("steady", "holds", "creep", "ramps", "steps"):
         data = tree.children[name].to_dataset()
         for row in rows_of(tree, name):
             here = table.setdefault((row["output_index"], row["stage_number"]), {})

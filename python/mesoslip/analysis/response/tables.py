@@ -117,6 +117,11 @@ def tables(tree: xr.DataTree) -> list[ResponseTable]:
     lines = {
         "steady": ("rate_dependence", "rate dependence a - b (slope over ln V)"),
         "holds": ("healing_per_decade", "healing per decade of hold time"),
+        "creep": ("creep_rate_dependence", "rate dependence a - b (slope of the force over ln V)"),
+        "ramps": (
+            "friction_rate_dependence",
+            "rate dependence of static friction (slope over ln of the force rate)",
+        ),
     }
     result = []
     several = len(tree.attrs["outputs"]) > 1
@@ -187,6 +192,27 @@ def _columns(
                 force("peak", "peak_force"),
                 force("healing", "healing"),
                 length("slip to peak", "slip_to_peak"),
+            ),
+        ),
+        "creep": (
+            "Creep under a constant force",
+            (
+                *stages,
+                force("force", "force"),
+                _Column("velocity", "velocity", "m/s", "velocity_error"),
+                _Column("displacement", "displacement", "m"),
+                _Column("transient", "transient_time", "s"),
+            ),
+        ),
+        "ramps": (
+            "Static friction under a growing force",
+            (
+                *stages,
+                _Column("force rate", "force_rate", "N/s", digits=3),
+                _Column("hold time", "hold_time", "s", is_optional=True),
+                force("static friction", "static_friction"),
+                _Column("time to slide", "slide_time", "s", digits=3),
+                _Column("displacement", "displacement", "m", digits=3),
             ),
         ),
         "rate_and_state": (

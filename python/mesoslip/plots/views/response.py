@@ -13,6 +13,7 @@ from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit, record_of
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
+from mesoslip.plots.forced_response import draw_forced
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.record import draw_record, title_record
@@ -120,11 +121,14 @@ def _scale(data: xr.Dataset, name: str) -> float:
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
     """The record with the law that fits better; steady forces; healing in holds.
 
-    Of a measured trace: residuals, and a - b against velocity, instead of steady forces.
+    Of a measured trace: residuals, and a - b against velocity, instead of steady forces. Of a
+    slider under a force: displacement, velocities of creep, static friction.
     """
     experiment = Experiment(tree)
     if experiment.is_measured:
         return draw_measured(tree, experiment, figure)
+    if experiment.is_forced:
+        return draw_forced(tree, experiment, figure)
     found = response_of([experiment], with_fit=False)
     steady, holds = found["steady"].to_dataset(), found["holds"].to_dataset()
     velocities = steady["velocity"].values[np.isfinite(steady["steady_force"].values)]

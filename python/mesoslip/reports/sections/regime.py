@@ -13,7 +13,11 @@ def regime(subjects: Sequence[Subject]) -> Section:
     """The regime of the motion of each run."""
     blocks = []
     for subject in subjects:
-        results = regimes.results_of(regimes.regimes(subject.tree, subject.name))
-        text = regimes.summary(results)
+        found = regimes.regimes(subject.tree, subject.name)
+        text = (
+            f"in the last stage the slider {found.attrs['motion']}"
+            if "motion" in found.attrs
+            else regimes.summary(regimes.results_of(found))
+        )
         blocks.append(Text(named(subjects, subject, f"{text[:1].upper()}{text[1:]}.")))
     return Section("Regime", tuple(blocks))

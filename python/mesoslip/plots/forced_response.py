@@ -1,0 +1,118 @@
+"""The response to a drive by force: displacement, velocities of creep, static friction."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.response import creep_line, friction_line, response_of
+from mesoslip.configuration.config import Config
+from mesoslip.plots.record import MAX_MARKS
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles
+from mesoslip.quantities import scale_for, with_error
+from mesoslip.theory.thermal import steady_force
+
+# Samples of the displacement that are drawn, and velocities of the theory.
+MAX_DOTS, THEORY_POINTS = 20_000, 30
+
+
+def draw_forced(tree: xr.DataTree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
+    """Displacement over time; creep velocities with F(v) of the theory; static friction.
+
+    Parameters
+    ----------
+    tree
+        The output.
+    experiment
+        The same as an experiment, driven by a force.
+    figure
+        Where; a figure of its own by default.
+    """
+    found = response_of([experiment], with_fit=False)
+    creep, ramps = found["creep"].to_dataset(), found["ramps"].to_dataset()
+    creep = creep.isel(force_stage=creep["velocity"].values > 2 * creep["velocity_error"].values)
+    ramps = ramps.isel(ramp=np.isfinite(ramps["static_friction"].values))
+    drawn = ((_draw_creep, creep), (_draw_friction, ramps))
+    panels = [(draw, data) for draw, data in drawn if data["stage_number"].size]
+    with styled():
+        figure = canvas(figure, (6.5, 5.0 if panels else 3.0))
+        grid = figure.add_gridspec(2 if panels else 1, max(1, len(panels)))
+        _draw_displacement(figure.add_subplot(grid[0, :]), tree, experiment)
+        for column, (draw, data) in enumerate(panels):
+            draw(figure.add_subplot(grid[1, column]), experiment, data)
+    return figure
+
+
+def _draw_displacement(axes: Axes, tree: xr.DataTree, experiment: Experiment) -> None:
+    """Draw the displacement of each realization over time, and the starts of stages."""
+    step = max(1, experiment.time.size // MAX_DOTS)
+    length = scale_for(float(np.max(np.abs(experiment.displacement))), "m")
+    time = scale_for(float(experiment.time[-1]), "s")
+    x = experiment.time[::step] / time.size
+    for one in experiment.displacement[:, ::step]:
+        axes.plot(x, one / length.size, color="black", linewidth=0.6)
+    for stage in experiment.stages[1 : MAX_MARKS + 1]:
+        axes.axvline(stage.start / time.size, color="0.8", linewidth=0.5, zorder=0)
+    force = axes.twinx()
+    force.plot(x, experiment.force[0, ::step] / experiment.static_force, color=BLUE, linewidth=0.8)
+    force.set_ylabel("force over $F_s$", color=BLUE)
+    axes.set_xlabel(time.label("time"))
+    axes.set_ylabel(length.label("displacement"))
+    titles(axes, tree)
+
+
+def _draw_creep(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
+    """Draw the force over the velocity of creep, and the steady force of the theory."""
+    velocity, force = data["velocity"].values, data["force"].values / experiment.static_force
+    unit = scale_for(float(np.max(velocity)), "m/s")
+    is_steady = data["is_steady"].values == 1
+    error = data["velocity_error"].values / unit.size
+    for chosen, colour in ((is_steady, "black"), (~is_steady, "0.7")):
+        axes.errorbar(
+            velocity[chosen] / unit.size,
+            force[chosen],
+            xerr=error[chosen],
+            fmt="o",
+            color=colour,
+            markersize=3,
+        )
+    config = experiment.config
+    if config is not None and _is_known(config):
+        grid = np.geomspace(0.5 * velocity.min(), 2 * velocity.max(), THEORY_POINTS)
+        theory = np.array([steady_force(config, one) for one in grid]) / experiment.static_force
+        axes.plot(grid / unit.size, theory, color=RED, label="steady force $F(v)$, theory")
+        axes.legend(loc="upper left")
+    axes.set_xscale("log")
+    line = creep_line(data)
+    if line is not None:
+        scale = 1 / experiment.static_force
+        slope = with_error(line.slope * scale, line.slope_error * scale)
+        axes.set_title(f"$dF/d\\ln v$ = {slope} $F_s$", loc="left")
+    axes.set_xlabel(unit.label("velocity of creep"))
+    axes.set_ylabel("force over $F_s$")
+
+
+def _is_known(config: Config) -> bool:
+    """Whether the theory has the steady force."""
+    contacts = config.contacts
+    return contacts.thermal is not None and contacts.newborn_width == 0 and contacts.reattach
+
+
+def _draw_friction(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
+    """Draw the static friction over the rate of the force, with a line."""
+    scale = 1 / experiment.static_force
+    rate, friction = data["force_rate"].values, data["static_friction"].values
+    unit = scale_for(float(np.max(rate)), "N/s")
+    error = np.nan_to_num(data["static_friction_error"].values) * scale
+    axes.errorbar(rate / unit.size, friction * scale, error, fmt="o", color="black", markersize=3)
+    axes.set_xscale("log")
+    line = friction_line(data)
+    if line is not None:
+        ends = np.array([rate.min(), rate.max()])
+        axes.plot(ends / unit.size, (line.level + line.slope * np.log(ends)) * scale, color=RED)
+        slope = with_error(line.slope * scale, line.slope_error * scale)
+        axes.set_title(f"slope over ln of the rate = {slope} $F_s$", loc="left")
+    axes.set_xlabel(unit.label("rate of the force"))
+    axes.set_ylabel("static friction over $F_s$")

@@ -1,0 +1,98 @@
+"""The response of a slider under a force: creep, static friction, the motion in words."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import mesoslip
+import pytest
+from conftest import klein_tables
+from mesoslip import Config
+from mesoslip.analysis.response import rows_of, scalars_of
+from mesoslip.theory.thermal import creep_velocity, steady_slope
+
+SLIDER = {"kind": "force", "mass": 1.47e-3, "damping": 500.0}
+
+
+@pytest.fixture(scope="module")
+def creep():
+    """Activated contacts under two constant forces."""
+    tables = klein_tables(
+        slider=SLIDER,
+        drive={"stage": [{"duration": 8.0, "force": 7.6e-6}, {"duration": 8.0, "force": 8.2e-6}]},
+        run={"duration": 16.0},
+        output={"interval": 5e-3},
+        contacts__coupling="equal",
+        contacts__count=2000,
+        contacts__delay=0.0,
+        contacts__back_force_ratio=0.0,
+        contacts__threshold__relative_width=0.3,
+        contacts__thermal={"rate": 1e4, "force_ratio": 0.04},
+    )
+    return Config.from_dict(tables)
+
+
+@pytest.fixture(scope="module")
+def creeping(creep):
+    return mesoslip.run(creep)
+
+
+def test_creep_velocities_are_those_of_the_theory(creep, creeping):
+    found = mesoslip.response(creeping)
+    rows = rows_of(found, "creep")
+    assert [row["force"] for row in rows] == pytest.approx([7.6e-6, 8.2e-6])
+    for row in rows:
+        expected = creep_velocity(creep, row["force"])
+        assert abs(row["velocity"] - expected) < 4 * row["velocity_error"] < 0.4 * expected
+    slope = scalars_of(found, "creep")["creep_rate_dependence"]
+    assert slope == pytest.approx(steady_slope(creep, rows[0]["velocity"]), rel=0.2)
+    for name in ("steady", "steps", "holds", "ramps", "rate_and_state"):
+        assert not rows_of(found, name)
+
+
+def test_the_regime_of_creep_is_smooth_and_said_in_words(creeping, tmp_path, command):
+    found = mesoslip.regime(creeping)
+    assert found["regime"].item() == 0
+    assert found.attrs["motion"].startswith("creeps at")
+    path = tmp_path / "creep.nc"
+    creeping.to_netcdf(path)
+    _, printed, _ = command("regime", path)
+    assert "creeps at" in printed
+    assert "stick-slip" not in printed
+    _, printed, _ = command("response", path, "--json")
+    assert len(json.loads(printed)["creep"]) == 2
+
+
+def test_static_friction_is_the_maximum_of_the_force_curve(klein):
+    """Of contacts without temperature, at any slow rate; the second ramp stays below it."""
+    stages = [
+        {"duration": 0.5, "start_force": 0.0, "end_force": 2e-6},
+        {"duration": 0.3, "force": 1e-6},
+        {"duration": 2.0, "start_force": 1e-6, "end_force": 1.8e-5},
+    ]
+    config = klein(
+        slider=SLIDER,
+        drive={"stage": stages},
+        run={"duration": 2.8, "realizations": 2},
+        contacts__coupling="equal",
+        contacts__threshold__relative_width=0.2,
+    )
+    tree = mesoslip.run(config)
+    found = mesoslip.response(tree)
+    below, above = rows_of(found, "ramps")
+    assert "does not slide" in below["note"]
+    assert math.isnan(below["static_friction"])
+    peak = mesoslip.curve(config).attrs["F_peak"]
+    assert above["static_friction"] == pytest.approx(peak, rel=0.01)
+    assert above["hold_time"] == pytest.approx(0.3)
+    assert above["force_rate"] == pytest.approx(8.5e-6)
+    regime = mesoslip.regime(tree)
+    assert regime.attrs["motion"].startswith("slides from")
+    assert set(regime["regime"].values) == {3}
+
+
+def test_the_picture_shows_displacement_and_creep(creeping, tmp_path):
+    path = tmp_path / "creep.svg"
+    mesoslip.plot(creeping, path, view="response")
+    assert path.stat().st_size > 10_000

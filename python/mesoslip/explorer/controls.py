@@ -222,6 +222,10 @@ CONTROLS = (
     Control(
         "contacts.ageing.young_relative_width", "width of the young", "Ageing", 1, (1e-3, 1), 0.1
     ),
+    Control("contacts.thermal.rate", "rate at the threshold ω_0", "Temperature", 3),
+    Control("contacts.thermal.force_ratio", "force f_T/f_s", "Temperature", 1.5, (1e-3, 1)),
+    Control("contacts.thermal.temperature", "temperature", "Temperature", 1),
+    Control("contacts.thermal.activation_length", "activation length x_a", "Temperature", 1),
     Control(
         "interaction.lattice",
         "lattice",

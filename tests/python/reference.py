@@ -59,11 +59,34 @@ REFUSED = {
     ("me", slider, contacts) for slider in SLIDERS for contacts in ("lattice", "thermal")
 } | {("me", "quasistatic", contacts) for contacts in CONTACTS}
 
+# Further ways to attach and to pull, in both engines.
+FORCE = {
+    "slider": {"kind": "force", "mass": 1.47e-3, "damping": 50.0},
+    "drive": {
+        "stage": [
+            {"duration": 0.03, "start_force": 0.0, "end_force": 2.2e-5},
+            {"duration": 0.02, "force": 1.0e-5},
+        ]
+    },
+}
+FURTHER: dict[str, dict[str, Any]] = {
+    "rigid-delays": SLIDERS["rigid"] | {"contacts__delay_law": "exponential"},
+    "rigid-newborn": SLIDERS["rigid"] | {"contacts__newborn_width": 0.05},
+    "rigid-table": SLIDERS["rigid"]
+    | {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}},
+    "force": FORCE,
+}
+
 Case = Callable[[], xr.DataTree]
 
 
 def _run(**changes: Any) -> Case:
     return lambda: mesoslip.run(klein_tables(**changes))
+
+
+def _without(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Tables without keys of those that are given whole."""
+    return {key: one for key, one in tables.items() if key.rpartition("__")[0] not in changes}
 
 
 def _theory(function: Callable[..., xr.DataTree], **changes: Any) -> Case:
@@ -73,17 +96,24 @@ def _theory(function: Callable[..., xr.DataTree], **changes: Any) -> Case:
     )
 
 
-CASES: dict[str, Case] = {
-    f"{engine}-{slider}-{contacts}": _run(
-        **COMMON, **ENGINES[engine], **SLIDERS[slider], **CONTACTS[contacts]
-    )
-    for engine, slider, contacts in itertools.product(ENGINES, SLIDERS, CONTACTS)
-    if (engine, slider, contacts) not in REFUSED
-} | {
-    f"{function.__name__}-{coupling}": _theory(function, contacts__coupling=coupling)
-    for function in (mesoslip.curve, mesoslip.onset)
-    for coupling in ("scaled", "equal")
-}
+CASES: dict[str, Case] = (
+    {
+        f"{engine}-{slider}-{contacts}": _run(
+            **COMMON, **ENGINES[engine], **SLIDERS[slider], **CONTACTS[contacts]
+        )
+        for engine, slider, contacts in itertools.product(ENGINES, SLIDERS, CONTACTS)
+        if (engine, slider, contacts) not in REFUSED
+    }
+    | {
+        f"{engine}-{name}": _run(**(_without(COMMON, changes) | ENGINES[engine] | changes))
+        for engine, (name, changes) in itertools.product(ENGINES, FURTHER.items())
+    }
+    | {
+        f"{function.__name__}-{coupling}": _theory(function, contacts__coupling=coupling)
+        for function in (mesoslip.curve, mesoslip.onset)
+        for coupling in ("scaled", "equal")
+    }
+)
 
 # How much of the greatest value in the reference each variable may differ by: another compiler may
 # change the last digits, not more.

@@ -109,6 +109,13 @@ def test_holds_in_which_newborn_contacts_break_are_refused():
         hold_force(config, 1e-2, 1e6)
 
 
+def test_a_newborn_width_is_refused():
+    config = unit(1, contacts__newborn_width=0.05)
+    for function in (steady_force, steady_slope, creep_velocity):
+        with pytest.raises(MesoslipError, match="newborn_width"):
+            function(config, 0.1)
+
+
 def klein_activated(rate: float, ratio: float, ageing: dict | None = None, **changes) -> Config:
     tables = Config.load("runs/klein.toml").to_dict()
     contacts = tables["contacts"]

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.errors import MesoslipError
 from mesoslip.theory import ageing
 from mesoslip.theory.thresholds import threshold_quadrature
 
@@ -58,6 +59,11 @@ class ActivatedLives:
     threshold_panel
         Length of the panels over thresholds, over f_T; as `coarseness` by default.
 
+    Raises
+    ------
+    MesoslipError
+        If contacts attach with forces of a distribution (``contacts.newborn_width``).
+
     Attributes
     ----------
     weight
@@ -81,6 +87,11 @@ class ActivatedLives:
     ) -> None:
         contacts, thermal = config.contacts, config.contacts.thermal
         assert thermal is not None
+        if contacts.newborn_width > 0:
+            raise MesoslipError(
+                "the friction of activated contacts is known without contacts.newborn_width: they "
+                "must attach with one force"
+            )
         self.config = config
         self.speed = velocity / contacts.break_stretch
         """Stretch in a second."""

@@ -4,6 +4,7 @@ from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
 from .api import run
+from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
@@ -45,6 +46,7 @@ __all__ = [
     "example",
     "export",
     "fit",
+    "mean_field",
     "onset",
     "open_output",
     "plot",

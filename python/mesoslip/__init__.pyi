@@ -8,6 +8,7 @@ from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
+from .cycles.branch import branches
 from .cycles.cycle import Cycle, cycle
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
@@ -39,6 +40,7 @@ __all__ = [
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "branches",
     "compare_fits",
     "curve",
     "cycle",

@@ -23,6 +23,8 @@ module mesoslip_interface_law
       real(wp) :: drag = 0.0_wp
       !> Rate of the force by what attaches, none where contacts are counted one by one [N/s]
       real(wp) :: rate = 0.0_wp
+      !> Force below which the law does not tell oscillation from rest [N]
+      real(wp) :: tolerance = 0.0_wp
    end type interface_law_type
 
    !> The law holds while the slider is between two displacements, until a time.

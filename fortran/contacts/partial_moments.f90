@@ -2,6 +2,8 @@
 module mesoslip_contacts_partial_moments
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_quadrature, only: gauss_legendre
+   use mesoslip_contacts_threshold_coordinate, only: new_threshold_coordinate, &
+      & threshold_coordinate_type
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
@@ -13,19 +15,13 @@ module mesoslip_contacts_partial_moments
    !> Probability that a threshold is outside of the table, on either side
    real(wp), parameter :: outside = 1.0e-17_wp
 
-   !> Coordinates in which a table is uniform: u, its root for laws that come close to 0, where
-   !> moments may be singular, and its logarithm for laws that do so themselves
-   integer, parameter :: linear = 1, root = 2, logarithmic = 3
-   !> Least threshold of laws that do not come close to 0
-   real(wp), parameter :: close = 0.1_wp
-
    !> Partial moments of some orders.
    type :: partial_moments_type
       !> Thresholds at or below do not occur, nor do those above
       real(wp) :: min_threshold = 0.0_wp, max_threshold = 0.0_wp
       class(threshold_law_type), allocatable, private :: law
       !> In which coordinate the table is uniform
-      integer, private :: coordinates = linear
+      type(threshold_coordinate_type) :: coordinate
       real(wp), private :: first = 0.0_wp, step = 1.0_wp
       !> Correction of the density for what the table leaves out
       real(wp), private :: scale = 1.0_wp
@@ -36,13 +32,14 @@ module mesoslip_contacts_partial_moments
       real(wp), allocatable, private :: table(:, :, :)
       !> Of a law with a constant density in cells, for which there is no table: edges of the cells,
       !> density in each, and moments above each edge, shape (orders, edges)
-      real(wp), allocatable, private :: edge(:), cell_density(:), above_edge(:, :)
+      real(wp), allocatable :: edge(:), cell_density(:)
+      real(wp), allocatable, private :: above_edge(:, :)
    contains
       !> Moments above a threshold, to rounding
       procedure, non_overridable :: above
       !> Moments above a threshold by interpolation, to about 1e-12
       procedure, non_overridable :: interpolate
-      procedure, non_overridable, private :: coordinate, density, sum_cells, above_in_cells
+      procedure, non_overridable, private :: density, sum_cells, above_in_cells
    end type partial_moments_type
 
 contains
@@ -67,13 +64,9 @@ contains
          call self%sum_cells()
          return
       end if
-      if (law%is_logarithmic) then
-         self%coordinates = logarithmic
-      else if (self%min_threshold < close) then
-         self%coordinates = root
-      end if
-      self%first = self%coordinate(self%min_threshold)
-      self%step = (self%coordinate(self%max_threshold) - self%first) / cells
+      self%coordinate = new_threshold_coordinate(law%is_logarithmic, self%min_threshold)
+      self%first = self%coordinate%at(self%min_threshold)
+      self%step = (self%coordinate%at(self%max_threshold) - self%first) / cells
       call gauss_legendre(self%point, self%weight)
 
       allocate (self%table(size(exponent), 2, cells + 1))
@@ -174,17 +167,6 @@ contains
       end if
    end function power_integral
 
-   !> Coordinate of a threshold in which the table is uniform.
-   elemental function coordinate(self, threshold)
-      class(partial_moments_type), intent(in) :: self
-      real(wp), intent(in) :: threshold
-      real(wp) :: coordinate
-
-      coordinate = threshold
-      if (self%coordinates == root) coordinate = sqrt(threshold)
-      if (self%coordinates == logarithmic) coordinate = log(threshold)
-   end function coordinate
-
    !> Density of each moment over the coordinate of the table.
    pure function density(self, coordinate)
       class(partial_moments_type), intent(in) :: self
@@ -193,12 +175,9 @@ contains
 
       real(wp) :: threshold
 
-      threshold = coordinate
-      if (self%coordinates == root) threshold = coordinate**2
-      if (self%coordinates == logarithmic) threshold = exp(coordinate)
-      density = self%scale * self%law%density(threshold) * threshold**self%exponent
-      if (self%coordinates == root) density = density * 2.0_wp * coordinate
-      if (self%coordinates == logarithmic) density = density * threshold
+      threshold = self%coordinate%threshold(coordinate)
+      density = self%scale * self%law%density(threshold) * threshold**self%exponent &
+         & * self%coordinate%slope(coordinate)
    end function density
 
    !> Moments above a threshold.
@@ -223,7 +202,7 @@ contains
       end if
       place = 0.0_wp
       if (threshold > self%min_threshold) then
-         place = (self%coordinate(threshold) - self%first) / self%step
+         place = (self%coordinate%at(threshold) - self%first) / self%step
       end if
       cell = min(int(place), cells - 1) + 1
       moment = self%table(:, 1, cell + 1)
@@ -254,7 +233,7 @@ contains
       else if (allocated(self%edge)) then
          call self%above_in_cells(threshold, moment)
       else
-         place = (self%coordinate(threshold) - self%first) / self%step
+         place = (self%coordinate%at(threshold) - self%first) / self%step
          cell = min(int(place), cells - 1)
          call hermite(size(moment), cells + 1, self%table, cell, place - cell, moment)
       end if

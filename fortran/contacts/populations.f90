@@ -8,6 +8,7 @@ module mesoslip_contacts_populations
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts
+   use mesoslip_contacts_mechanics, only: coupling_equal
    use mesoslip_contacts_populations_offer, only: offer_step
    use mesoslip_contacts_populations_packets, only: new_detached_packets
    use mesoslip_contacts_populations_pinned, only: new_pinned_populations
@@ -18,7 +19,7 @@ module mesoslip_contacts_populations
    private
 
    public :: contact_populations_type, new_contact_populations, make_contact_populations
-   public :: make_ageing_populations
+   public :: make_ageing_populations, make_activated_populations
 
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: max_attached_part = 0.1_wp
@@ -112,6 +113,38 @@ contains
       call move_alloc(populations, contacts)
    end subroutine make_ageing_populations
 
+   !> Set up populations that break by thermal activation from named numbers.
+   subroutine make_activated_populations(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: resolution, rate and force of activation
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_populations_type), allocatable :: populations
+      real(wp) :: resolution, rate, force
+
+      call parameters%take("resolution", resolution, error)
+      call parameters%take("activation_rate", rate, error)
+      call parameters%take("activation_force", force, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
+      if (.not. (rate > 0.0_wp .and. force > 0.0_wp &
+         & .and. common%coupling == coupling_equal)) then
+         call raise(error, status_invalid, "activation needs equal contacts, and a positive rate " &
+            & // "and force")
+         return
+      end if
+      allocate (populations)
+      call new_contact_populations(populations, common, resolution, error)
+      if (allocated(error)) return
+      call populations%pinned%activate(rate, force / common%static_force, resolution)
+      call move_alloc(populations, contacts)
+   end subroutine make_activated_populations
+
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state)
       !> The populations
@@ -191,6 +224,10 @@ contains
       call exchange_contacts(self, archive)
       call self%pinned%exchange(archive)
       call self%detached%exchange(archive)
+      if (.not. self%pinned%is_activated) return
+      call archive%exchange("last_duration", self%last_duration)
+      call archive%exchange("last_velocity", self%last_velocity)
+      call archive%exchange("excess", self%excess)
    end subroutine exchange
 
    !> Nothing is derived from the state: all of it is in the archive.

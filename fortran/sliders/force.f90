@@ -11,7 +11,7 @@ module mesoslip_sliders_force
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, slider_type
-   use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
+   use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, second_integral
    use mesoslip_step_filter, only: step_filter_type
    implicit none
@@ -23,6 +23,9 @@ module mesoslip_sliders_force
    !> series leaves out is less than 1e-16 of its leading terms.
    integer, parameter :: terms = 17
    real(wp), parameter :: max_step = 0.5_wp
+   !> Duration of a step over the time of an oscillation, per radian, beyond which one that the
+   !> contact force does not resolve counts as none
+   real(wp), parameter :: long_time = 2.0_wp
    !> Points of the rule for the losses of a step
    integer, parameter :: nodes = 6
    !> Forces that differ by this part are equal up to rounding.
@@ -95,22 +98,18 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
-      type(window_type) :: bounds
       real(wp) :: force, step
 
       self%law = law
       self%step_time = self%time
       self%start_displacement = self%displacement
-      bounds = window
-      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
-         & self%acceleration, bounds)
       force = self%drive%at(self%time)
       self%start_acceleration = acceleration_under(self, force, 0.0_wp)
 
-      if (is_settled(self, force)) then
-         call glide(self, bounds, step)
+      if (is_settled(self, force, window%end_time - self%time)) then
+         call glide(self, window, step)
       else
-         call move(self, bounds, step)
+         call move(self, window, step)
       end if
 
       call add_work(self, force, step)
@@ -140,12 +139,12 @@ contains
       velocity = (self%drive%rate - self%law%rate) / self%law%stiffness
    end function creep_velocity
 
-   !> Whether the motion differs from uniform creep by rounding only. Contacts that hold the slider
-   !> and a damper bring it there.
-   pure function is_settled(self, force) result(settled)
+   !> Whether the motion differs from uniform creep by rounding only, or by what the contact force
+   !> does not resolve. Contacts that hold the slider and a damper bring it there.
+   pure function is_settled(self, force, step) result(settled)
       type(slider_force_type), intent(in) :: self
-      !> Force [N]
-      real(wp), intent(in) :: force
+      !> Force [N], and duration of the step [s]
+      real(wp), intent(in) :: force, step
       logical :: settled
 
       real(wp) :: noise
@@ -155,10 +154,23 @@ contains
          & .and. self%law%drag + self%mass * self%damping > 0.0_wp)) return
       noise = rounding * (abs(force) + abs(self%law%stiffness * self%displacement) &
          & + abs(self%law%offset))
+      if (is_long(self, step)) noise = max(noise, self%law%tolerance)
       settled = self%mass * abs(self%start_acceleration) <= noise &
          & .and. sqrt(self%mass * self%law%stiffness) &
          & * abs(self%velocity - creep_velocity(self)) <= noise
    end function is_settled
+
+   !> Whether a step is so long that an oscillation which the contact force does not resolve counts
+   !> as none.
+   pure function is_long(self, step)
+      type(slider_force_type), intent(in) :: self
+      !> Duration [s]
+      real(wp), intent(in) :: step
+      logical :: is_long
+
+      is_long = self%law%tolerance > 0.0_wp &
+         & .and. step * sqrt(abs(self%law%stiffness) * self%inverse_mass) > long_time
+   end function is_long
 
    !> Creep uniformly to the first end of the window.
    subroutine glide(self, window, step)
@@ -170,11 +182,14 @@ contains
       real(wp) :: velocity, gap, target, longest
       logical :: crosses, is_due
 
+      step = window%end_time - self%time
       velocity = creep_velocity(self)
+      ! The slider comes to where it is in balance at the end of the step.
+      if (is_long(self, step)) velocity = velocity &
+         & + self%start_acceleration * self%mass / (self%law%stiffness * step)
       self%velocity = velocity
       self%series = 0.0_wp
       self%series(0) = velocity
-      step = window%end_time - self%time
       target = merge(window%upper, window%lower, velocity > 0.0_wp)
       gap = abs(target - self%displacement)
       longest = step

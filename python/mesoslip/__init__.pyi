@@ -4,11 +4,9 @@ from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
 from .api import run
-from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
-from .cycles.branch import branches
 from .cycles.cycle import Cycle, cycle
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
@@ -40,7 +38,6 @@ __all__ = [
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
-    "branches",
     "compare_fits",
     "curve",
     "cycle",
@@ -48,7 +45,6 @@ __all__ = [
     "example",
     "export",
     "fit",
-    "mean_field",
     "onset",
     "open_output",
     "plot",

@@ -73,10 +73,12 @@ def draw(random: Random) -> Tables:
     duration = min(stretch * loading / speed * random.uniform(0.3, 5), most)
     _drive(random, tables, duration, speed)
     tables["output"] = _output(random, tables, duration)
-    if engine == "eq" and not interaction.get("strength") and random.random() < THERMAL:
+    if not interaction.get("strength") and random.random() < THERMAL:
         contacts["coupling"] = "equal"
         contacts["thermal"] = _thermal(random, contacts, speed / stretch, duration)
-        if not interaction and random.random() < 0.4:
+        if engine == "me":
+            contacts["initial"] = random.choice(["relaxed", "steady"])
+        elif not interaction and random.random() < 0.4:
             contacts["ageing"] = _ageing(random, contacts, duration)
     return tables
 

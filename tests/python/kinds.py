@@ -118,6 +118,13 @@ KINDS: dict[str, dict[str, Any]] = {
     "layered, thermal": THERMAL | {"slider": LAYERED | {"base": BASE}},
     "layered, thermal, adams": THERMAL | {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "quasistatic, thermal": THERMAL | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
+    "rigid, thermal, me": THERMAL | {"run__engine": "me"},
+    "rigid, thermal, me, newborn width": THERMAL | NEWBORN | RANDOM | {"run__engine": "me"},
+    "prescribed, thermal, me, table": THERMAL
+    | TABLE
+    | {"run__engine": "me", "slider": {"kind": "prescribed"}},
+    "layered, thermal, me": THERMAL | {"run__engine": "me", "slider": LAYERED | {"base": BASE}},
+    "force, thermal, me": FORCE | THERMAL | {"run__engine": "me"},
     "rigid, thermal, ageing": AGEING | THERMAL,
     "prescribed, thermal, ageing, log": AGEING
     | THERMAL

@@ -55,9 +55,9 @@ CONTACTS: dict[str, dict[str, Any]] = {
 }
 ENGINES: dict[str, dict[str, Any]] = {"eq": {}, "me": {"run__engine": "me"}}
 # Infinitely many contacts have no neighbours; without inertia their force is that of the curve.
-REFUSED = {
-    ("me", slider, contacts) for slider in SLIDERS for contacts in ("lattice", "thermal")
-} | {("me", "quasistatic", contacts) for contacts in CONTACTS}
+REFUSED = {("me", slider, "lattice") for slider in SLIDERS} | {
+    ("me", "quasistatic", contacts) for contacts in CONTACTS
+}
 
 # Further ways to attach and to pull, in both engines.
 FORCE = {

@@ -70,7 +70,7 @@ def main(sweep: Path, file: Path) -> None:
     above.plot([], [], "_", color="black", label="mean force")
     above.set(ylabel="peaks of the spring force / $F_s$")
     above.legend()
-    below.set(xlabel="velocity of the drive, µm/s", ylabel="amplitude / static force", yscale="log")
+    below.set(xlabel="velocity of the drive, µm/s", ylabel="amplitude / mean", yscale="log")
     figure.savefig(file, dpi=100)
 
 

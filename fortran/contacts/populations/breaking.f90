@@ -3,9 +3,11 @@
 !> It is tried first: the slider is offered a force by what will break. It breaks when the slider
 !> has come there.
 module mesoslip_contacts_populations_breaking
+   use mesoslip_contacts_populations_survivors, only: no_level
    use mesoslip_contacts_mechanics, only: broken_threshold
    use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
-      & column_broken, column_force, column_law, column_origin, column_weight, compliant, lost, &
+      & column_broken, column_force, column_law, column_level, column_origin, column_weight, &
+      & compliant, lost, &
       & massive, moments_length, number, population_rows_type, stiff
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -28,15 +30,19 @@ module mesoslip_contacts_populations_breaking
       !> The displacement [m], time [s] and direction
       real(wp) :: end = 0.0_wp, time = 0.0_wp, direction = 1.0_wp
       !> The populations of which contacts break, their forces at attaching along the direction,
-      !> the distances from there, the thresholds below which they will have broken, what the
-      !> moments will be, and twice the energy that is lost; shape (count, or more)
+      !> the distances from there, the thresholds below which they will have broken, the levels of
+      !> their hazards, what the moments will be, and twice the energy that is lost; shape (count,
+      !> or more)
       integer :: count = 0
       integer, allocatable :: population(:)
-      real(wp), allocatable :: force(:), distance(:), broken(:), moments(:, :), lost(:)
+      real(wp), allocatable :: force(:), distance(:), broken(:), level(:), moments(:, :), lost(:)
       !> Breaks, and their mass; work that need not be done for them [J]
       real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp
-      !> What the contacts would sum_forces at the end [N], and how far it is [m]
+      !> Force at the end that the contacts which break would bear [N], and how far it is [m]
       real(wp) :: drop = 0.0_wp, reach = 0.0_wp
+      !> Of all these the breaks, work and force of contacts that come to their thresholds; those of
+      !> the others go with the time, not with the displacement
+      real(wp) :: cut_breaks = 0.0_wp, cut_work = 0.0_wp, cut_drop = 0.0_wp
       !> Where the next population breaks [m]
       real(wp) :: next = 0.0_wp
    end type trial_type
@@ -54,8 +60,9 @@ module mesoslip_contacts_populations_breaking
       procedure, non_overridable :: forget_trial
       !> Break what was found to break
       procedure, non_overridable :: break_tried
-      procedure, non_overridable, private :: make_room_to_try, list_breaking, find_thresholds, &
-         & find_moments, sum_breaks, more_lost
+      procedure, non_overridable :: make_room_to_try
+      procedure, non_overridable, private :: list_breaking, find_thresholds, find_moments, &
+         & sum_breaks, more_lost, remove_empty
    end type breaking_populations_type
 
 contains
@@ -188,6 +195,9 @@ contains
          trial%mass = mass
          trial%work = work * self%parameters%static_force * self%stretch
          trial%drop = drop * self%parameters%static_force
+         trial%cut_breaks = trial%breaks
+         trial%cut_work = trial%work
+         trial%cut_drop = trial%drop
       end associate
    end subroutine sum_breaks
 
@@ -228,10 +238,11 @@ contains
       if (allocated(self%trial%population)) then
          if (size(self%trial%population) == rows) return
          deallocate (self%trial%population, self%trial%force, self%trial%distance, &
-            & self%trial%broken, self%trial%moments, self%trial%lost)
+            & self%trial%broken, self%trial%level, self%trial%moments, self%trial%lost)
       end if
       allocate (self%trial%population(rows), self%trial%force(rows), &
          & self%trial%distance(rows), self%trial%broken(rows))
+      allocate (self%trial%level(rows), source=no_level)
       allocate (self%trial%moments(moments_length, rows), self%trial%lost(rows))
    end subroutine make_room_to_try
 
@@ -296,6 +307,7 @@ contains
 
       self%trial%count = 0
       self%trial%breaks = 0.0_wp
+      self%trial%cut_breaks = 0.0_wp
       self%trial%mass = 0.0_wp
    end subroutine forget_trial
 
@@ -334,6 +346,7 @@ contains
                & * self%trial%lost(trial))
             self%left(:, row) = self%trial%moments(:, trial)
             population(row, column_broken) = self%trial%broken(trial)
+            population(row, column_level) = self%trial%level(trial)
             if (self%left(number, row) > 0.0_wp) then
                if (self%trial%direction > 0.0_wp) then
                   population(row, column_ahead) = self%trial%end
@@ -344,7 +357,7 @@ contains
                end if
                ahead = min(ahead, population(row, column_ahead))
                behind = max(behind, population(row, column_behind))
-            else
+            else if (.not. self%keeps_order) then
                population(row, :) = population(self%count, :)
                self%left(:, row) = self%left(:, self%count)
                self%count = self%count - 1
@@ -356,10 +369,31 @@ contains
       break_loss = energy
       self%ahead = ahead
       self%behind = behind
+      if (self%keeps_order) call self%remove_empty()
       if (self%count == 0) then
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
       end if
    end subroutine break_tried
+
+   !> Remove populations of which no contact is left; the others keep their order.
+   subroutine remove_empty(self)
+      class(breaking_populations_type), intent(inout) :: self
+
+      integer :: row, kept
+
+      kept = 0
+      do row = 1, self%count
+         if (.not. self%left(number, row) > 0.0_wp) then
+            if (row > self%count - self%open_count) self%open_count = 0
+            cycle
+         end if
+         kept = kept + 1
+         if (kept == row) cycle
+         self%population(kept, :) = self%population(row, :)
+         self%left(:, kept) = self%left(:, row)
+      end do
+      self%count = kept
+   end subroutine remove_empty
 
 end module mesoslip_contacts_populations_breaking

@@ -6,6 +6,8 @@
 !> shifted so that it does the true work. Chords of successive steps meet, so that the slider is not
 !> shaken. The steps are of second order.
 module mesoslip_contacts_populations_offer
+   use mesoslip_contacts_populations_activated_step, only: expect_motion, look_ahead_activated, &
+      & max_growth, min_part, smooth_excess
    use mesoslip_contacts_populations_breaking, only: tiny_gap
    use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, &
       & time_to_move
@@ -20,8 +22,11 @@ module mesoslip_contacts_populations_offer
 
    !> Part of a step's length below which a slider creeps
    real(wp), parameter :: creeping_part = 0.01_wp
-   !> Part of a step's length over which breaks are looked for at least
-   real(wp), parameter :: min_part = 1.0e-3_wp
+   !> Duration of a step in which a slider may settle, over the time in which it oscillates, per
+   !> radian
+   real(wp), parameter :: settling_time = 8.0_wp
+   !> Part of a step's length by which a slider that hardly oscillates may go back
+   real(wp), parameter :: back_part = 0.1_wp
    !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates, per
    !> radian
    real(wp), parameter :: rate_part = 1.0_wp
@@ -38,40 +43,59 @@ contains
       !> Where it holds
       type(window_type), intent(out) :: window
 
-      real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack
-      logical :: breaks, moves
+      real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack, growing
+      logical :: breaks, moves, is_quiet
       type(expected_births_type) :: births
+      type(pose_type) :: expected
 
-      direction = pose%direction
-      if (.not. abs(pose%velocity) > 0.0_wp .and. abs(pose%acceleration) > 0.0_wp) then
-         direction = sign(1.0_wp, pose%acceleration)
+      expected = pose
+      is_quiet = .false.
+      if (self%pinned%is_activated) call expect_motion(self, pose, expected, is_quiet)
+      direction = expected%direction
+      if (.not. abs(expected%velocity) > 0.0_wp .and. abs(expected%acceleration) > 0.0_wp) then
+         direction = sign(1.0_wp, expected%acceleration)
       end if
       slack = tiny_gap * self%pinned%step
-      if (direction > 0.0_wp) then
+      if (is_quiet) slack = back_part * self%pinned%step
+      if (self%pinned%is_activated) then
+         breaks = self%pinned%count > 0
+      else if (direction > 0.0_wp) then
          breaks = self%pinned%ahead - pose%displacement <= slack
       else
          breaks = pose%displacement - self%pinned%behind <= slack
       end if
       call self%pinned%forget_trial()
 
-      span = time_to_move(pose, direction, self%pinned%step)
-      max_span = max_duration(self, pose)
+      span = time_to_move(expected, direction, self%pinned%step)
+      max_span = huge(1.0_wp)
+      if (.not. is_quiet) max_span = max_duration(self, pose)
       max_births = self%max_attached
-      if (max_span >= max_time .and. .not. distance_in(pose, direction, span) > 0.0_wp) then
+      if (max_span >= max_time .and. .not. distance_in(expected, direction, span) > 0.0_wp) then
          max_births = self%max_attached_at_rest
       end if
       self%max_fall_time = huge(1.0_wp)
       if (self%pinned%some_fall) self%max_fall_time = time_to_fall(self, pose, span)
       max_span = min(max_span, self%max_fall_time)
+      if (self%pinned%is_activated .and. breaks) then
+         ! As long as that a slider which hardly oscillates may settle.
+         growing = max_growth * min(self%last_duration, max_time)
+         if (is_quiet) growing = max(growing, settling_time / self%oscillation_rate(pose))
+         max_span = min(max_span, growing)
+      end if
       span = min(span, max_span)
       call self%detached%expect(pose%time, span, max_births, &
-         & breaks .and. distance_in(pose, direction, span) > 0.0_wp, births)
+         & breaks .and. distance_in(expected, direction, span) > 0.0_wp, births)
       span = min(span, births%end_time - pose%time)
-      distance = distance_in(pose, direction, span)
+      distance = distance_in(expected, direction, span)
       reach = max(distance, min_part * self%pinned%step)
       limit = self%pinned%step
-      if (breaks) call look_ahead(self, pose, direction, max_births, span, distance, reach, limit, &
-         & births)
+      if (breaks .and. self%pinned%is_activated) then
+         call look_ahead_activated(self, expected, direction, max_births, span, distance, reach, &
+            & limit, births)
+         max_span = span
+      else if (breaks) then
+         call look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
+      end if
       breaks = self%pinned%trial%count > 0
 
       moves = breaks .or. births%number > 0.0_wp
@@ -92,19 +116,20 @@ contains
             if (breaks) window%upper = reach
             window%upper = min(window%upper, reach)
             window%lower = pose%displacement
-            if (.not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
+            if (is_quiet .or. .not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
          else
             reach = pose%displacement - reach
             if (breaks) window%lower = reach
             window%lower = max(window%lower, reach)
             window%upper = pose%displacement
-            if (.not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
+            if (is_quiet .or. .not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
          end if
       end if
 
       law = self%law()
       self%detached_count = self%detached%number%total()
-      if (moves) call add_changes(self, pose, direction, span, distance, births, law)
+      if (moves) call add_changes(self, expected, direction, span, distance, births, law)
+      if (self%pinned%is_activated) call smooth_excess(self, window%end_time - pose%time, law)
       self%offered = law
       self%offers = .true.
    end subroutine offer_step
@@ -174,9 +199,7 @@ contains
 
       real(wp) :: rate
 
-      rate = sqrt(pose%own_rate**2 + max(0.0_wp, self%pinned%stiffness%total()) &
-         & * pose%inverse_mass) &
-         & + self%parameters%drag * max(0.0_wp, self%detached%mass%total()) * pose%inverse_mass
+      rate = self%oscillation_rate(pose)
       duration = huge(1.0_wp)
       if (rate > 1.0_wp / max_time) duration = self%resolution * rate_part / rate
    end function max_duration
@@ -191,22 +214,27 @@ contains
       type(expected_births_type), intent(in) :: births
       type(interface_law_type), intent(inout) :: law
 
-      real(wp) :: slope, rate, middle, mass, number, velocity
+      real(wp) :: slope, rate, middle, mass, number, velocity, heat
 
       associate (trial => self%pinned%trial, parameters => self%parameters)
          slope = 0.0_wp
          rate = 0.0_wp
+         heat = 0.0_wp
          middle = 0.0_wp
          mass = -births%mass - births%own_mass
          number = -births%number - births%own
          if (trial%count > 0) then
-            slope = -trial%drop / trial%reach
+            ! By activation contacts break evenly in time, at thresholds with the displacement.
+            heat = trial%drop - trial%cut_drop
+            slope = -trial%cut_drop / trial%reach
             ! The true force lies between those of the start and of the end. Contacts that attached
             ! in the step before may be due already, in no distance at all.
-            middle = 0.5_wp * trial%drop - trial%work / trial%reach
-            middle = max(-0.5_wp * abs(trial%drop), min(0.5_wp * abs(trial%drop), middle))
-            mass = mass + trial%mass * distance / trial%reach
-            number = number + trial%breaks * distance / trial%reach
+            middle = 0.5_wp * trial%cut_drop - trial%cut_work / trial%reach
+            middle = max(-0.5_wp * abs(trial%cut_drop), min(0.5_wp * abs(trial%cut_drop), middle))
+            mass = mass + (trial%mass - (trial%breaks - trial%cut_breaks)) &
+               & * distance / trial%reach + (trial%breaks - trial%cut_breaks)
+            number = number + trial%cut_breaks * distance / trial%reach &
+               & + (trial%breaks - trial%cut_breaks)
          end if
          slope = slope + 0.5_wp * self%pinned%newborn_stiffness * (births%number + births%own)
          middle = middle - self%pinned%newborn_stiffness * (births%number + births%own) * distance &
@@ -216,7 +244,7 @@ contains
          if (span > 0.0_wp .and. span < max_time) then
             velocity = max(0.0_wp, direction * (pose%velocity + span * pose%acceleration))
             rate = (births%number * parameters%static_force * self%pinned%newborn_force &
-               & + parameters%drag * mass * velocity) / span
+               & + parameters%drag * mass * velocity - heat) / span
          end if
          law%stiffness = law%stiffness + slope
          law%offset = law%offset + slope * pose%displacement - direction * middle

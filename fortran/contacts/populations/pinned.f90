@@ -5,9 +5,11 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
       & initial_steady, initial_uniform
    use mesoslip_contacts_partial_moments, only: new_partial_moments
-   use mesoslip_contacts_populations_breaking, only: breaking_populations_type, unresolved_part
-   use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
-      & new_population_rows, number, stiff
+   use mesoslip_contacts_populations_activated, only: activated_populations_type, joining_part
+   use mesoslip_contacts_populations_activation, only: new_activation
+   use mesoslip_contacts_populations_breaking, only: unresolved_part
+   use mesoslip_contacts_populations_rows, only: column_level, column_weight, compliant, &
+      & moments_length, new_population_rows, number, stiff
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -26,24 +28,27 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: reach = 6.0_wp
 
    !> Populations of pinned contacts.
-   type, extends(breaking_populations_type) :: pinned_populations_type
+   type, extends(activated_populations_type) :: pinned_populations_type
       !> Mean stiffness of a contact that attaches [N/m], and the energy it gains [J]
       real(wp) :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
       !> Mean relative force of a contact that attaches
       real(wp) :: newborn_force = 0.0_wp
       !> Forces with which contacts attach: how many there are, the relative forces, thresholds at
-      !> or below which a contact could not attach with each, and the shares of contacts
+      !> or below which a contact could not attach with each, the shares of contacts before those
+      !> thresholds are rejected, and those of contacts that attach
       integer, private :: classes = 1
       real(wp), private :: class_force(max_classes) = 0.0_wp, class_broken(max_classes) = 0.0_wp, &
-         & share(max_classes) = 1.0_wp
+         & share(max_classes) = 1.0_wp, newborn_share(max_classes) = 1.0_wp
    contains
       !> Let thresholds change with age
       procedure, non_overridable :: set_ageing
+      !> Let contacts break by thermal activation
+      procedure, non_overridable :: activate
       !> Prepare the populations for the start of a run
       procedure, non_overridable :: initialize
       !> Attach contacts as a population, or as one for each force
       procedure, non_overridable :: attach
-      procedure, non_overridable, private :: spread_newborns
+      procedure, non_overridable, private :: spread_newborns, may_join_last
    end type pinned_populations_type
 
 contains
@@ -60,7 +65,7 @@ contains
       real(wp) :: exponent(moments_length), one_over_stretch, all(moments_length)
 
       call new_population_rows(self, parameters)
-      self%step = step_part * resolution * min(parameters%law%width, max_spread) * self%stretch
+      self%step = step_length(parameters%law%width, resolution, self%stretch)
       if (parameters%coupling == coupling_scaled) self%step = 0.5_wp * self%step
 
       exponent = [0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp]
@@ -81,6 +86,27 @@ contains
       if (parameters%newborn_width > 0.0_wp) call self%spread_newborns()
    end subroutine new_pinned_populations
 
+   !> Maximum displacement in which one population attaches, of equal contacts.
+   pure function step_length(spread, resolution, stretch) result(length)
+      !> Spread of the breaking stretches, length of a step over it, and f_s/k [m]
+      real(wp), intent(in) :: spread, resolution, stretch
+      !> Length [m]
+      real(wp) :: length
+
+      length = step_part * resolution * min(spread, max_spread) * stretch
+   end function step_length
+
+   !> Let contacts break by thermal activation, which spreads their breaking stretches too.
+   subroutine activate(self, rate, width, resolution)
+      !> The populations, of equal contacts
+      class(pinned_populations_type), intent(inout) :: self
+      !> Rate of breaking at the threshold [1/s], f_T/f_s, and length of a step over the spread
+      real(wp), intent(in) :: rate, width, resolution
+
+      call self%set_activation(new_activation(rate, width, self%stretch))
+      self%step = step_length(hypot(self%parameters%law%width, width), resolution, self%stretch)
+   end subroutine activate
+
    !> Set the forces with which contacts attach, from a normal law cut off at the thresholds.
    subroutine spread_newborns(self)
       class(pinned_populations_type), intent(inout) :: self
@@ -99,6 +125,7 @@ contains
          call self%moments(1)%interpolate(self%class_broken(class), left(:, class))
       end do
       self%share = self%share / sum(self%share * left(number, :))
+      self%newborn_share = self%share * left(number, :)
       associate (static => self%parameters%static_force, force => self%class_force)
          self%newborn_stiffness = self%parameters%stiffness * sum(self%share * left(stiff, :))
          self%newborn_force = sum(self%share * left(number, :) * force)
@@ -164,24 +191,61 @@ contains
    end subroutine initialize
 
    !> Attach contacts as one population for each force, where they do on average.
-   subroutine attach(self, births, moment, direction, displacement, birth, time)
+   subroutine attach(self, births, moment, direction, displacement, birth, time, lost)
       !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> How many they are, the sum of their displacements [m], and the direction of their forces
       real(wp), intent(in) :: births, moment, direction
       !> Where the slider is [m], when the contacts attached on average, and when that is [s]
       real(wp), intent(in) :: displacement, birth, time
+      !> Elastic energy that is lost as contacts join others [J]
+      real(wp), intent(out) :: lost
 
+      real(wp) :: origin, force, level
       integer :: class
+      logical :: joins
 
       call self%stiffness%add(self%newborn_stiffness * births)
       call self%offset%add(self%newborn_stiffness * moment &
          & - self%parameters%static_force * births * (direction * self%newborn_force))
       self%last_birth = time
+      lost = 0.0_wp
+      origin = moment / births
+      joins = .false.
+      if (self%is_activated) joins = self%may_join_last(origin, direction)
       do class = 1, self%classes
-         call self%add(moment / births, direction * self%class_force(class), &
-            & self%share(class) * births, 1, self%class_broken(class), displacement, birth, time)
+         force = direction * self%class_force(class)
+         level = self%activation%newborn_level(time - birth, &
+            & force + 0.5_wp * (displacement - origin) / self%stretch)
+         if (joins) then
+            call self%join_last(self%count - self%classes + class, origin, &
+               & births * self%newborn_share(class), level, displacement, time, lost)
+         else
+            call self%add(origin, force, self%share(class) * births, 1, self%class_broken(class), &
+               & displacement, birth, time)
+            self%population(self%count, column_level) = level
+         end if
       end do
+      if (joins) return
+      self%open_count = self%classes
+      self%open_origin = origin
+      self%open_direction = direction
    end subroutine attach
+
+   !> Whether contacts that attach may join the last populations.
+   pure function may_join_last(self, origin, direction) result(joins)
+      class(pinned_populations_type), intent(in) :: self
+      !> Where they attach [m], and the direction of their forces
+      real(wp), intent(in) :: origin, direction
+      logical :: joins
+
+      integer :: row
+
+      joins = self%open_count == self%classes .and. self%open_direction * direction > 0.0_wp &
+         & .and. abs(origin - self%open_origin) <= joining_part * self%step
+      do row = self%count - self%open_count + 1, self%count
+         joins = joins .and. self%may_join(row)
+      end do
+   end function may_join_last
 
 end module mesoslip_contacts_populations_pinned

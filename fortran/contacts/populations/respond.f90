@@ -11,6 +11,9 @@ module mesoslip_contacts_populations_respond
 
    !> Populations whose work is that of one contact that breaks
    real(wp), parameter :: populations_per_cost = 16.0_wp
+   !> Duration of a step over the time in which the slider oscillates, per radian, beyond which its
+   !> motion is taken as even
+   real(wp), parameter :: even_time = 1.5_wp
 
 contains
 
@@ -21,30 +24,19 @@ contains
       !> Where the slider was, and where it is
       type(pose_type), intent(in) :: before, after
 
-      real(wp) :: direction, late, onset, distance
-      logical :: reaches
+      type(pose_type) :: start, end
+      logical :: has_broken
 
-      if (self%offers) call add_step_work(self, before, after)
-      distance = after%displacement - before%displacement
-      direction = sign(1.0_wp, distance)
-      if (direction > 0.0_wp) then
-         reaches = after%displacement > self%pinned%ahead
+      start = before
+      end = after
+      if (self%pinned%is_activated) call straighten(self, start, end)
+      if (self%offers) call add_step_work(self, start, end)
+      if (self%pinned%is_activated) then
+         call try_activated(self, start, end, has_broken)
       else
-         reaches = after%displacement < self%pinned%behind
+         call try_to_break(self, start, end, has_broken)
       end if
-      if (self%pinned%some_fall .and. .not. reaches) then
-         ! Where thresholds fall contacts may break at rest.
-         if (.not. abs(distance) > 0.0_wp) direction = after%direction
-         if (direction > 0.0_wp) then
-            reaches = after%displacement >= self%pinned%ahead
-         else
-            reaches = after%displacement <= self%pinned%behind
-         end if
-      end if
-      if (reaches) then
-         if (.not. self%pinned%has_tried(after%displacement, after%time)) then
-            call self%pinned%try(before, after%displacement, after%time, direction, late, onset)
-         end if
+      if (has_broken) then
          call self%pinned%break_tried(self%break_loss)
          associate (trial => self%pinned%trial)
             self%breaks = self%breaks + trial%breaks
@@ -52,12 +44,93 @@ contains
             call self%detached%add(before%time, after%time, trial%breaks, trial%mass)
          end associate
       end if
-      if (.not. self%detached%is_empty()) call attach_due(self, before, after)
+      if (.not. self%detached%is_empty()) call attach_due(self, start, end)
       if (self%pinned%ages) call self%pinned%update_thresholds(after%displacement, after%time)
       self%detached_count = self%detached%number%total()
       self%cost = 1.0_wp + self%pinned%count / populations_per_cost
+      if (self%pinned%is_activated) call note_step(self, before, after)
       self%offers = .false.
    end subroutine respond_to_motion
+
+   !> Find what breaks of contacts that break at their thresholds.
+   subroutine try_to_break(self, before, after, has_broken)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+      !> Whether contacts break
+      logical, intent(out) :: has_broken
+
+      real(wp) :: direction, late, onset, distance
+
+      distance = after%displacement - before%displacement
+      direction = sign(1.0_wp, distance)
+      if (direction > 0.0_wp) then
+         has_broken = after%displacement > self%pinned%ahead
+      else
+         has_broken = after%displacement < self%pinned%behind
+      end if
+      if (self%pinned%some_fall .and. .not. has_broken) then
+         ! Where thresholds fall contacts may break at rest.
+         if (.not. abs(distance) > 0.0_wp) direction = after%direction
+         if (direction > 0.0_wp) then
+            has_broken = after%displacement >= self%pinned%ahead
+         else
+            has_broken = after%displacement <= self%pinned%behind
+         end if
+      end if
+      if (.not. has_broken) return
+      if (.not. self%pinned%has_tried(after%displacement, after%time)) then
+         call self%pinned%try(before, after%displacement, after%time, direction, late, onset)
+      end if
+   end subroutine try_to_break
+
+   !> Find what breaks of contacts that break by activation.
+   subroutine try_activated(self, before, after, has_broken)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+      !> Whether contacts break
+      logical, intent(out) :: has_broken
+
+      real(wp) :: late, onset
+
+      has_broken = self%pinned%count > 0 .and. (after%time > before%time &
+         & .or. abs(after%displacement - before%displacement) > 0.0_wp)
+      if (has_broken) call self%pinned%try_motion(before, after, after%displacement, late, onset)
+   end subroutine try_activated
+
+   !> Take a motion as even in which the slider may have oscillated many times, by next to nothing.
+   pure subroutine straighten(self, before, after)
+      class(population_state_type), intent(in) :: self
+      type(pose_type), intent(inout) :: before, after
+
+      real(wp) :: duration
+
+      duration = after%time - before%time
+      if (.not. duration * self%oscillation_rate(before) > even_time) return
+      before%velocity = (after%displacement - before%displacement) / duration
+      before%acceleration = 0.0_wp
+      after%velocity = before%velocity
+      after%acceleration = 0.0_wp
+   end subroutine straighten
+
+   !> Note what the next step is based on.
+   subroutine note_step(self, before, after)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: duration
+      type(interface_law_type) :: law
+
+      duration = after%time - before%time
+      if (.not. duration > 0.0_wp) return
+      self%last_duration = duration
+      self%last_velocity = (after%displacement - before%displacement) / duration
+      self%excess = 0.0_wp
+      if (.not. (before%inverse_mass > 0.0_wp .and. self%offers)) return
+      law = self%law()
+      self%excess = (self%offered%stiffness - law%stiffness) * after%displacement &
+         & - (self%offered%offset - law%offset) + (self%offered%drag - law%drag) * after%velocity &
+         & + self%offered%rate * duration
+   end subroutine note_step
 
    !> Add the work by which the offered force differs from that of the contacts as they were.
    subroutine add_step_work(self, before, after)
@@ -81,7 +154,7 @@ contains
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
-      real(wp) :: births, moment, when, origin, force
+      real(wp) :: births, moment, when, origin, force, lost
 
       call self%detached%take_due(before, after, births, moment, when)
       if (.not. births > 0.0_wp) return
@@ -93,7 +166,8 @@ contains
          & * (0.5_wp * self%pinned%newborn_stiffness * (after%displacement - origin) &
          & + self%parameters%static_force * force))
       call self%pinned%attach(births, moment, after%direction, after%displacement, &
-         & min(when / births, after%time), after%time)
+         & min(when / births, after%time), after%time, lost)
+      call self%step_work%add(lost)
    end subroutine attach_due
 
 end module mesoslip_contacts_populations_respond

@@ -14,6 +14,7 @@ module mesoslip_contacts_populations_rows
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_mechanics, only: breaking_distance
    use mesoslip_contacts_partial_moments, only: partial_moments_type
+   use mesoslip_contacts_populations_survivors, only: no_level
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
@@ -23,7 +24,7 @@ module mesoslip_contacts_populations_rows
    public :: population_rows_type, new_population_rows
    public :: moments_length, number, stiff, compliant, lost, massive
    public :: column_origin, column_force, column_weight, column_broken, column_law, column_ahead, &
-      & column_behind, column_birth
+      & column_behind, column_birth, column_level
 
    !> Moments of the thresholds of a population's pinned contacts: their number, stiffness, one over
    !> it, twice the energy that they lose in breaking, and mass.
@@ -31,7 +32,7 @@ module mesoslip_contacts_populations_rows
    integer, parameter :: number = 1, stiff = 2, compliant = 3, lost = 4, massive = 5
 
    !> Numbers kept for a population, besides its moments
-   integer, parameter :: population_length = 8
+   integer, parameter :: population_length = 9
    !> Displacement at which stretches are zero but for the force at attaching [m]
    integer, parameter :: column_origin = 1
    !> Force at attaching, signed
@@ -46,6 +47,8 @@ module mesoslip_contacts_populations_rows
    integer, parameter :: column_ahead = 6, column_behind = 7
    !> When it attached [s]
    integer, parameter :: column_birth = 8
+   !> Level of its hazard, if its contacts break by thermal activation
+   integer, parameter :: column_level = 9
 
    !> Populations for which there is room at first
    integer, parameter :: initial_rows = 64
@@ -74,6 +77,12 @@ module mesoslip_contacts_populations_rows
       real(wp) :: first_broken = 0.0_wp
       !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
       type(partial_moments_type) :: moments(2)
+      !> Whether populations keep their order, that in which they attached; the number of those at
+      !> the end that contacts may still join, where the first of them attached [m], and in which
+      !> direction their forces are
+      logical :: keeps_order = .false.
+      integer :: open_count = 0
+      real(wp) :: open_origin = 0.0_wp, open_direction = 1.0_wp
       !> Populations, shape (rows, population_length), as many are in use as there are
       real(wp), allocatable :: population(:, :)
       !> Moments of their contacts that are left, shape (moments_length, rows)
@@ -138,6 +147,7 @@ contains
          population(row, column_law) = real(law, wp)
          population(row, column_broken) = max(broken, self%first_broken)
          population(row, column_birth) = birth
+         population(row, column_level) = no_level
          self%left(:, row) = weight * moments
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
          population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
@@ -236,6 +246,7 @@ contains
          all(:, column_ahead) = all(:, column_ahead) - shift
          all(:, column_behind) = all(:, column_behind) - shift
       end associate
+      self%open_origin = self%open_origin - shift
       call self%sum_forces()
    end subroutine shift_origin
 
@@ -289,6 +300,10 @@ contains
       call archive%exchange("stiffness", self%stiffness)
       call archive%exchange("offset", self%offset)
       call archive%exchange("last_birth", self%last_birth)
+      if (.not. self%keeps_order) return
+      call archive%exchange("open_count", self%open_count)
+      call archive%exchange("open_origin", self%open_origin)
+      call archive%exchange("open_direction", self%open_direction)
    end subroutine exchange
 
 end module mesoslip_contacts_populations_rows

@@ -4,7 +4,7 @@ module mesoslip_contacts_populations_state
    use mesoslip_contacts_base, only: contacts_type
    use mesoslip_contacts_populations_packets, only: detached_packets_type
    use mesoslip_contacts_populations_pinned, only: pinned_populations_type
-   use mesoslip_interface_law, only: interface_law_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -27,8 +27,12 @@ module mesoslip_contacts_populations_state
       !> Part of the time of ageing that a step may last while thresholds fall, and how long this
       !> step may last for that [s]
       real(wp) :: resolution = 1.0_wp, max_fall_time = huge(1.0_wp)
+      !> Where contacts break by thermal activation: duration of the last step [s], mean velocity in
+      !> it [m/s], and what the offered force had beyond the contact force at its end [N]
+      real(wp) :: last_duration = huge(1.0_wp), last_velocity = 0.0_wp, excess = 0.0_wp
    contains
       procedure :: law
+      procedure, non_overridable :: oscillation_rate
    end type population_state_type
 
 contains
@@ -44,5 +48,19 @@ contains
       law%offset = self%pinned%offset%total()
       law%drag = self%parameters%drag * self%detached%mass%total()
    end function law
+
+   !> Rate at which the slider oscillates or is damped on the contacts [1/s].
+   pure function oscillation_rate(self, pose) result(rate)
+      !> The populations
+      class(population_state_type), intent(in) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The rate, 0 for a slider of which the motion is prescribed
+      real(wp) :: rate
+
+      rate = sqrt(pose%own_rate**2 + max(0.0_wp, self%pinned%stiffness%total()) &
+         & * pose%inverse_mass) &
+         & + self%parameters%drag * max(0.0_wp, self%detached%mass%total()) * pose%inverse_mass
+   end function oscillation_rate
 
 end module mesoslip_contacts_populations_state

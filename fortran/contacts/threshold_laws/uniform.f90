@@ -18,6 +18,7 @@ module mesoslip_contacts_threshold_laws_uniform
       procedure :: plain_quantile
       procedure :: plain_density
       procedure :: plain_survival
+      procedure :: cell_edges
    end type uniform_law_type
 
 contains
@@ -33,6 +34,7 @@ contains
 
       call take_relative_width(self, parameters, error)
       self%half = sqrt(3.0_wp) * self%width
+      self%cells = 1
    end subroutine take
 
    !> Threshold that is exceeded with a given probability, before rejection.
@@ -71,5 +73,15 @@ contains
 
       value = min(1.0_wp, max(0.0_wp, 0.5_wp * (1.0_wp - (argument - 1.0_wp) / self%half)))
    end function plain_survival
+
+   !> The ends of the interval: its density is constant in one cell.
+   pure function cell_edges(self) result(edge)
+      !> The law
+      class(uniform_law_type), intent(in) :: self
+      !> Relative thresholds, ascending, before rejection, shape (cells + 1)
+      real(wp) :: edge(self%cells + 1)
+
+      edge = 1.0_wp + self%half * [-1.0_wp, 1.0_wp]
+   end function cell_edges
 
 end module mesoslip_contacts_threshold_laws_uniform

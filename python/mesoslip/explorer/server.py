@@ -24,7 +24,6 @@ from tornado.web import HTTPError, RequestHandler
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
-from mesoslip.explorer.pictures import Measured
 from mesoslip.explorer.view import Page
 
 ADDRESS = "127.0.0.1"
@@ -51,9 +50,9 @@ class Pages(Handler):
     One at a time: several would not be done sooner, and would slow the server down.
     """
 
-    def __init__(self, config: Config, source: str, trace: Measured | None = None) -> None:
+    def __init__(self, config: Config, source: str) -> None:
         super().__init__()
-        self._config, self._source, self._trace = config, source, trace
+        self._config, self._source = config, source
         self._turn = asyncio.Lock()
 
     async def on_session_created(self, session_context: SessionContext) -> None:
@@ -62,7 +61,7 @@ class Pages(Handler):
 
     async def _build(self, document: Document) -> None:
         document.template = TEMPLATE
-        await asyncio.to_thread(Page, document, self._config, self._source, self._trace)
+        await asyncio.to_thread(Page, document, self._config, self._source)
 
     def modify_document(self, doc: Document) -> None:
         """Nothing is left to do."""
@@ -106,7 +105,6 @@ def serve(
     config: Config,
     source: str,
     *,
-    trace: Measured | None = None,
     port: int,
     opens: bool,
     report: Callable[[str], None],
@@ -119,8 +117,6 @@ def serve(
         Configuration at the start.
     source
         Its name on the command line.
-    trace
-        A measured trace to draw beside the run.
     port
         Port of the loopback address; the first free one from there on.
     opens
@@ -133,7 +129,7 @@ def serve(
     RunError
         If no port is free.
     """
-    server = make_server(config, source, port, trace)
+    server = make_server(config, source, port)
     address = f"http://{ADDRESS}:{server.port}/"
     report(address)
     if opens:
@@ -145,7 +141,7 @@ def serve(
         server.stop()
 
 
-def make_server(config: Config, source: str, port: int, trace: Measured | None = None) -> Server:
+def make_server(config: Config, source: str, port: int) -> Server:
     """A server of the page that is not started; see `serve`."""
     # Objects that exist now stay: the garbage collector, which runs after each change, skips them.
     gc.collect()
@@ -171,7 +167,7 @@ def make_server(config: Config, source: str, port: int, trace: Measured | None =
             "check_unused_sessions_milliseconds": UNUSED_MILLISECONDS // 3,
         }
         try:
-            server = Server({"/": Application(Pages(config, source, trace))}, **options)
+            server = Server({"/": Application(Pages(config, source))}, **options)
         except OSError:
             continue
         gate.hosts = {f"{name}:{server.port}" for name in (ADDRESS, "localhost")}

@@ -5,7 +5,11 @@ Adding a kind is adding a file with a `ContactKind` and naming it in `KINDS`.
 
 from __future__ import annotations
 
-from mesoslip.configuration.contacts.activated import ActivatedAgeingContacts, ActivatedContacts
+from mesoslip.configuration.contacts.activated import (
+    ActivatedAgeingContacts,
+    ActivatedContacts,
+    ActivatedPopulations,
+)
 from mesoslip.configuration.contacts.ageing import AgeingContacts, AgeingPopulations
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.ensemble import EnsembleContacts
@@ -17,6 +21,7 @@ from mesoslip.configuration.tables import Run
 KINDS: tuple[type[ContactKind], ...] = (
     ActivatedAgeingContacts,
     ActivatedContacts,
+    ActivatedPopulations,
     AgeingContacts,
     AgeingPopulations,
     EnsembleContacts,

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from mesoslip.configuration.contacts.ageing import ageing_of, ageing_problems
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
+from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables import (
     MAX_IDLE_BREAKS,
     MAX_IDLE_DELAY,
@@ -107,3 +108,37 @@ class ActivatedAgeingContacts(ActivatedContacts):
         yield from super().problems(config)
         # Coupling and interaction have been checked.
         yield from (one for one in ageing_problems(config) if one.key == INITIAL_AGE)
+
+
+class ActivatedPopulations(PopulationContacts):
+    """Infinitely many contacts that break by thermal activation."""
+
+    kernel_kind: ClassVar[str] = "activated populations"
+    # A slider that hardly oscillates is taken to creep: what energy it oscillates with is lost.
+    residual_bound: ClassVar[float] = 1e-5
+
+    @classmethod
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
+        return run.engine == "me" and contacts.thermal is not None
+
+    def kernel_parameters(self, config: Setting) -> Parameters:
+        return super().kernel_parameters(config) | thermal_parameters(config)
+
+    def problems(self, config: Setting) -> Complaints:
+        yield from super().problems(config)
+        # PopulationContacts refuses interaction already.
+        yield from (one for one in thermal_problems(config) if one.key != "interaction.strength")
+        if config.contacts.initial == "uniform":
+            yield Complaint(
+                "contacts.initial",
+                'must be "relaxed" or "steady" with contacts.thermal and engine "me": in the other '
+                "state thresholds do not have the law by which activation is tabulated",
+                config.contacts.initial,
+            )
+        if config.contacts.ageing is not None:
+            yield Complaint(
+                "contacts.ageing",
+                'needs engine "eq" with contacts.thermal: as thresholds change, the hazards of '
+                "contacts of different thresholds have no ratio that stays, so that one number "
+                "does not give what is left of a population",
+            )

@@ -73,7 +73,7 @@ class AgeingPopulations(PopulationContacts):
 
     @classmethod
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "me" and contacts.ageing is not None
+        return run.engine == "me" and contacts.ageing is not None and contacts.thermal is None
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()

@@ -31,7 +31,7 @@ class PopulationContacts(ContactKind):
 
     @classmethod
     def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "me" and contacts.ageing is None
+        return run.engine == "me" and contacts.ageing is None and contacts.thermal is None
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return common_parameters(config) | {"resolution": config.run.resolution}
@@ -45,13 +45,7 @@ class PopulationContacts(ContactKind):
             yield Complaint(
                 "interaction",
                 'needs engine "eq": the master equation has no neighbours; on average, '
-                "interaction acts like a smaller contacts.threshold.relative_width: "
-                "mesoslip mean-field measures it",
-            )
-        if config.contacts.thermal is not None:
-            yield Complaint(
-                "contacts.thermal",
-                'needs engine "eq": the master equation has no thermally activated breaking',
+                "interaction acts like a smaller contacts.threshold.relative_width",
             )
         if run.realizations > self.max_realizations:
             yield Complaint(

@@ -1,0 +1,133 @@
+!> Thermal activation of populations: how the level of a population grows while the slider moves.
+!>
+!> A contact under the force g breaks at the rate omega_0 exp((abs(g) - u)/theta), in units of f_s
+!> and theta = f_T/f_s. The integral over the time is exp((e - u)/theta) with the level e, a number
+!> of its population. Populations whose forces have one sign share the integral of exp(x/theta)
+!> over the motion x of the slider. All is relative to where the slider was: there are no exponents
+!> but of differences of forces in a step.
+module mesoslip_contacts_populations_activation
+   use mesoslip_contacts_populations_motion, only: position_at
+   use mesoslip_contacts_populations_survivors, only: no_level
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_quadrature, only: gauss_legendre
+   implicit none
+   private
+
+   public :: activation_type, growth_type, new_activation
+
+   !> Points of the rule over a motion
+   integer, parameter :: points = 12
+   !> Exponent of a force that is none
+   real(wp), parameter :: tiny_exponent = 1.0e-6_wp
+
+   !> How populations are activated.
+   type :: activation_type
+      !> Rate of breaking at the threshold [1/s], and f_T/f_s
+      real(wp) :: rate = 0.0_wp, width = 1.0_wp
+      !> Displacement of a force f_s [m]
+      real(wp), private :: stretch = 1.0_wp
+      real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
+   contains
+      !> What a motion adds to levels
+      procedure, non_overridable :: growth
+      !> Level after a motion, and after a time under a force
+      procedure, non_overridable :: level_after
+      procedure, non_overridable :: newborn_level
+   end type activation_type
+
+   !> What a motion of the slider adds to the levels of populations, over its force at the start.
+   type :: growth_type
+      !> Of those under positive force, and under negative force
+      real(wp), private :: level(2) = no_level
+      !> Of those under no force, if the slider rested
+      real(wp), private :: rest = no_level
+   end type growth_type
+
+contains
+
+   !> Set up activation.
+   pure function new_activation(rate, width, stretch) result(self)
+      !> Rate of breaking at the threshold [1/s], f_T/f_s, and f_s/k [m]
+      real(wp), intent(in) :: rate, width, stretch
+      !> How populations are activated
+      type(activation_type) :: self
+
+      self%rate = rate
+      self%width = width
+      self%stretch = stretch
+      call gauss_legendre(self%point, self%weight)
+   end function new_activation
+
+   !> What a motion adds to levels.
+   pure function growth(self, before, after)
+      !> How populations are activated
+      class(activation_type), intent(in) :: self
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+      !> What is added
+      type(growth_type) :: growth
+
+      real(wp) :: duration, exponent(points), place, most, sign
+      integer :: node, one
+
+      duration = after%time - before%time
+      if (.not. self%rate * duration > 0.0_wp) return
+      growth%rest = self%width * log(self%rate * duration)
+      do node = 1, points
+         place = position_at(before, after, before%time + self%point(node) * duration)
+         exponent(node) = (place - before%displacement) / (self%stretch * self%width)
+      end do
+      sign = 1.0_wp
+      do one = 1, 2
+         most = maxval(sign * exponent)
+         growth%level(one) = growth%rest + self%width * (most &
+            & + log(sum(self%weight * exp(sign * exponent - most))))
+         sign = -1.0_wp
+      end do
+   end function growth
+
+   !> Level of a population after a motion.
+   elemental function level_after(self, growth, level, start_force, end_force) result(after)
+      !> How populations are activated
+      class(activation_type), intent(in) :: self
+      !> What the motion adds
+      type(growth_type), intent(in) :: growth
+      !> Level before it, and forces on the contacts before and after
+      real(wp), intent(in) :: level, start_force, end_force
+      real(wp) :: after
+
+      real(wp) :: more, low, high
+
+      if (.not. growth%rest > no_level) then
+         after = level
+         return
+      end if
+      if (start_force * end_force >= 0.0_wp) then
+         more = abs(start_force) + growth%level(merge(1, 2, start_force + end_force >= 0.0_wp))
+      else
+         ! The force changes its sign, evenly in time.
+         low = min(abs(start_force), abs(end_force)) / self%width
+         high = max(abs(start_force), abs(end_force)) / self%width
+         more = growth%rest + self%width * (high + log((1.0_wp + exp(low - high) &
+            & - 2.0_wp * exp(-high)) / (low + high)))
+         if (high < tiny_exponent) more = growth%rest
+      end if
+      after = more
+      if (.not. level > no_level) return
+      after = max(level, more) + self%width * log(1.0_wp + exp(-abs(level - more) / self%width))
+   end function level_after
+
+   !> Level of contacts that have attached a time ago.
+   elemental function newborn_level(self, duration, force) result(level)
+      !> How populations are activated
+      class(activation_type), intent(in) :: self
+      !> The time [s], and the force on them
+      real(wp), intent(in) :: duration, force
+      real(wp) :: level
+
+      level = no_level
+      if (self%rate * duration > 0.0_wp) level = abs(force) + self%width * log(self%rate * duration)
+   end function newborn_level
+
+end module mesoslip_contacts_populations_activation

@@ -1,0 +1,83 @@
+!> Coordinates in which the density of a threshold law is smooth: u, its root for laws that come
+!> close to 0, where the density may be singular, and its logarithm for laws that do so themselves.
+module mesoslip_contacts_threshold_coordinate
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: threshold_coordinate_type, new_threshold_coordinate
+
+   !> The coordinates
+   integer, parameter :: linear = 1, root = 2, logarithmic = 3
+   !> Least threshold of laws that do not come close to 0
+   real(wp), parameter :: close = 0.1_wp
+
+   !> A coordinate of thresholds.
+   type :: threshold_coordinate_type
+      integer, private :: kind = linear
+   contains
+      !> Coordinate of a threshold
+      procedure, non_overridable :: at
+      !> Threshold of a coordinate, and its derivative
+      procedure, non_overridable :: threshold
+      procedure, non_overridable :: slope
+   end type threshold_coordinate_type
+
+contains
+
+   !> The coordinate of a law.
+   pure function new_threshold_coordinate(is_logarithmic, min_threshold) result(self)
+      !> Whether the density varies with the logarithm of the threshold
+      logical, intent(in) :: is_logarithmic
+      !> Lowest threshold
+      real(wp), intent(in) :: min_threshold
+      !> The coordinate
+      type(threshold_coordinate_type) :: self
+
+      if (is_logarithmic) then
+         self%kind = logarithmic
+      else if (min_threshold < close) then
+         self%kind = root
+      end if
+   end function new_threshold_coordinate
+
+   !> Coordinate of a threshold.
+   elemental function at(self, threshold) result(coordinate)
+      !> The coordinate
+      class(threshold_coordinate_type), intent(in) :: self
+      !> Relative threshold
+      real(wp), intent(in) :: threshold
+      real(wp) :: coordinate
+
+      coordinate = threshold
+      if (self%kind == root) coordinate = sqrt(threshold)
+      if (self%kind == logarithmic) coordinate = log(threshold)
+   end function at
+
+   !> Threshold of a coordinate.
+   elemental function threshold(self, coordinate)
+      !> The coordinate
+      class(threshold_coordinate_type), intent(in) :: self
+      !> Its value
+      real(wp), intent(in) :: coordinate
+      real(wp) :: threshold
+
+      threshold = coordinate
+      if (self%kind == root) threshold = coordinate**2
+      if (self%kind == logarithmic) threshold = exp(coordinate)
+   end function threshold
+
+   !> Derivative of the threshold with respect to the coordinate.
+   elemental function slope(self, coordinate)
+      !> The coordinate
+      class(threshold_coordinate_type), intent(in) :: self
+      !> Its value
+      real(wp), intent(in) :: coordinate
+      real(wp) :: slope
+
+      slope = 1.0_wp
+      if (self%kind == root) slope = 2.0_wp * coordinate
+      if (self%kind == logarithmic) slope = exp(coordinate)
+   end function slope
+
+end module mesoslip_contacts_threshold_coordinate

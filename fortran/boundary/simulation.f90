@@ -464,6 +464,27 @@ subroutine drain_rows(handle, table, columns, rows, values, status, message)
    call report(error, status, message)
 end subroutine drain_rows
 
+!> Displace the drive of a simulation at once, as a small perturbation.
+subroutine displace_drive(handle, distance, status, message)
+   !f2py threadsafe
+   use mesoslip_boundary_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_loop_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> How far [m]
+   real(8), intent(in) :: distance
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%displace_drive(distance)
+   call report(error, status, message)
+end subroutine displace_drive
+
 !> Put the state of a simulation into an archive, which the simulation keeps until it is fetched.
 subroutine save_simulation(handle, length, status, message)
    !f2py threadsafe

@@ -70,6 +70,8 @@ module mesoslip_loop_state
       procedure, non_overridable :: table
       procedure, non_overridable :: rows_to_drain
       procedure, non_overridable :: drain
+      !> Displace the drive at once
+      procedure, non_overridable :: displace_drive
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       !> Put the state away, fetch it, and go on from it
@@ -187,6 +189,21 @@ contains
          call buffer%drain(values)
       end if
    end subroutine drain
+
+   !> Displace the drive at once: the spring has another length, and the motion goes on from there.
+   subroutine displace_drive(self, distance)
+      !> The state, between two segments
+      class(state_type), intent(inout) :: self
+      !> How far [m]
+      real(wp), intent(in) :: distance
+
+      real(wp) :: energy
+
+      energy = self%slider%energy()
+      self%slider%drive%value = self%slider%drive%value + distance
+      ! The balance counts from the displaced state.
+      self%start_energy = self%start_energy + (self%slider%energy() - energy)
+   end subroutine displace_drive
 
    !> Put the state into an archive or take it out; a queue taken out is ordered anew.
    subroutine exchange(self, archive)

@@ -1,5 +1,6 @@
 from .analysis.avalanches import avalanche_summary, avalanches
 from .analysis.export import export
+from .analysis.lyapunov import lyapunov
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
@@ -45,6 +46,7 @@ __all__ = [
     "example",
     "export",
     "fit",
+    "lyapunov",
     "onset",
     "open_output",
     "plot",

@@ -19,9 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.lyapunov import lyapunov
 from mesoslip.analysis.regime import NAMES, REGIME, regimes
+from mesoslip.analysis.return_map import map_exponent
 from mesoslip.campaign import predictions
 from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.output.access import config_of
+from mesoslip.output.variables import LYAPUNOV
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,6 +60,12 @@ class RunView:
         """The regime and the statistics that determine it."""
         data = regimes(self.tree)
         return {name: float(data[name].values[0]) for name in REGIME}
+
+    @cached_property
+    def exponent(self) -> xr.DataTree:
+        """Its largest Lyapunov exponent, from twins of another run of the configuration."""
+        number = int(self.tree["realization"].values[0])
+        return lyapunov(config_of(self.tree), realization=number, executor=1)
 
     def total(self, name: str) -> float:
         """A scalar of the whole run."""
@@ -161,6 +171,21 @@ def _peak_velocity(run: RunView) -> float:
     return float(np.max(np.abs(velocities))) if velocities.size else np.nan
 
 
+def _peak_variation(run: RunView) -> float:
+    """Coefficient of variation of the force at the starts of slips."""
+    peaks = run.catalogue("slips", "force_before")
+    return float(np.std(peaks) / abs(np.mean(peaks))) if peaks.size > 1 else np.nan
+
+
+def _map_exponent(run: RunView) -> float:
+    return map_exponent(run.catalogue("slips", "force_before"))
+
+
+def _lyapunov(name: str) -> Function:
+    """The largest Lyapunov exponent or its error."""
+    return lambda run: float(run.exponent[name])
+
+
 def _smooth_time_share(run: RunView) -> float:
     """Fraction of steps in which the slider moves between 1/2 and 2 times as far as the drive."""
     displacement, drive = (
@@ -233,6 +258,22 @@ MEASURES: dict[str, Measure] = {
             _smooth_time_share,
             "1",
             "fraction of time with a slider velocity between 1/2 and 2 times that of the drive",
+        ),
+        Measure(
+            "peak_variation",
+            _peak_variation,
+            "1",
+            "standard deviation of the spring force at the starts of slips, over its mean",
+        ),
+        Measure(
+            "map_exponent",
+            _map_exponent,
+            "1",
+            "mean logarithm of the slope of the return map of peaks",
+        ),
+        *(
+            Measure(name, _lyapunov(name), LYAPUNOV[name].units, LYAPUNOV[name].long_name)
+            for name in ("lyapunov_exponent", "lyapunov_error")
         ),
         Measure("breaks", _breaks, "1", "breaks of contacts in the whole run"),
         Measure(

@@ -29,6 +29,7 @@ KINDS = {
     "cycle": Kind("a cycle", lambda tree: "settled_motion" in tree.attrs),
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
+    "lyapunov": Kind("a Lyapunov exponent", lambda tree: "lyapunov_exponent" in tree.data_vars),
     "fit": Kind("a fit", lambda tree: "posterior" in tree.children),
 }
 

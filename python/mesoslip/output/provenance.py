@@ -24,6 +24,8 @@ SUMMARIES = {
     "contacts that break one after another and for a film that melts at once",
     "cycle": "The motion that a slider on infinitely many contacts settles to, from the master "
     "equation of multicontact friction",
+    "lyapunov": "Largest Lyapunov exponent of a slider pulled over contacts with random breaking "
+    "thresholds, from runs that start a small distance apart",
     "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
     "over a range of parameters",
     "trace": "A measured trace of the spring force of a slider, with the slips found in it",

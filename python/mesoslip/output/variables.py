@@ -272,6 +272,22 @@ STRETCHES = Group(
     unbroken_part=Meaning("1", "part of the contacts that bear the stretch of a relaxed start"),
 )
 
+LYAPUNOV = Group(
+    distance=Meaning(
+        "1", "distance of the twin, in units of F_s and of the slip velocity, less a time shift"
+    ),
+    growth_time=Meaning("s", "time since the start of the twin"),
+    start=Meaning("s", "time at which the twin starts"),
+    twin_exponent=Meaning("1/s", "rate at which the distance of the twin grows while it is small"),
+    lyapunov_exponent=Meaning("1/s", "largest Lyapunov exponent"),
+    lyapunov_error=Meaning("1/s", "standard error of the largest Lyapunov exponent"),
+    min_distance=Meaning("1", "distance from which growth is fitted"),
+    max_distance=Meaning("1", "distance up to which growth is fitted"),
+    peak_force=Meaning("N", "spring force at the start of a slip"),
+    waiting_time=Meaning("s", "time since the start of the slip before"),
+)
+
+
 ONSET = Group(
     onset_time=Meaning("1", "time since the onset of slip times the setup frequency"),
     onset_displacement=Meaning(

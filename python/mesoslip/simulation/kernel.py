@@ -215,6 +215,10 @@ class Kernel:
         self._call(_core.fetch_state, words)
         return words
 
+    def displace_drive(self, distance: float) -> None:
+        """Displace the drive at once by a distance [m]; the motion goes on from there."""
+        self._call(_core.displace_drive, distance)
+
     def restore(self, words: Words) -> None:
         """Go on from a state, instead of starting."""
         self._call(_core.restore_simulation, words)

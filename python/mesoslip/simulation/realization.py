@@ -283,6 +283,23 @@ class Realization:
             wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
             advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
 
+    def twin(self, distance: float) -> Realization:
+        """Another realization that goes on from here with the same random numbers.
+
+        It records from here on, and its errors are not estimated.
+
+        Parameters
+        ----------
+        distance
+            How far its drive is ahead of that of this one [m]. The spring joins the drive to a
+            slider with inertia (`rigid`, `layered`).
+        """
+        saved = self.save()
+        other = Realization(self.config, self.number, estimates_errors=False)
+        other.restore(saved, {name: Rows(rows.columns) for name, rows in self.waiting})
+        other._open().displace_drive(distance)
+        return other
+
     def __enter__(self) -> Self:
         return self
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from outputs import chosen, opened
 
-from claims import coexistence, curves, layered, limit, motion, numbers, slips
+from claims import coexistence, curves, film, layered, limit, motion, numbers, slips
 from claims.base import Claim, Judgement, Verdict
 
 __all__ = ["CLAIMS", "Claim", "Judgement", "Verdict", "judge"]
@@ -24,6 +24,7 @@ _MODULES = (
     limit,
     layered,
     coexistence,
+    film,
 )
 CLAIMS = {
     claim.name: claim

@@ -11,6 +11,7 @@ from mesoslip.reports.sections.avalanches import avalanches
 from mesoslip.reports.sections.changes import changes
 from mesoslip.reports.sections.configuration import configuration
 from mesoslip.reports.sections.energy import energy
+from mesoslip.reports.sections.lyapunov import lyapunov
 from mesoslip.reports.sections.methods import methods
 from mesoslip.reports.sections.parameters import parameters
 from mesoslip.reports.sections.pictures import pictures
@@ -38,5 +39,6 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
     "cycle": (changes, pictures, cycle, methods, configuration, provenance),
     "curve": (changes, pictures, curve, methods, configuration, provenance),
     "onset": (changes, pictures, onset, methods, configuration, provenance),
+    "lyapunov": (changes, pictures, lyapunov, methods, configuration, provenance),
     "fit": (parameters, methods, configuration, provenance),
 }

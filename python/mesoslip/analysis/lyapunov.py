@@ -1,0 +1,372 @@
+"""The largest Lyapunov exponent of a run, from twins that start a small distance away.
+
+A twin goes on from the state of the run, with the same random numbers, after its drive was
+displaced by a small distance. The distance of both grows as exp(λt) until it is as large as the
+motion itself, or decays until rounding and steps hide it. Nothing is renormalized:
+the run is compared with a new twin at each of several times, which brings both together again.
+
+A displacement along the motion neither grows nor decays, and does not count: in each window of time
+the shift in time that leaves the least difference is taken off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.execution.executors import ExecutorLike, as_executor, completed
+from mesoslip.execution.stop import Stop, StoppedError
+from mesoslip.output.inputs import ConfigLike, as_config
+from mesoslip.output.provenance import program_attributes
+from mesoslip.output.variables import LYAPUNOV
+from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.tables import TRACE_COLUMNS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mesoslip.configuration.config import Config
+
+Array = NDArray[np.float64]
+
+# Kinds of sliders with inertia and a spring, whose drive can be displaced.
+SLIDERS = ("rigid", "layered")
+# Periods of the setup in a window in which distances are measured.
+WINDOW_PERIODS = 1
+# Samples that a window has at least.
+MIN_SAMPLES = 16
+# Windows after which the distance has turned to the direction that grows most.
+SETTLING_WINDOWS = 3
+# Windows that a fit has at least.
+MIN_WINDOWS = 3
+# Distance up to which growth is linear, over the amplitude of the motion.
+MAX_DISTANCE = 0.1
+# Parts of the run before the first twin, and in which each is followed.
+TRANSIENT, FOLLOWED = 0.3, 0.3
+# Displacement of a twin's drive over F_s/K. In the master equation it is well above the floor of
+# steps and rounding; N contacts break one by one, and only distances above 1/N grow smoothly.
+DISPLACEMENT = 1e-10
+# Distances from which N contacts are fitted, times N.
+DISCRETE_DISTANCES = 10.0
+# Units and meanings of what is printed.
+SUMMARY = {
+    name: (LYAPUNOV[name].units, LYAPUNOV[name].long_name)
+    for name in ("lyapunov_exponent", "lyapunov_error", "min_distance", "max_distance")
+}
+# Standard errors by which an exponent must be positive to be called so.
+SIGNIFICANCE = 3.0
+
+
+class Fit(NamedTuple):
+    """A mean rate of growth."""
+
+    exponent: float
+    """Rate [1/s]; NaN if nothing could be fitted."""
+    error: float
+    """Its standard error, from the scatter of the twins [1/s]."""
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """Samples of a motion at equal intervals, in units of F_s and of the slip velocity Ω_S F_s/K.
+
+    Attributes
+    ----------
+    time
+        Times [s], shape (samples).
+    position
+        Spring force and velocity of the slider, shape (samples, 2).
+    rate
+        Their derivatives [1/s], shape (samples, 2).
+    """
+
+    time: Array
+    position: Array
+    rate: Array
+
+    @classmethod
+    def of_trace(cls, trace: Array, config: Config) -> Orbit:
+        """That of a trace with the columns of a run."""
+        index = [TRACE_COLUMNS.index(one) for one in ("time", "spring_force", "velocity")]
+        time, force, velocity = trace[:, index].T
+        static, spring = config.contacts.static_force, config.spring_stiffness
+        unit = static / spring * math.sqrt(spring / config.slider.mass)
+        position = np.stack([force / static, velocity / unit], axis=1)
+        return cls(time, position, np.gradient(position, time, axis=0))
+
+    def after(self, time: float) -> Orbit:
+        """The motion from a time [s] on."""
+        late = self.time >= time
+        return Orbit(self.time[late], self.position[late], self.rate[late])
+
+    @property
+    def amplitude(self) -> float:
+        """Root mean square distance from the mean."""
+        return float(np.sqrt(np.mean(np.sum((self.position - self.position.mean(0)) ** 2, axis=1))))
+
+
+def transverse_distances(one: Orbit, other: Orbit, window: int) -> tuple[Array, Array]:
+    """Distance of two motions in windows of time, but for a shift in time.
+
+    Parameters
+    ----------
+    one
+        A motion.
+    other
+        The other, sampled at some of the same times.
+    window
+        Samples in a window.
+
+    Returns
+    -------
+    times
+        Middles of the windows [s], shape (windows).
+    distances
+        Root mean square distance in each window less the time shift that leaves the least of it.
+    """
+    interval = float(np.median(np.diff(one.time)))
+    first = round((other.time[0] - one.time[0]) / interval)
+    count = min(len(other.time), len(one.time) - first)
+    difference = other.position[:count] - one.position[first : first + count]
+    rate = one.rate[first : first + count]
+    windows = count // window
+    shape = (windows, 2 * window)
+    difference = difference[: windows * window].reshape(shape)
+    rate = rate[: windows * window].reshape(shape)
+    shift = np.sum(difference * rate, axis=1) / np.sum(rate**2, axis=1)
+    left = difference - shift[:, np.newaxis] * rate
+    times = one.time[first : first + windows * window].reshape(windows, window).mean(axis=1)
+    return times, np.sqrt(np.sum(left**2, axis=1) / window)
+
+
+def growth_rate(times: Array, distances: Array, low: float, high: float) -> tuple[float, float]:
+    """Rate at which a distance grows while it is small.
+
+    Parameters
+    ----------
+    times
+        Times since the start [s], shape (windows).
+    distances
+        Distances, shape (windows).
+    low, high
+        The fit begins with the first distance above the one and ends before the first above the
+        other.
+
+    Returns
+    -------
+    Rate [1/s], NaN if fewer than `MIN_WINDOWS` are in the range, and the time of the fit [s].
+    """
+    begin = max(SETTLING_WINDOWS, _first(distances >= low))
+    end = _first(distances >= high)
+    inside = slice(begin, end)
+    known = distances[inside] > 0
+    time, logarithm = times[inside][known], np.log(distances[inside][known])
+    if time.size < MIN_WINDOWS:
+        return math.nan, 0.0
+    return float(np.polyfit(time, logarithm, 1)[0]), float(time[-1] - time[0])
+
+
+def _first(condition: NDArray[np.bool_]) -> int:
+    """Index of the first that is true; their number if none is."""
+    return int(np.argmax(condition)) if condition.any() else len(condition)
+
+
+def pooled(rates: Array, weights: Array) -> Fit:
+    """Mean of rates of independent twins, weighted by the times of their fits, and its error."""
+    known = np.isfinite(rates)
+    rates, weights = rates[known], weights[known]
+    if rates.size < 2:
+        return Fit(math.nan if rates.size == 0 else float(rates[0]), math.nan)
+    share = weights / weights.sum()
+    mean = float(np.sum(share * rates))
+    error = math.sqrt(np.sum(share**2 * (rates - mean) ** 2) * rates.size / (rates.size - 1))
+    return Fit(mean, error)
+
+
+def lyapunov(
+    config: ConfigLike,
+    *,
+    realization: int = 0,
+    twins: int = 8,
+    duration: float | None = None,
+    displacement: float = DISPLACEMENT,
+    executor: ExecutorLike = None,
+    progress: Callable[[float], None] | None = None,
+) -> xr.DataTree:
+    """The largest Lyapunov exponent of the motion that a configuration settles to.
+
+    Parameters
+    ----------
+    config
+        A configuration whose slider has inertia and a spring; one realization is computed.
+    realization
+        Number of the realization.
+    twins
+        Number of twins, at least 2; they start at equal intervals after `TRANSIENT` of the run.
+    duration
+        Time for which each is followed [s]; by default `FOLLOWED` of the run.
+    displacement
+        Displacement of a twin's drive over F_s/K.
+    executor
+        Where twins are computed: threads.
+    progress
+        Called repeatedly with the fraction of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    xarray.DataTree
+        Dimensions ``twin`` and ``window``; ``distance`` over ``growth_time``, ``twin_exponent``,
+        ``lyapunov_exponent`` with ``lyapunov_error`` [1/s], the peaks of the spring force before
+        slips, and the range of distances that was fitted.
+
+    Raises
+    ------
+    ConfigError
+        If the slider has no inertia or no spring, or there are fewer than two twins.
+    RunError
+        If the run fails, or is too short for a window.
+    """
+    import xarray as xr
+
+    checked = as_config(config)
+    _check(checked, twins, displacement)
+    end = checked.duration
+    span = min(duration or FOLLOWED * end, (1 - TRANSIENT) * end)
+    starts = np.linspace(TRANSIENT * end, end - span, twins)
+    period = 2 * math.pi * math.sqrt(checked.slider.mass / checked.spring_stiffness)
+    window = max(MIN_SAMPLES, round(WINDOW_PERIODS * period / checked.output_interval))
+    distance = displacement * checked.contacts.static_force / checked.spring_stiffness
+    with Realization(checked, realization, estimates_errors=False) as run:
+        others = []
+        for start in starts:
+            run.advance_to(float(start))
+            others.append((run.twin(distance), run.time))
+            if progress is not None:
+                progress(0.5 * run.time / end)
+        run.advance_to(end)
+        reference = Orbit.of_trace(run.trace, checked)
+        peaks = run.table("slips")
+    _follow(others, span, executor, progress)
+    results = []
+    for other, start in others:
+        times, distances = transverse_distances(
+            reference, Orbit.of_trace(other.trace, checked), window
+        )
+        results.append((times - start, distances))
+    windows = min(len(times) for times, _ in results)
+    if windows < MIN_WINDOWS:
+        raise RunError(
+            f"{windows} windows of {window * checked.output_interval:.3g} s are too few: a longer "
+            "run.duration is needed"
+        )
+    times = np.stack([one[0][:windows] for one in results])
+    distances = np.stack([one[1][:windows] for one in results])
+    low, high = _range(checked, reference.after(float(starts[0])).amplitude)
+    fits = [growth_rate(*one, low, high) for one in zip(times, distances, strict=True)]
+    rates, lengths = (np.array(one) for one in zip(*fits, strict=True))
+    fit = pooled(rates, lengths)
+    settled = peaks["start_time"] >= starts[0]
+    data = {
+        "distance": (("twin", "window"), distances),
+        "growth_time": (("twin", "window"), times),
+        "start": (("twin",), np.array([start for _, start in others])),
+        "twin_exponent": (("twin",), rates),
+        "lyapunov_exponent": ((), fit.exponent),
+        "lyapunov_error": ((), fit.error),
+        "min_distance": ((), low),
+        "max_distance": ((), high),
+        "peak_force": (("slip",), peaks["force_before"][settled]),
+        "waiting_time": (("slip",), np.diff(peaks["start_time"], prepend=np.nan)[settled]),
+    }
+    return xr.DataTree(
+        xr.Dataset(
+            {name: LYAPUNOV.variable(name, *value) for name, value in data.items()},
+            attrs=program_attributes(checked, "lyapunov"),
+        )
+    )
+
+
+def summary(tree: xr.DataTree) -> str:
+    """What the sign of the largest exponent means."""
+    exponent, error = (float(tree[name]) for name in ("lyapunov_exponent", "lyapunov_error"))
+    if not math.isfinite(error):
+        return "too few distances in the range: a longer run or a smaller displacement is needed"
+    if exponent > SIGNIFICANCE * error:
+        return "chaos: small distances grow"
+    if exponent < -SIGNIFICANCE * error:
+        return "regular: small distances decay"
+    return "no growth beyond the error: the exponent is zero, or more twins are needed"
+
+
+def _check(config: Config, twins: int, displacement: float) -> None:
+    """Refuse what has no twins.
+
+    Raises
+    ------
+    ConfigError
+        If the slider has no inertia or no spring, or an argument is not positive.
+    """
+    problems = []
+    if config.slider.kind not in SLIDERS:
+        problems.append(
+            Problem(
+                "",
+                "slider.kind",
+                "the Lyapunov exponent needs a slider with inertia and a spring: "
+                + " or ".join(SLIDERS),
+                config.slider.kind,
+            )
+        )
+    if twins < 2:
+        problems.append(Problem("", "twins", "must be at least 2, for an error", twins))
+    if not 0 < displacement < MAX_DISTANCE:
+        text = f"must be between 0 and {MAX_DISTANCE}"
+        problems.append(Problem("", "displacement", text, displacement))
+    if problems:
+        raise ConfigError(problems)
+
+
+def _range(config: Config, amplitude: float) -> tuple[float, float]:
+    """Distances between which growth is fitted."""
+    low = 0.0
+    if config.contact_kind.is_discrete:
+        low = DISCRETE_DISTANCES / config.contacts.count
+    return low, MAX_DISTANCE * amplitude
+
+
+def _follow(
+    twins: list[tuple[Realization, float]],
+    span: float,
+    executor: ExecutorLike,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """Let twins go on for a time.
+
+    Raises
+    ------
+    StoppedError
+        If that was interrupted.
+    """
+    stop = Stop()
+    with stop.on_interrupt():
+        work = completed(
+            as_executor(executor), lambda one, _: _advance(*one, span, stop), twins, stop
+        )
+        for done, (_, future) in enumerate(work, start=1):
+            future.result()
+            if progress is not None:
+                progress(0.5 + 0.5 * done / len(twins))
+    if stop.is_set():
+        raise StoppedError("interrupted")
+
+
+def _advance(twin: Realization, start: float, span: float, stop: Stop) -> None:
+    while not stop.is_set() and not twin.finished and twin.time < start + span:
+        twin.advance_to(min(start + span, twin.time + span / 16))
+    twin.close()

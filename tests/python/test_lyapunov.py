@@ -1,0 +1,174 @@
+"""Lyapunov exponents and return maps against closed forms."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import mesoslip
+import numpy as np
+import pytest
+from conftest import klein_tables
+from mesoslip.analysis.lyapunov import Orbit, growth_rate, pooled, summary, transverse_distances
+from mesoslip.analysis.return_map import map_exponent, settled_peaks
+from mesoslip.configuration.config import Config
+
+# No contact breaks: the slider on its springs is a linear system.
+PINNED = {
+    "run__engine": "me",
+    "run__duration": 3.0,
+    "contacts__static_force": 1.0,
+    "contacts__stiffness": 500.0,
+    "contacts__coupling": "equal",
+    "output__interval": 0.5e-3,
+}
+
+
+def linear_rate(config: Config) -> float:
+    """Slowest decay of V' = -w^2 x - D, D' = eta (V' - D)."""
+    slider = config.slider
+    square = (slider.stiffness + config.contacts.stiffness) / slider.mass
+    eta = slider.damping_rate
+    return float(np.max(np.roots([1.0, 2 * eta, square, eta * square]).real))
+
+
+def test_distances_of_a_linear_system_decay_with_its_slowest_mode():
+    config = Config.from_dict(klein_tables(**PINNED))
+    tree = mesoslip.lyapunov(config, twins=4, duration=0.5, executor=1)
+    expected = linear_rate(config)
+    # Windows average over the ringing; the shift in time takes a little of it off.
+    assert float(tree["lyapunov_exponent"]) == pytest.approx(expected, rel=0.03)
+    assert summary(tree) == "regular: small distances decay"
+
+
+def test_a_twin_that_is_not_displaced_is_the_run_itself():
+    config = Config.from_dict(klein_tables(run__duration=3.0, contacts__count=50))
+    with mesoslip.Realization(config) as run:
+        run.advance_to(1.9)
+        with run.twin(0.0) as same, run.twin(1e-12) as other:
+            for one in (run, same, other):
+                one.advance_to(2.5)
+            begin = len(run.trace) - len(same.trace)
+            assert np.array_equal(run.trace[begin:], same.trace)
+            assert not np.array_equal(run.trace[begin:], other.trace)
+            assert abs(other.energy_residual) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        ("rigid", {}),
+        (
+            "layered",
+            {
+                "slider__layers": 2,
+                "slider__layer_damping": 1e3,
+                "slider__damping_ratio": None,
+            },
+        ),
+    ],
+)
+def test_a_displaced_drive_pulls_with_its_spring(kind, changes):
+    config = Config.from_dict(klein_tables(slider__kind=kind, contacts__count=50, **changes))
+    with mesoslip.Realization(config) as run:
+        run.advance_to(0.1)
+        with run.twin(1e-9) as other:
+            for one in (run, other):
+                one.advance_to(0.5)
+            before, after = run.table("trace")[-1], other.table("trace")[-1]
+            shift = after["drive_displacement"] - before["drive_displacement"]
+            assert shift == pytest.approx(1e-9, rel=1e-4)
+            # Pinned contacts and the spring share it.
+            spring, contacts = config.spring_stiffness, config.contacts.stiffness
+            share = 1e-9 * spring * contacts / (spring + contacts)
+            difference = after["spring_force"] - before["spring_force"]
+            assert difference == pytest.approx(share, rel=0.02)
+
+
+def test_a_shift_in_time_is_no_distance():
+    time = np.arange(0.0, 20.0, 0.01)
+
+    def orbit(shift: float, growth: float) -> Orbit:
+        phase = time + shift
+        position = np.stack([np.cos(phase), np.sin(phase)], axis=1)
+        position *= 1 + growth * np.exp(0.3 * time)[:, np.newaxis]
+        return Orbit(time, position, np.gradient(position, time, axis=0))
+
+    _, none = transverse_distances(orbit(0.0, 0.0), orbit(1e-4, 0.0), 100)
+    assert none.max() < 1e-7
+    times, grown = transverse_distances(orbit(0.0, 0.0), orbit(1e-4, 1e-6), 100)
+    rate, length = growth_rate(times, grown, 0.0, 1.0)
+    assert rate == pytest.approx(0.3, rel=0.02)
+    assert length > 15
+
+
+def test_growth_is_fitted_between_two_distances():
+    times = np.arange(40.0)
+    distances = np.minimum(np.maximum(1e-9 * np.exp(times), 1e-6), 1e-1)
+    assert growth_rate(times, distances, 1e-5, 1e-2)[0] == pytest.approx(1.0)
+    assert math.isnan(growth_rate(times, distances, 1e-3, 2e-3)[0])
+
+
+def test_the_error_of_a_mean_rate_is_that_of_its_scatter():
+    rng = np.random.default_rng(1)
+    fits = [pooled(rng.normal(2.0, 0.5, 20), np.ones(20)) for _ in range(400)]
+    means, errors = np.array(fits).T
+    assert means.mean() == pytest.approx(2.0, abs=0.02)
+    assert errors.mean() == pytest.approx(means.std(), rel=0.1)
+    assert math.isnan(pooled(np.array([1.0, np.nan]), np.ones(2)).error)
+
+
+def test_the_exponent_of_a_map_is_the_mean_logarithm_of_its_slope():
+    x = np.empty(1000)
+    x[0] = 0.3
+    for i in range(x.size - 1):
+        x[i + 1] = 4 * x[i] * (1 - x[i])
+    assert map_exponent(x) == pytest.approx(math.log(2), abs=0.03)
+    # Of a map with a stable point.
+    y = np.empty(300)
+    y[0] = 0.1
+    for i in range(y.size - 1):
+        y[i + 1] = 0.5 - 0.95 * (y[i] - 0.3)
+    assert map_exponent(y[:200]) == pytest.approx(math.log(0.95), abs=0.001)
+    assert math.isnan(map_exponent(x[:50]))
+
+
+def test_peaks_are_those_of_the_second_half():
+    tree = mesoslip.run(klein_tables(run__duration=8.0, contacts__count=20), executor=1)
+    slips = tree["slips"].to_dataset()
+    late = slips["start_time"].values >= 4.0
+    assert np.array_equal(settled_peaks(tree), slips["force_before"].values[late])
+    assert 0 < late.sum() < late.size
+    assert mesoslip.plot(tree, view="return-map").axes[0].lines
+
+
+def test_sliders_without_inertia_have_no_twins(tmp_path, command):
+    config = {**klein_tables(), "slider": {"kind": "prescribed"}}
+    with pytest.raises(mesoslip.ConfigError, match=r"slider\.kind = .*rigid or layered"):
+        mesoslip.lyapunov(config)
+    with pytest.raises(mesoslip.ConfigError, match=r"twins.* must be at least 2"):
+        mesoslip.lyapunov(klein_tables(), twins=1)
+    file = tmp_path / "pinned.toml"
+    file.write_text(Config.from_dict(klein_tables(**PINNED)).to_toml())
+    output = tmp_path / "pinned.nc"
+    _, text, _ = command(
+        "lyapunov", file, "-o", output, "--follow", "0.5 s", "--twins", "4", "--quiet"
+    )
+    assert "regular: small distances decay" in text
+    with mesoslip.open_output(output) as tree:
+        assert tree.sizes["twin"] == 4
+        assert mesoslip.plot(tree).axes
+    _, text, _ = command("lyapunov", file, "--follow", "0.5 s", "--twins", "4", "--json", "--quiet")
+    found = json.loads(text)
+    assert found["lyapunov_exponent"] < -3 * found["lyapunov_error"]
+
+
+def test_a_sweep_measures_exponents(tmp_path):
+    (tmp_path / "base.toml").write_text(Config.from_dict(klein_tables(**PINNED)).to_toml())
+    (tmp_path / "sweep.toml").write_text(
+        'base = "base.toml"\n[sweep]\nmeasures = ["lyapunov_exponent", "peak_variation"]\n'
+        '[sweep.grid]\n"run.duration" = ["1.5 s"]\n'
+    )
+    data = mesoslip.sweep(tmp_path / "sweep.toml", executor=1)
+    assert data["lyapunov_exponent"].item() < -1
+    assert math.isnan(data["peak_variation"].item())

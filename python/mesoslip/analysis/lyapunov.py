@@ -96,7 +96,7 @@ class Orbit:
         index = [TRACE_COLUMNS.index(one) for one in ("time", "spring_force", "velocity")]
         time, force, velocity = trace[:, index].T
         static, spring = config.contacts.static_force, config.spring_stiffness
-        unit = static / spring * math.sqrt(spring / config.slider.mass)
+        unit = static / spring * math.pi / config.slider.quiet_time
         position = np.stack([force / static, velocity / unit], axis=1)
         return cls(time, position, np.gradient(position, time, axis=0))
 
@@ -239,7 +239,7 @@ def lyapunov(
     end = checked.duration
     span = min(duration or FOLLOWED * end, (1 - TRANSIENT) * end)
     starts = np.linspace(TRANSIENT * end, end - span, twins)
-    period = 2 * math.pi * math.sqrt(checked.slider.mass / checked.spring_stiffness)
+    period = 2 * checked.slider.quiet_time
     window = max(MIN_SAMPLES, round(WINDOW_PERIODS * period / checked.output_interval))
     distance = displacement * checked.contacts.static_force / checked.spring_stiffness
     with Realization(checked, realization, estimates_errors=False) as run:

@@ -39,7 +39,7 @@ def settled_peaks(tree: xr.DataTree, realization: int = 0) -> Array:
     if "slips" not in tree.children:
         return np.empty(0)
     data = group_of(tree, "slips")
-    time = tree["time"].values
+    time = tree.to_dataset()["time"].values
     mine = (data["realization_index"].values == realization) & (
         data["start_time"].values >= time[0] + TRANSIENT * (time[-1] - time[0])
     )

@@ -64,7 +64,7 @@ class RunView:
     @cached_property
     def exponent(self) -> xr.DataTree:
         """Its largest Lyapunov exponent, from twins of another run of the configuration."""
-        number = int(self.tree["realization"].values[0])
+        number = int(self.tree.to_dataset()["realization"].values[0])
         return lyapunov(config_of(self.tree), realization=number, executor=1)
 
     def total(self, name: str) -> float:

@@ -19,14 +19,15 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     with styled():
         figure, (growth, peaks) = side_by_side(figure, (6.5, 3.2))
         draw_growth(growth, tree, options)
-        draw_map(peaks, tree["peak_force"].values)
+        draw_map(peaks, tree.to_dataset()["peak_force"].values)
         peaks.set_title("return map of peaks", loc="left")
     return figure
 
 
 def draw_growth(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     """Draw the distances of twins over the time since their start, and the mean growth."""
-    times, distances = tree["growth_time"].values, tree["distance"].values
+    data = tree.to_dataset()
+    times, distances = data["growth_time"].values, data["distance"].values
     axes.semilogy(times.T, distances.T, color=BLUE, linestyle="-", linewidth=0.6, alpha=0.6)
     exponent, error = (float(tree[name]) for name in ("lyapunov_exponent", "lyapunov_error"))
     low, high = float(tree["min_distance"]), float(tree["max_distance"])
@@ -52,8 +53,9 @@ def draw_growth(axes: Axes, tree: xr.DataTree, _: Options) -> None:
 def draw_all(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options) -> None:
     """Draw the mean growth of several outputs over each other."""
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
-        mean = np.exp(np.mean(np.log(tree["distance"].values), axis=0))
-        time = tree["growth_time"].values.mean(axis=0)
+        data = tree.to_dataset()
+        mean = np.exp(np.mean(np.log(data["distance"].values), axis=0))
+        time = data["growth_time"].values.mean(axis=0)
         axes.semilogy(time, mean, color=curve_color(number), label=label)
     axes.set_xlabel("time since the start of a twin, s")
     axes.set_ylabel("distance, geometric mean of twins")

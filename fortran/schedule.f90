@@ -6,10 +6,14 @@
 !>
 !> A schedule is never wrong, only short: it ends before anything that it does not know of, and the
 !> numbers of a run do not depend on its length.
+!>
+!> With clocks of thermally activated breaking a contact may be in two lists, that of coordinates
+!> and that of readings of a clock; where it breaks by one it is gone from the other.
 module mesoslip_schedule
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
-   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_hazard, only: hazard_type
+   use mesoslip_interface_law, only: clocks, interface_law_type, window_type
    implicit none
    private
 
@@ -46,8 +50,9 @@ module mesoslip_schedule
       !> of the contact when it is detached [N s/m]
       real(wp) :: break_coordinate(max_events) = 0.0_wp, break_stiffness(max_events) = 0.0_wp, &
          & break_origin(max_events) = 0.0_wp, break_drag(max_events) = 0.0_wp
-      !> When and where it came [s, m]
-      real(wp) :: break_time(max_events) = 0.0_wp, break_displacement(max_events) = 0.0_wp
+      !> When and where those came, in their order [s, m]
+      real(wp) :: break_time(2 * max_events) = 0.0_wp, &
+         & break_displacement(2 * max_events) = 0.0_wp
       !> Of each attachment: its time [s], with that of the first one that is not in the schedule;
       !> stiffness [N/m], stretch at first and at breaking [m] and drag until then [N s/m]
       real(wp) :: attach_time(max_events + 1) = 0.0_wp, attach_stiffness(max_events) = 0.0_wp, &
@@ -55,13 +60,39 @@ module mesoslip_schedule
          & attach_drag(max_events) = 0.0_wp
       !> Where it came [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
+
+      !> Whether there are clocks, which they are, and the one by which contacts break here
+      logical :: has_clocks = .false.
+      type(hazard_type) :: hazard
+      integer :: number = 1
+      !> Breaks by the clock to come, and those that came or are gone
+      integer :: clock_breaks = 0, clock_broken = 0
+      !> Of each its reading [s], and origin [m]
+      real(wp) :: clock_key(max_events) = 0.0_wp, clock_origin(max_events) = 0.0_wp
+      !> Entries of the two lists that end the schedule without a break, 0 for none
+      integer :: break_stop = 0, clock_stop = 0
+      !> Of each entry the same contact in the other list, or 0, and whether it is gone
+      integer :: break_twin(max_events) = 0, clock_twin(max_events) = 0
+      logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
+      !> Breaks in all, and the entry of each, negative if it is one of the clock
+      integer :: came_count = 0, came(2 * max_events) = 0
+      !> Whether contacts broke in the last moment
+      logical :: breaks_now = .false.
+      !> Of each attachment the deviate, and the reading at which the contact breaks [s]; distance
+      !> from its origin at which its force changes its sign on the way back [m]
+      real(wp) :: attach_left(max_events) = 0.0_wp, attach_key(max_events) = 0.0_wp, &
+         & tiny_stretch = 0.0_wp
    contains
       !> Contact force until the next event, and where and when that is
       procedure, non_overridable :: law
       procedure, non_overridable :: window
+      !> Number of contacts that broke
+      procedure, non_overridable :: break_count
       !> Let what is due at a time and a displacement happen
       procedure, non_overridable :: pass
       procedure, non_overridable, private :: break_due, attach_due
+      procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
+         & skip_gone
    end type schedule_type
 
 contains
@@ -96,7 +127,18 @@ contains
       end if
       window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
          & time + self%max_step)
+      if (self%has_clocks) call self%hazard%limit_window(window)
    end function window
+
+   !> Number of contacts that broke.
+   pure function break_count(self) result(number)
+      !> The schedule
+      class(schedule_type), intent(in) :: self
+      !> Their number
+      integer :: number
+
+      number = merge(self%came_count, self%broken, self%has_clocks)
+   end function break_count
 
    !> Let what is due happen: first contacts break, then contacts attach.
    subroutine pass(self, time, displacement)
@@ -105,6 +147,10 @@ contains
       !> Time [s] and displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
 
+      if (self%has_clocks) then
+         call self%pass_clocks(time, displacement)
+         return
+      end if
       if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
          call self%break_due(time, displacement)
       end if
@@ -172,5 +218,139 @@ contains
       end do
       self%attached = event - 1
    end subroutine attach_due
+
+   !> The same with clocks: contacts break by their clock, then at coordinates, then others attach.
+   !> What else may be due where the schedule ends is left to the contacts.
+   subroutine pass_clocks(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      logical :: far(clocks)
+      integer :: earlier, other
+
+      earlier = self%came_count
+      do while (self%clock_broken < self%clock_breaks)
+         associate (event => self%clock_broken + 1)
+            if (event == self%clock_stop &
+               & .or. self%clock_key(event) > self%hazard%reading(self%number)) exit
+            call self%break_with_clocks(time, displacement, -event, self%clock_origin(event))
+            if (self%clock_twin(event) > 0) self%break_gone(self%clock_twin(event)) = .true.
+         end associate
+         self%clock_broken = self%clock_broken + 1
+      end do
+      call self%skip_gone()
+      do while (self%broken < self%breaks)
+         associate (event => self%broken + 1)
+            if (self%break_coordinate(event) > self%direction * displacement) exit
+            if (event == self%break_stop) then
+               self%is_over = .true.
+               exit
+            end if
+            call self%break_with_clocks(time, displacement, event, self%break_origin(event))
+            if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
+         end associate
+         self%broken = self%broken + 1
+         call self%skip_gone()
+      end do
+      self%breaks_now = self%came_count > earlier
+      if (self%breaks_now) self%moments = self%moments + 1
+
+      other = clocks + 1 - self%number
+      call self%hazard%is_far(self%number, displacement, far(self%number))
+      far(other) = .false.
+      if (self%hazard%is_used(other)) then
+         call self%hazard%is_far(other, displacement, far(other))
+         far(other) = far(other) .or. self%hazard%reading(other) >= self%hazard%next(other)
+      end if
+      self%is_over = self%is_over .or. any(far) .or. time >= self%end_time &
+         & .or. abs(displacement) * self%mean_stiffness >= self%max_force &
+         & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks
+      if (self%is_over) return
+      if (self%attach_time(self%attached + 1) <= time) then
+         call self%attach_with_clocks(time, displacement)
+         self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
+            & .or. self%attach_time(self%attached + 1) <= time
+         if (self%is_over) return
+      end if
+      self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
+   end subroutine pass_clocks
+
+   !> A contact breaks.
+   subroutine break_with_clocks(self, time, displacement, entry, origin)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+      !> Entry of its list, negative if it is that of the clock
+      integer, intent(in) :: entry
+      !> Its origin [m]
+      real(wp), intent(in) :: origin
+
+      self%came_count = self%came_count + 1
+      self%came(self%came_count) = entry
+      self%break_time(self%came_count) = time
+      self%break_displacement(self%came_count) = displacement
+      call self%stiffness%add(-self%break_stiffness(1))
+      call self%offset%add(-self%break_stiffness(1) * origin)
+      if (self%break_drag(1) > 0.0_wp) call self%drag%add(self%break_drag(1))
+      ! Those that break now come after all that wait to attach.
+      if (self%came_count == 1) then
+         self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
+            & time + self%delay)
+      end if
+      self%pinned = self%pinned - 1
+      self%detached = self%detached + 1
+      if (self%pinned == 0) then
+         self%stiffness = accumulator_type()
+         self%offset = accumulator_type()
+      end if
+   end subroutine break_with_clocks
+
+   !> Skip contacts that have broken as entries of the other list.
+   pure subroutine skip_gone(self)
+      class(schedule_type), intent(inout) :: self
+
+      do while (self%broken < self%breaks)
+         if (.not. self%break_gone(self%broken + 1)) exit
+         self%broken = self%broken + 1
+      end do
+      do while (self%clock_broken < self%clock_breaks)
+         if (.not. self%clock_gone(self%clock_broken + 1)) exit
+         self%clock_broken = self%clock_broken + 1
+      end do
+   end subroutine skip_gone
+
+   !> Contacts attach. One that would break before another of a list cuts it short.
+   subroutine attach_with_clocks(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      real(wp) :: origin, ahead, key
+      integer :: event
+
+      do event = self%attached + 1, self%attachments
+         if (self%attach_time(event) > time) exit
+         self%attach_displacement(event) = displacement
+         origin = displacement - self%attach_stretch(event)
+         call self%drag%add(-self%attach_drag(event))
+         self%pinned = self%pinned + 1
+         self%detached = self%detached - 1
+         if (self%detached == 0) self%drag = accumulator_type()
+         call self%stiffness%add(self%attach_stiffness(event))
+         call self%offset%add(self%attach_stiffness(event) * origin)
+         self%behind = max(self%behind, self%direction * origin - self%tiny_stretch)
+         ahead = self%direction * origin + self%attach_limit(event)
+         do while (self%breaks > self%broken)
+            if (self%break_coordinate(self%breaks) < ahead) exit
+            self%breaks = self%breaks - 1
+         end do
+         key = self%hazard%key(self%number, self%attach_left(event), self%attach_limit(event), &
+            & origin)
+         self%attach_key(event) = key
+         do while (self%clock_breaks > self%clock_broken)
+            if (self%clock_key(self%clock_breaks) < key) exit
+            self%clock_breaks = self%clock_breaks - 1
+         end do
+      end do
+      self%attached = event - 1
+   end subroutine attach_with_clocks
 
 end module mesoslip_schedule

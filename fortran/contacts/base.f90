@@ -224,8 +224,8 @@ contains
    subroutine settle(self, schedule, pose)
       !> The contacts
       class(contacts_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
-      type(schedule_type), intent(in) :: schedule
+      !> The schedule, as far as the slider came; moments in which contacts broke may be added
+      type(schedule_type), intent(inout) :: schedule
       !> Where the slider is
       type(pose_type), intent(in) :: pose
 

@@ -141,7 +141,7 @@ contains
       !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
-      integer :: number, event
+      integer :: number, event, contact(max_events)
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
@@ -161,7 +161,8 @@ contains
       schedule%moments = 0
       schedule%direction = self%direction
       schedule%behind = self%behind
-      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule)
+      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule, &
+         & contact)
       schedule%is_over = .false.
    end subroutine plan
 
@@ -170,7 +171,7 @@ contains
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
       !> The schedule, as far as the slider came
-      type(schedule_type), intent(in) :: schedule
+      type(schedule_type), intent(inout) :: schedule
       !> Where the slider is
       type(pose_type), intent(in) :: pose
 

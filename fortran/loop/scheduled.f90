@@ -93,7 +93,7 @@ contains
       call state%recorder%slips%skip_steps(filter)
       if (.not. filter%is_selected) return
       call state%recorder%record(state%slider, real(state%schedule%detached, wp), &
-         & state%contacts%breaks + state%schedule%broken)
+         & state%contacts%breaks + state%schedule%break_count())
       call state%slider%note_extreme()
       if (state%slider%direction * state%schedule%direction < 0.0_wp) return
       call state%schedule%pass(state%slider%time, state%slider%displacement)

@@ -66,12 +66,14 @@ contains
       uniform(2) = unit_real(word(2), word(3))
    end subroutine uniform_pair
 
-   !> The pairs of several contacts at their first attempts, to the same bits and in less time.
-   pure subroutine uniform_pairs(seed, realization, contact, renewal, first, second)
+   !> The pairs of several contacts at one attempt, to the same bits and in less time.
+   pure subroutine uniform_pairs(seed, realization, contact, renewal, attempt, first, second)
       !> Seed of the run, and number of the realization
       integer(i8), intent(in) :: seed, realization
       !> Numbers of the contacts, and how often each has been born before
       integer(i8), intent(in), contiguous :: contact(:), renewal(:)
+      !> Number of the attempt
+      integer(i8), intent(in) :: attempt
       !> The two deviates of each, shape that of contact
       real(wp), intent(out), contiguous :: first(:), second(:)
 
@@ -86,7 +88,7 @@ contains
             place(lane) = min(start + lane, size(contact))
             word_0(lane) = contact(place(lane))
             word_1(lane) = iand(renewal(place(lane)), mask)
-            word_2(lane) = ishft(renewal(place(lane)), -32)
+            word_2(lane) = ior(ishft(renewal(place(lane)), -32), ishft(attempt, 16))
             word_3(lane) = realization
          end do
          do round = 1, rounds

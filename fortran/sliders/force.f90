@@ -11,7 +11,7 @@ module mesoslip_sliders_force
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, slider_type
-   use mesoslip_sliders_hazard_clock, only: advance_clocks
+   use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
    use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, second_integral
    use mesoslip_step_filter, only: step_filter_type
    implicit none
@@ -98,18 +98,22 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
+      type(window_type) :: bounds
       real(wp) :: force, step
 
       self%law = law
       self%step_time = self%time
       self%start_displacement = self%displacement
+      bounds = window
+      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
+         & self%acceleration, bounds)
       force = self%drive%at(self%time)
       self%start_acceleration = acceleration_under(self, force, 0.0_wp)
 
-      if (is_settled(self, force, window%end_time - self%time)) then
-         call glide(self, window, step)
+      if (is_settled(self, force, bounds%end_time - self%time)) then
+         call glide(self, bounds, step)
       else
-         call move(self, window, step)
+         call move(self, bounds, step)
       end if
 
       call add_work(self, force, step)

@@ -1,34 +1,34 @@
 !> Clocks of thermally activated breaking: when they come to a reading during a motion.
 !>
 !> The reading is the integral of exp(slope X) over the motion, which is known as a series of the
-!> velocity. It is a Gauss rule over parts of a step so short that the rule is exact to rounding;
-!> the time of a reading is found by Halley's method. In most steps between two events the exponent
-!> changes so little that the reading is a polynomial of the time.
+!> velocity. In most steps between two events the exponent changes so little that the reading is a
+!> series in the time, too. In others it is a Gauss rule over parts of a step so short that the rule
+!> is exact to rounding, and the time of a reading is found by Halley's method.
 module mesoslip_sliders_hazard_clock
-   use mesoslip_interface_law, only: clocks, hazard_clock_type
+   use mesoslip_interface_law, only: clocks, hazard_clock_type, window_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_hazard_series, only: try_series
    use mesoslip_sliders_motion_series, only: horner, inverse, max_terms
    implicit none
    private
 
-   public :: advance_clocks, time_to_reading, reading_after
+   public :: advance_clocks, limit_window, time_to_reading, reading_after
+
+   !> Time over that in which a clock is expected to come to its reading after which a window ends
+   real(wp), parameter :: window_ratio = 1.25_wp
 
    !> Maximum change of the exponent in a part of a step, in which the rule is exact to rounding
    real(wp), parameter :: max_change = 0.5_wp
    !> Relative change of a time after which one more step changes nothing: convergence is cubic
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
-   !> A step is short if the terms of the exponent, from the first to the fourth, change it by no
-   !> more than this, and others by nothing: what a series of the sixth order leaves out of its
-   !> exponential function is below 1e-15 of it
-   integer, parameter :: short_terms = 4, short_order = 6
-   real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
-   real(wp), parameter :: no_change = 1.0e-16_wp
-   !> Bounds on the mean of the exponential function over a short step
-   real(wp), parameter :: min_growth = 0.97_wp, max_growth = 1.03_wp
+   !> Change of an exponent below which eight terms of a series do
+   real(wp), parameter :: small = 1.0e-2_wp
 
-   !> Change of an exponent below which three terms of a series do
-   real(wp), parameter :: small = 1.0e-4_wp
+   integer :: i
+   !> Coefficients of 1 - log(1 + y)/y and of (exp(z) - 1)/z - 1
+   real(wp), parameter :: logarithm(0:8) = [0.0_wp, (-(-1.0_wp)**i / (i + 1), i=1, 8)]
+   real(wp), parameter :: growth(0:7) = [0.0_wp, (1.0_wp / gamma(i + 2.0_wp), i=1, 7)]
 
    !> Gauss-Legendre points and weights on [0, 1]
    integer, parameter :: points = 10
@@ -52,6 +52,50 @@ module mesoslip_sliders_hazard_clock
 
 contains
 
+   !> End a window where no clock is expected to need it any more: a step that is not much longer
+   !> than needed takes less time.
+   pure subroutine limit_window(clock, time, velocity, acceleration, window)
+      !> The clocks
+      type(hazard_clock_type), intent(in) :: clock(clocks)
+      !> Time [s], velocity [m/s] and acceleration [m/s2] of the slider
+      real(wp), intent(in) :: time, velocity, acceleration
+      !> The window
+      type(window_type), intent(inout) :: window
+
+      real(wp) :: expected
+      integer :: number
+
+      expected = huge(1.0_wp)
+      do number = 1, clocks
+         if (.not. (clock(number)%is_used .and. clock(number)%left < huge(1.0_wp))) cycle
+         expected = min(expected, expected_time(clock(number)%slope * velocity, &
+            & clock(number)%slope * acceleration, clock(number)%left / clock(number)%rate))
+      end do
+      if (expected < huge(1.0_wp)) window%end_time = min(window%end_time, &
+         & max(time + window_ratio * expected, nearest(time, 1.0_wp)))
+   end subroutine limit_window
+
+   !> Time in which the integral of exp(growth t + bend t**2/2) is expected to have a value; huge
+   !> where this estimate does not apply.
+   pure function expected_time(growth, bend, wanted) result(time)
+      !> Growth of the exponent [1/s] and its change [1/s2], the integral [s]
+      real(wp), intent(in) :: growth, bend, wanted
+      real(wp) :: time
+
+      real(wp) :: y
+
+      y = growth * wanted
+      time = wanted
+      if (abs(y) < 0.1_wp) then
+         time = wanted * (1.0_wp - y * (0.5_wp - y / 3.0_wp))
+      else
+         time = huge(1.0_wp)
+         if (y > -1.0_wp) time = log(1.0_wp + y) / growth
+      end if
+      ! Where the velocity changes by much, the slider is to go as far as it can.
+      if (abs(bend) * min(time, 1.0e100_wp)**2 > 1.0_wp) time = max(time, 1.0_wp / sqrt(abs(bend)))
+   end function expected_time
+
    !> Shorten a step to the first time at which a clock comes to its reading, and let clocks go on.
    pure subroutine advance_clocks(clock, series, terms, step, is_ended)
       !> The clocks
@@ -65,13 +109,18 @@ contains
       logical, intent(out) :: is_ended
 
       integer :: number, ended_by
-      logical :: is_short
+      logical :: is_done
       real(wp) :: time
 
-      call try_short_step(clock, series, terms, step, ended_by, is_short)
+      if (terms == 1) then
+         call go_uniformly(clock, series(0), step, ended_by)
+         is_done = .true.
+      else
+         call try_series(clock, series, terms, step, ended_by, is_done)
+      end if
       is_ended = ended_by > 0
       if (is_ended) clock(ended_by)%is_due = .true.
-      if (is_short) return
+      if (is_done) return
       do number = 1, clocks
          if (.not. clock(number)%is_used) cycle
          time = time_to_reading(clock(number), series, terms, step)
@@ -177,123 +226,38 @@ contains
       end do
    end subroutine expand_exponent
 
-   !> Try a short step: shorten it to the first time at which a clock comes to its reading, and let
-   !> clocks go on.
-   pure subroutine try_short_step(clock, series, terms, step, ended_by, is_short)
+   !> Make a step at a constant velocity: shorten it to the first time at which a clock comes to its
+   !> reading, and let clocks go on.
+   pure subroutine go_uniformly(clock, velocity, step, ended_by)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
-      real(wp), intent(in) :: series(0:)
-      integer, intent(in) :: terms
+      real(wp), intent(in) :: velocity
       real(wp), intent(inout) :: step
       !> The clock that ends the step, or 0
       integer, intent(out) :: ended_by
-      !> Whether the step is short; if not, nothing has changed
-      logical, intent(out) :: is_short
 
-      real(wp) :: change, length, part, time
-      real(wp) :: exponent(short_terms), growth(0:short_order, clocks)
-      integer :: term, number
+      real(wp) :: time
+      integer :: number
 
       ended_by = 0
-      is_short = .true.
-      exponent = 0.0_wp
-      ! Both clocks have one slope but for its sign.
-      length = clock(1)%slope
-      do term = 1, min(terms, short_terms)
-         length = length * step
-         exponent(term) = series(term - 1) * inverse(term) * length
-         if (.not. abs(exponent(term)) <= max_short(term)) is_short = .false.
-      end do
-      if (.not. is_short) return
-      change = 0.0_wp
-      do term = terms, short_terms + 1, -1
-         change = (change + abs(series(term - 1)) * inverse(term)) * step
-      end do
-      is_short = change * abs(length) <= no_change
-      if (.not. is_short) return
-
-      length = step
-      time = 1.0_wp
       do number = 1, clocks
          if (.not. clock(number)%is_used) cycle
-         growth(:, number) = expand_growth(sign(1.0_wp, clock(number)%slope * clock(1)%slope) &
-            & * exponent)
-         part = short_time(growth(:, number), clock(number)%left, clock(number)%rate * length, time)
-         if (part > time) cycle
-         time = part
-         ended_by = number
+         associate (one => clock(number))
+            if (one%left > 0.0_wp) then
+               if (.not. (one%left < huge(1.0_wp) .and. one%rate > 0.0_wp)) cycle
+               time = steady_time(one%slope * velocity, one%left / one%rate)
+            else
+               time = 0.0_wp
+            end if
+            if (time > step) cycle
+            step = time
+            ended_by = number
+         end associate
       end do
       do number = 1, clocks
-         if (clock(number)%is_used) clock(number)%elapsed = clock(number)%rate * length &
-            & * short_integral(growth(:, number), time)
+         if (clock(number)%is_used .and. number /= ended_by) clock(number)%elapsed = step &
+            & * clock(number)%rate * mean_growth(clock(number)%slope * velocity * step)
       end do
-      if (ended_by > 0) step = time * length
-   end subroutine try_short_step
-
-   !> Coefficients of the exponential function, from those of the exponent: of g = exp(e), n g_n is
-   !> the sum over j of j e_j g_(n-j).
-   pure function expand_growth(e) result(g)
-      real(wp), intent(in) :: e(short_terms)
-      real(wp) :: g(0:short_order)
-
-      real(wp) :: e_2, e_3, e_4
-
-      e_2 = 2.0_wp * e(2)
-      e_3 = 3.0_wp * e(3)
-      e_4 = 4.0_wp * e(4)
-      g(0) = 1.0_wp
-      g(1) = e(1)
-      g(2) = inverse(2) * (e(1) * g(1) + e_2)
-      g(3) = inverse(3) * (e(1) * g(2) + e_2 * g(1) + e_3)
-      g(4) = inverse(4) * ((e(1) * g(3) + e_2 * g(2)) + (e_3 * g(1) + e_4))
-      g(5) = inverse(5) * ((e(1) * g(4) + e_2 * g(3)) + (e_3 * g(2) + e_4 * g(1)))
-      g(6) = inverse(6) * ((e(1) * g(5) + e_2 * g(4)) + (e_3 * g(3) + e_4 * g(2)))
-   end function expand_growth
-
-   !> Integral of the exponential function over a part of a short step, in units of the step.
-   pure function short_integral(growth, time) result(integral)
-      !> Its coefficients
-      real(wp), intent(in) :: growth(0:short_order)
-      real(wp), intent(in) :: time
-      real(wp) :: integral
-
-      associate (g => growth)
-         integral = time * (g(0) + time * (inverse(2) * g(1) + time * (inverse(3) * g(2) &
-            & + time * (inverse(4) * g(3) + time * (inverse(5) * g(4) + time * (inverse(6) * g(5) &
-            & + time * inverse(7) * g(6)))))))
-      end associate
-   end function short_integral
-
-   !> Time at which a clock comes to its reading in a short step, in units of the step; huge if it
-   !> is later than a time.
-   pure function short_time(growth, left, whole, latest) result(time)
-      real(wp), intent(in) :: growth(0:short_order)
-      !> What is left, and what the clock would go on by in the step at its first rate
-      real(wp), intent(in) :: left, whole
-      real(wp), intent(in) :: latest
-      real(wp) :: time
-
-      real(wp) :: wanted, change, pace
-      integer :: iteration
-
-      time = huge(1.0_wp)
-      if (left > max_growth * latest * whole) return
-      wanted = left / whole
-      if (wanted > min_growth * latest) then
-         if (wanted > short_integral(growth, latest)) return
-      end if
-      pace = growth(1) * wanted
-      time = wanted * (1.0_wp - pace * (0.5_wp - inverse(3) * pace))
-      do iteration = 1, max_iterations
-         associate (g => growth)
-            change = (short_integral(g, time) - wanted) / (g(0) + time * (g(1) + time * (g(2) &
-               & + time * (g(3) + time * g(4)))))
-         end associate
-         time = time - change
-         ! Newton's method squares the error; the slope is right to 1e-9.
-         if (abs(change) <= converged * time) exit
-      end do
-      time = min(time, latest)
-   end function short_time
+   end subroutine go_uniformly
 
    !> Parts of a step in each of which the exponent changes so little that a rule is exact.
    pure function parts_of(exponent, step) result(parts)
@@ -388,7 +352,7 @@ contains
       y = growth * wanted
       above = 1.0_wp + y
       if (abs(y) < small) then
-         time = wanted * (1.0_wp - y * (0.5_wp - y * (inverse(3) - y * (0.25_wp - 0.2_wp * y))))
+         time = wanted * (1.0_wp - horner(logarithm, size(logarithm), y))
       else if (above > 0.5_wp * huge(1.0_wp)) then
          time = (log(growth) + log(wanted)) / growth
       else if (above > 0.0_wp) then
@@ -408,14 +372,11 @@ contains
 
       if (abs(z) > 1.0_wp) then
          mean = (exp(z) - 1.0_wp) / z
-         return
-      end if
-      half = 0.5_wp * z
-      mean = exp(half)
-      if (abs(half) < small) then
-         mean = mean * (1.0_wp + half**2 / 6.0_wp)
+      else if (abs(z) < small) then
+         mean = 1.0_wp + horner(growth, size(growth), z)
       else
-         mean = mean * sinh(half) / half
+         half = 0.5_wp * z
+         mean = exp(half) * sinh(half) / half
       end if
    end function mean_growth
 

@@ -16,7 +16,7 @@ module mesoslip_sliders_layered
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, shift_slider, &
       & slider_type
-   use mesoslip_sliders_hazard_clock, only: advance_clocks
+   use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
    use mesoslip_sliders_layered_expansion, only: expand, sum_series
    use mesoslip_sliders_layered_integrator, only: integrator_type
    use mesoslip_sliders_layered_system, only: fastest_rate, layered_parameters_type, new_system, &
@@ -202,12 +202,16 @@ contains
       !> Where the law holds
       type(window_type), intent(in) :: window
 
+      type(window_type) :: bounds
       real(wp) :: step, longest, direction
       logical :: ends, crosses, turns, is_due
 
       call self%take_law(law)
       self%step_time = self%time
-      step = window%end_time - self%time
+      bounds = window
+      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
+         & self%acceleration, bounds)
+      step = bounds%end_time - self%time
       if (.not. step > 0.0_wp) then
          self%series(:, :, 1:) = 0.0_wp
          self%series(:, :, 0) = self%state
@@ -215,22 +219,22 @@ contains
       end if
 
       if (self%parameters%solver == solver_series) then
-         call self%expand_motion(window, step, ends)
+         call self%expand_motion(bounds, step, ends)
       else
-         call self%integrate(window%end_time, step, ends)
+         call self%integrate(bounds%end_time, step, ends)
          if (allocated(self%failure)) return
       end if
       longest = step
-      call self%find_end(window, step, crosses, turns, direction)
+      call self%find_end(bounds, step, crosses, turns, direction)
       if (self%has_clocks) then
          call advance_clocks(self%clock, self%sliding, self%terms, step, is_due)
          crosses = crosses .and. .not. is_due
          turns = turns .and. .not. is_due
       end if
-      call self%move_to(step, crosses, turns, merge(window%upper, window%lower, direction > 0.0_wp))
+      call self%move_to(step, crosses, turns, merge(bounds%upper, bounds%lower, direction > 0.0_wp))
       if (step < longest) self%integrator%is_stale = .true.
       if (ends .and. .not. (crosses .or. turns) .and. step >= longest) then
-         self%time = window%end_time
+         self%time = bounds%end_time
       else
          self%time = self%time + step
       end if

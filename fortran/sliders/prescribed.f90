@@ -117,7 +117,12 @@ contains
       type(step_filter_type), intent(inout) :: filter
 
       do
+         if (schedule%has_clocks) then
+            self%has_clocks = .true.
+            call schedule%hazard%offer(self%displacement, self%clock)
+         end if
          call step_on(self, schedule%law(), schedule%window(self%time))
+         if (schedule%has_clocks) call schedule%hazard%go_on(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)

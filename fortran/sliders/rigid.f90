@@ -13,6 +13,7 @@ module mesoslip_sliders_rigid
    use mesoslip_schedule, only: schedule_type
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, shift_law, &
       & shift_slider, slider_type
+   use mesoslip_sliders_hazard_clock, only: limit_window
    use mesoslip_sliders_motion_series, only: horner, integral
    use mesoslip_sliders_rigid_long_step, only: take_long_step
    use mesoslip_sliders_rigid_settled_step, only: try_settled_step
@@ -103,7 +104,12 @@ contains
       system = constants(self)
       do
          self%law = schedule%law()
+         if (schedule%has_clocks) then
+            self%has_clocks = .true.
+            call schedule%hazard%offer(self%displacement, self%clock)
+         end if
          call step_on(self, system, schedule%window(self%time))
+         if (schedule%has_clocks) call schedule%hazard%go_on(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)
@@ -112,17 +118,21 @@ contains
    end subroutine run_ahead
 
    !> One step: a short one, as nearly all between two events, or any.
-   subroutine step_on(self, constant, window)
+   subroutine step_on(self, constant, whole_window)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: constant
-      type(window_type), intent(in) :: window
+      type(window_type), intent(in) :: whole_window
 
+      type(window_type) :: window
       type(system_type) :: system
       type(motion_rates_type) :: early
       logical :: is_done
 
       self%step_time = self%time
       self%start_displacement = self%displacement
+      window = whole_window
+      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
+         & self%acceleration, window)
 
       system = constant
       system%stiffness = system%spring + self%law%stiffness * system%inverse_mass

@@ -5,9 +5,11 @@ from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
 from .api import run
+from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
+from .cycles.branch import branches
 from .cycles.cycle import Cycle, cycle
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
@@ -39,6 +41,7 @@ __all__ = [
     "ThresholdLaw",
     "avalanche_summary",
     "avalanches",
+    "branches",
     "compare_fits",
     "curve",
     "cycle",
@@ -47,6 +50,7 @@ __all__ = [
     "export",
     "fit",
     "lyapunov",
+    "mean_field",
     "onset",
     "open_output",
     "plot",

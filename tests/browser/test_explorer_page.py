@@ -380,6 +380,47 @@ def test_files_are_saved(server, browser, tmp_path):
     )
 
 
+def test_a_movie_is_saved(server, browser, tmp_path):
+    browser.driver.execute_cdp_cmd(
+        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)}
+    )
+    browser.open(server.address)
+    for key, value in (("run.duration", "2.2 s"), ("contacts.count", "400")):
+        assert browser.change(key, value)[1] == "drawn"
+    browser.element("movie", "button").click()
+    assert eventually((tmp_path / "klein.gif").exists, PATIENCE)
+    assert (tmp_path / "klein.gif").read_bytes().startswith(b"GIF8")
+    assert browser.change("run.engine", "me")[1] == "drawn"
+    browser.element("movie", "button").click()
+    assert eventually(lambda: "engine" in browser.value("status", "text"))
+    assert browser.errors() == []
+
+
+def test_a_measured_trace_lies_beside_the_model(browser, tmp_path):
+    import mesoslip
+
+    trace = tmp_path / "trace.nc"
+    mesoslip.run(Config.load(ROOT / "runs" / "klein.toml", ["contacts.delay=1 ms"])).to_netcdf(
+        trace
+    )
+    server = Server("runs/klein.toml", "--trace", str(trace))
+    try:
+        browser.open(server.address)
+        browser.wait_until_done()
+        measured, force = browser.data("force:measured"), browser.data("force:force")
+        assert 17.0 < max(measured) < 18.0
+        assert measured != force
+        assert "(measured " in browser.value("regime", "text")
+        # The same parameters, the same motion.
+        assert browser.change("contacts.delay", "1 ms")[1] == "drawn"
+        browser.wait_until_done()
+        assert browser.data("force:measured") == measured
+        assert max(browser.data("force:force")) == pytest.approx(max(measured), rel=1e-3)
+        assert browser.errors() == []
+    finally:
+        server.stop()
+
+
 @pytest.mark.parametrize(
     "headers",
     [

@@ -73,7 +73,7 @@ contains
       do length = 1, most
          first = -1.0_wp
          second = -1.0_wp
-         call uniform_pairs(seed, realization, contact(:length), renewal(:length), &
+         call uniform_pairs(seed, realization, contact(:length), renewal(:length), 0_i8, &
             & first(:length), second(:length))
          do place = 1, length
             call uniform_pair(seed, realization, contact(place), renewal(place), 0_i8, pair)
@@ -83,7 +83,7 @@ contains
             & .and. all(second(length + 1:) < 0.0_wp)
       end do
       call check(agree, "pairs of 1 to 70 contacts are those of each alone")
-      call uniform_pairs(seed, realization, contact(:0), renewal(:0), first(:0), second(:0))
+      call uniform_pairs(seed, realization, contact(:0), renewal(:0), 0_i8, first(:0), second(:0))
       call check(all(first(2:) > 0.0_wp), "no contact, no draw")
    end subroutine several_are_as_single_ones
 

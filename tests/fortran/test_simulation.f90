@@ -44,11 +44,18 @@ program test_simulation
    call goes_on("ageing", "prescribed", "series")
    call goes_on("ageing", "quasistatic", "series")
    call goes_on("ageing populations", "rigid", "series")
-   call runs_ahead("rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("rigid", "exponential", 1.0_wp, 5.0e-4_wp)
-   call runs_ahead("rigid", "exponential", 1.0_wp, 0.0_wp)
-   call runs_ahead("prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call goes_on("activated", "rigid", "series")
+   call goes_on("activated", "prescribed", "series")
+   call goes_on("activated ageing", "rigid", "series")
+   call runs_ahead("ensemble", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 5.0e-4_wp)
+   call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("ensemble", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ensemble", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("activated", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("activated", "rigid", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("activated", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("activated", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call is_bounded()
    call refuses()
    call holds()
@@ -181,8 +188,8 @@ contains
 
    !> A run is the same to the bit whatever the length of its schedules, none at all included, and
    !> wherever it is cut, put away and taken up again.
-   subroutine runs_ahead(slider, law, width, delay)
-      character(len=*), intent(in) :: slider
+   subroutine runs_ahead(contacts, slider, law, width, delay)
+      character(len=*), intent(in) :: contacts, slider
       character(len=*), intent(in) :: law
       real(wp), intent(in) :: width, delay
 
@@ -197,14 +204,15 @@ contains
       character(len=10), parameter :: tables(4) = [character(len=10) :: &
          & "trace", "slip_trace", "slips", "stages"]
 
-      call prepare(whole, slider, law, width, delay, 0)
+      call prepare(whole, contacts, slider, law, width, delay, 0)
       call whole%start(initial_steady)
       call whole%run(forever, any_work, error)
       do number = 1, size(lengths)
-         name = slider // ", length " // achar(iachar("0") + lengths(number) / 10) &
+         name = contacts // ", " // slider // ", length " &
+            & // achar(iachar("0") + lengths(number) / 10) &
             & // achar(iachar("0") + modulo(lengths(number), 10))
          allocate (now)
-         call prepare(now, slider, law, width, delay, lengths(number))
+         call prepare(now, contacts, slider, law, width, delay, lengths(number))
          call now%start(initial_steady)
          if (number < size(lengths)) call now%run(forever, any_work, error)
          do segment = 1, 100000
@@ -214,7 +222,7 @@ contains
             allocate (words(length))
             call now%fetch(words, error)
             allocate (next)
-            call prepare(next, slider, law, width, delay, modulo(segment, max_events))
+            call prepare(next, contacts, slider, law, width, delay, modulo(segment, max_events))
             call next%restore(words, error)
             deallocate (words)
             deallocate (now)
@@ -236,14 +244,14 @@ contains
    end subroutine runs_ahead
 
    !> Klein's case with schedules of a length, and nothing recorded that needs each event.
-   subroutine prepare(simulation, slider, law, width, delay, longest)
+   subroutine prepare(simulation, contacts, slider, law, width, delay, longest)
       type(simulation_type), intent(out) :: simulation
-      character(len=*), intent(in) :: slider
+      character(len=*), intent(in) :: contacts, slider
       character(len=*), intent(in) :: law
       integer, intent(in) :: longest
       real(wp), intent(in) :: width, delay
 
-      call build(simulation, "ensemble", slider, law, width, coupling_scaled, "series")
+      call build(simulation, contacts, slider, law, width, coupling_scaled, "series")
       simulation%contacts%parameters%delay = delay
       call simulation%avalanches%open(avalanche_parameters_type(), [real(wp) ::], count)
       simulation%max_schedule = longest
@@ -284,7 +292,7 @@ contains
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
 
-      call prepare(simulation, "rigid", "gaussian", 0.1_wp, 5.0e-4_wp, max_events)
+      call prepare(simulation, "ensemble", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp, max_events)
       call new_parameters(parameters, [character(len=name_length) :: "mass", "stiffness", &
          & "damping"], [1.0e-16_wp, 97.0_wp, 0.0_wp])
       call make_slider(simulation%slider, "rigid", parameters, error)
@@ -368,6 +376,9 @@ contains
          & "ageing_time", "initial_age", "young_force_ratio", "young_relative_width"]
       ! Some thresholds fall, as the young are spread widely.
       real(wp), parameter :: relax(4) = [3.0e-3_wp, 0.0_wp, 0.9_wp, 0.3_wp]
+      character(len=name_length), parameter :: activation(4) = [character(len=name_length) :: &
+         & "columns", "rows", "activation_rate", "activation_force"]
+      real(wp), parameter :: bell(4) = [0.0_wp, 0.0_wp, 1.0e3_wp, 0.05_wp * 18.0e-6_wp / count]
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
       type(recorder_parameters_type) :: recorder
@@ -388,6 +399,12 @@ contains
       case ("ageing populations")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & "resolution"], [values, relax, 0.5_wp])
+      case ("activated")
+         call new_parameters(parameters, [character(len=name_length) :: common, activation], &
+            & [values, bell])
+      case ("activated ageing")
+         call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
+            & activation], [values, relax, bell])
       case ("populations")
          call new_parameters(parameters, [character(len=name_length) :: common, "resolution"], &
             & [values, 0.5_wp])
@@ -398,8 +415,8 @@ contains
       call parameters%add_word("threshold_law", law)
       call parameters%add_word("delay_law", "fixed")
       call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
-         & contacts(:6) == "ageing"))))
-      if (contacts(:6) == "ageing") call parameters%add_word("ageing", "relax")
+         & contacts(:1) == "a"))))
+      if (index(contacts, "ageing") > 0) call parameters%add_word("ageing", "relax")
       call make_contacts(simulation%contacts, contacts, parameters, 1_i8, 0_i8, error)
       call check(.not. allocated(error), "contacts: " // contacts)
 

@@ -12,7 +12,7 @@ from conftest import klein_tables
 from mesoslip import MesoslipError
 
 SHORT = {"run__duration": 3.0, "contacts__count": 100, "run__realizations": 2}
-FUNCTIONS_OF_CONFIGURATIONS = ("run", "derived", "curve", "onset", "sweep")
+FUNCTIONS_OF_CONFIGURATIONS = ("run", "derived", "curve", "onset", "mean_field", "sweep")
 FUNCTIONS_OF_OUTPUTS = (
     "open_output",
     "slips",

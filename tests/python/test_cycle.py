@@ -8,7 +8,8 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT
-from mesoslip.cycles.coordinates import Coordinates
+from mesoslip.cycles.branch import adapted
+from mesoslip.cycles.coordinates import SLIDER, Coordinates
 from mesoslip.cycles.cycle import master_equation
 from mesoslip.cycles.section import Motion
 from mesoslip.simulation.archive import Archive
@@ -100,6 +101,23 @@ def test_changes_of_a_state_are_those_asked_for(regular):
     change[2:] -= vector[2:] * change[2:].sum()
     got = coordinates.of(coordinates.changed(regular.state, change)) - vector
     assert got == pytest.approx(change, abs=1e-7)
+
+
+def test_branches_go_on_from_the_value_before(regular):
+    found = mesoslip.branches(configuration(), "contacts.delay", [1.9e-3, 2e-3])
+    assert found["motion"].values.tolist() == [[1, 1], [1, 1]]
+    assert found["period"].values[:, 1] == pytest.approx(regular.period, rel=1e-4)
+    assert found["peak_force"].values[:, 1] == pytest.approx(regular.peak_force, rel=1e-4)
+    assert np.all(found["growth_rate"] > 0)
+    with pytest.raises(mesoslip.ConfigError, match=r"contacts\.delay"):
+        mesoslip.branches(configuration(), "contacts.count", [10, 20])
+
+
+def test_another_spring_bears_the_same_force(regular):
+    stiffer = regular.config.replace("slider.stiffness=150")
+    state = Archive(adapted(regular.state, regular.config, stiffer))
+    gap = state.number(SLIDER, "drive value") - state.number(SLIDER, "displacement")
+    assert 150 * gap == pytest.approx(regular.section.force, rel=1e-6)
 
 
 def test_command(command, tmp_path):

@@ -13,19 +13,30 @@ import time
 import tomllib
 from pathlib import Path
 
+import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT, klein_tables
 from kinds import KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.newest import Newest
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import CONTROLS, ROW_HEIGHTS, STEPS, lattice_size, values
 from mesoslip.explorer.live_run import Pace, explored, run_live
-from mesoslip.explorer.pictures import Theories, motion, theory
+from mesoslip.explorer.movies import (
+    around_slip,
+    finished_run,
+    movie_of,
+    recorded_for_movie,
+)
+from mesoslip.explorer.pictures import Measured, Theories, motion, theory
 from mesoslip.explorer.session import Session
 from mesoslip.explorer.stages import read_stages
+from mesoslip.output.tree import build_tree
+from mesoslip.plots.close_up import largest_slip, slip_window
+from mesoslip.quantities import with_unit
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import Results, run_realizations
 
@@ -746,3 +757,79 @@ def test_the_models_of_a_page_are_collected_once(monkeypatch):
     Page(document, Config.load(KLEIN), KLEIN).close()
     assert len(document.roots) > 40
     assert len(collected) <= 2
+
+
+FAST_MOVIE = ("run.duration=2.2 s", "contacts.count=400")
+
+
+@pytest.mark.parametrize(
+    ("changes", "view"),
+    [
+        ((), "contacts"),
+        (("slider.kind=layered", "slider.layers=3"), "layers"),
+        (
+            (
+                "interaction.lattice=square",
+                "interaction.columns=20",
+                "interaction.rows=20",
+                "interaction.strength=0.1",
+            ),
+            "lattice",
+        ),
+    ],
+)
+def test_a_run_is_recorded_for_its_movie(changes, view):
+    """The motion is that of the run, and most snapshots of contacts lie in the largest slip."""
+    config = Config.load(KLEIN, (*FAST_MOVIE, *changes))
+    found, wanted = recorded_for_movie(config)
+    assert found == view
+    results = finished_run(wanted, Stop())
+    assert results.realizations[0].breaks == run_realizations(config).realizations[0].breaks > 400
+    if view == "contacts":
+        around = around_slip(wanted, results)
+        (slip,) = [largest_slip(build_tree(results))]
+        low, high = slip_window(slip)
+        times = np.array(around.output.snapshots)
+        assert np.sum((times >= low) & (times <= high)) >= 70
+        assert len(times) <= 100
+
+
+def test_a_movie_is_made_or_the_key_is_named():
+    said = []
+    movie = movie_of(
+        Config.load(KLEIN, (*FAST_MOVIE, "slider.kind=layered", "slider.layers=3")),
+        Stop(),
+        said.append,
+    )
+    assert movie.startswith(b"GIF8")
+    assert said == ["the movie: running …", "the movie: drawing …"]
+    for change, key in (("run.engine=me", "run.engine"), ("contacts.count=401", "contacts.count")):
+        with pytest.raises(ConfigError, match=f"{key}.*movie"):
+            movie_of(Config.load(KLEIN, (*FAST_MOVIE, change)), Stop(), said.append)
+    stop = Stop()
+    stop.set()
+    assert movie_of(Config.load(KLEIN), stop, said.append) is None
+
+
+def test_a_measured_trace_lies_beside_the_model():
+    """In one unit, with the means over its slips."""
+    config = explored(Config.load(KLEIN, ["run.duration=6 s"]))
+    stronger = ["run.duration=8 s", "contacts.static_force=1.8 mN", "drive.velocity=10 um/s"]
+    trace = run_realizations(Config.load(KLEIN, stronger))
+    measured = Measured(build_tree(trace))
+    seen = []
+    run_live(config, Stop(), seen.append)
+    alone, beside = motion(seen[-1]), motion(seen[-1], measured)
+    assert alone.measured.is_empty
+    assert beside.force.y_label == beside.measured.y_label == "spring force (mN)"
+    assert 1e3 * np.max(beside.force.y) == pytest.approx(np.max(alone.force.y))
+    assert np.max(beside.measured.y) == pytest.approx(
+        1e3 * measured.tree["spring_force"].sel(time=slice(0, 6)).max().item(), rel=1e-3
+    )
+    # Not longer than the axis.
+    assert beside.measured.x[-1] <= beside.end
+    numbers = dict(beside.numbers)
+    drop = float(mesoslip.slips(measured.tree)["force_drop"].mean())
+    assert numbers["mean force drop"].endswith(f"(measured {with_unit(drop, 'N', 3)})")
+    with pytest.raises(FileError):
+        Measured(mesoslip.curve(Config.load(KLEIN)))

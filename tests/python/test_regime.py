@@ -12,6 +12,7 @@ import pytest
 from conftest import ROOT
 from mesoslip.analysis.regime import (
     IRREGULAR,
+    NAMES,
     REGIME,
     SMOOTH,
     STICK_SLIP,
@@ -19,14 +20,15 @@ from mesoslip.analysis.regime import (
     Scales,
     classify,
 )
+from mesoslip.analysis.regime.events import NO_SLIPS, Slips
 
 TIME = np.linspace(0.0, 1.0, 20001)
 
 
-def study():
-    """The study with the spectral classification."""
-    path = ROOT / "tests" / "studies" / "regimes.py"
-    spec = importlib.util.spec_from_file_location("regimes_study", path)
+def study(name="regimes"):
+    """The study with the spectral classification, or another one."""
+    path = ROOT / "tests" / "studies" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"{name}_study", path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
@@ -44,10 +46,10 @@ def sawtooth(periods, falls):
     return 1e-5 * force
 
 
-def result(config, force, velocity=None):
+def result(config, force, velocity=None, slips=NO_SLIPS):
     velocity = np.full(len(TIME), 1e-7) if velocity is None else velocity
     scales = Scales.of_config(config, TIME[-1])
-    return classify(scales, TIME, force, velocity, np.empty(0), np.empty(0))
+    return classify(scales, TIME, force, velocity, slips)
 
 
 def test_noise_of_steady_contacts_is_smooth(klein):
@@ -68,7 +70,7 @@ def test_a_sawtooth_is_stick_slip(klein):
     assert found.regime == STICK_SLIP
     assert found.period == pytest.approx(1 / 50, rel=1e-3)
     assert found.period_variation < 0.02
-    assert found.relative_amplitude == pytest.approx(0.45 * 0.8 / 0.6, rel=0.02)
+    assert found.relative_amplitude == pytest.approx(0.45 * 0.8 * 10 / 18, rel=0.02)
     assert found.cycles == 49
 
 
@@ -92,7 +94,13 @@ def test_random_slips_are_irregular(klein):
 
 def test_what_dies_away_is_not_settled(klein):
     config = klein(contacts__count=1_000_000)
-    for rate, regime in [(0.0, STICK_SLIP), (0.2, STICK_SLIP), (2.0, TRANSIENT), (15.0, TRANSIENT)]:
+    for rate, regime in [
+        (0.0, STICK_SLIP),
+        (0.05, STICK_SLIP),
+        (0.2, TRANSIENT),
+        (2.0, TRANSIENT),
+        (15.0, TRANSIENT),
+    ]:
         force = 1e-5 * (1 + 0.5 * np.exp(-rate * TIME) * np.sin(300 * TIME))
         assert result(config, force).regime == regime
     # Decayed, before and within the window.
@@ -106,7 +114,7 @@ def test_a_run_that_ends_too_soon_is_transient(klein):
     slow = klein(drive__velocity=1e-9)
     assert result(slow, np.full(len(TIME), 1e-5)).regime == TRANSIENT
     scales = Scales.of_config(slow, 0.0)
-    assert classify(scales, *np.empty((3, 0)), np.empty(0), np.empty(0)).regime == TRANSIENT
+    assert classify(scales, *np.empty((3, 0)), NO_SLIPS).regime == TRANSIENT
 
 
 def test_the_rebound_of_a_slip_is_no_cycle(klein):
@@ -120,6 +128,119 @@ def test_the_rebound_of_a_slip_is_no_cycle(klein):
     assert found.regime == STICK_SLIP
     assert found.period == pytest.approx(1 / 40, rel=1e-3)
     assert found.fall_irregularity < 0.01
+
+
+def ringing(periods, decay):
+    """Slips after periods [s], each followed by ringing at 200 Hz, and the catalogue of slips."""
+    starts = np.cumsum(periods)
+    rate, drop = 9e-4, np.diff(starts, prepend=0.0) * 9e-4
+    force = rate * TIME
+    for start, size in zip(starts, drop, strict=True):
+        since = np.maximum(TIME - start, 0.0)
+        swing = np.exp(-decay * since) * np.cos(2 * np.pi * 200 * since)
+        force = force - np.where(TIME > start, size * (1 - 0.9 * swing), 0.0)
+    return force + 1e-6, Slips(starts, np.interp(starts, TIME, force), 1.8 * drop)
+
+
+def test_ringing_after_slips_is_no_cycle(klein):
+    """Its swings are deeper than half the force's range, and three times as many as slips."""
+    periods = 0.0375 + 0.004 * np.random.default_rng(4).normal(size=25)
+    force, slips = ringing(periods, 50.0)
+    # Without a catalogue all swings are cycles.
+    assert result(klein(), force).cycles > 2 * len(periods)
+    # The drive loads the spring by as much as slips relieve.
+    config = klein(drive__velocity=9e-4 / 97.0)
+    found = result(config, force, slips=slips)
+    assert (found.regime, found.are_slips, found.cycles) == (STICK_SLIP, True, 24)
+    assert found.period == pytest.approx(0.0375, rel=0.05)
+    assert found.slips == 25
+    assert found.slip_share == pytest.approx(1.8, rel=0.1)
+    assert "a slip every 3" in found.summary
+
+
+def test_oscillations_with_one_slip_have_cycles_of_the_force(klein):
+    force = 1e-5 + 3e-6 * np.sin(2 * np.pi * 100 * TIME)
+    found = result(klein(), force, slips=Slips(*np.array([[0.5], [1.3e-5], [6e-6]])))
+    assert (found.regime, found.are_slips, found.slips) == (STICK_SLIP, False, 1)
+    assert found.cycles == 99
+    assert "99 oscillations of 10" in found.summary
+
+
+def test_peaks_that_vary_are_irregular(klein):
+    """By a tenth of the falls, with periods that vary by a quarter; peaks that alternate are
+    regular, and so is either variation alone."""
+    rng = np.random.default_rng(5)
+    even, random = np.ones(60), rng.uniform(0.57, 1.43, size=60)
+    for peaks, periods, regime in [
+        (1 + 0.1 * rng.normal(size=60), random, IRREGULAR),
+        (1 + 0.1 * np.tile([1, -1], 30), random, STICK_SLIP),
+        (1 + 0.03 * rng.normal(size=60), random, STICK_SLIP),
+        (1 + 0.1 * rng.normal(size=60), even, STICK_SLIP),
+    ]:
+        starts = np.cumsum(periods) / 62
+        slips = Slips(starts, 1.5e-5 * peaks, np.full(60, 1.5e-5))
+        force = sawtooth(np.full(60, 1 / 62), np.full(60, 0.8))
+        found = result(klein(), force, slips=slips)
+        assert (found.regime, found.are_slips) == (regime, True)
+        assert max(found.period_irregularity, found.fall_irregularity) < 0.3
+
+
+def test_shares_of_sticking_and_of_fast_sliding(klein):
+    velocity = np.select([TIME < 0.4, TIME < 0.7], [0.0, 0.7e-7], 2e-7)
+    found = result(klein(), sawtooth(np.full(60, 1 / 50), np.full(60, 0.8)), velocity)
+    assert found.stick_share == pytest.approx(0.4, abs=1e-3)
+    assert found.fast_share == pytest.approx(0.3, abs=1e-3)
+
+
+def test_amplitudes_are_fractions_of_the_static_force(klein):
+    """A force around 0, of which amplitudes would be many times the mean."""
+    found = result(klein(), 9e-6 * np.sin(300 * TIME))
+    assert found.relative_amplitude == pytest.approx(0.5 * np.sin(0.45 * np.pi), rel=0.01)
+    assert abs(found.drift) < 0.05
+
+
+def test_layers_are_judged_by_the_force_of_their_slips(klein):
+    layers = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 4}
+    few = {"contacts__count": 300, "contacts__delay": 3e-3, "drive__velocity": 1e-6}
+    tree = mesoslip.run(klein(**few, slider=layers, run__duration=3.0, output__interval=2e-4))
+    found = mesoslip.regime(tree).isel(realization=0)
+    slips = mesoslip.slips(tree)
+    inside = slips["start_time"] >= float(found["window_start"])
+    assert found["slips"] == inside.sum()
+    assert found["are_slips"] == 1
+    assert float(found["period"]) == pytest.approx(
+        float(slips["waiting_time"].values[inside.values][1:].mean()), rel=0.3
+    )
+    elastic = tree["elastic_force"].values[0][tree["time"].values >= float(found["window_start"])]
+    low, high = np.percentile(elastic, [5, 95])
+    assert float(found["relative_amplitude"]) == pytest.approx((high - low) / 2 / 18e-6, rel=0.01)
+
+
+def test_the_irregular_motion_of_ageing_contacts(klein):
+    """Section 15 of the model: the peaks of slips vary by 0.19 of their mean."""
+    ageing = {"law": "relax", "time": 0.15, "young_force_ratio": 0.2877}
+    irregular = klein(
+        slider__damping_ratio=0.02,
+        slider__stiffness=75.9,
+        contacts__coupling="equal",
+        contacts__count=100,
+        contacts__delay=2.765e-3,
+        contacts__threshold__relative_width=0.0316,
+        contacts__ageing=ageing | {"young_relative_width": 0.2264},
+        drive__velocity=2.32e-6,
+        run__duration=12.0,
+    )
+    assert regime_of(irregular) == [IRREGULAR]
+
+
+def test_marked_motions():
+    """Some of those of the study that an eye has marked, the cheapest of each kind."""
+    module = study("marked_motions")
+    motions = [one for one in module.load() if one["kind"] in {"layers", "lattice", "fast"}]
+    assert len(module.load()) == 140
+    for one in module.classified(motions[1::9]):
+        assert one.regime in one.marks, one.configuration
+        assert one.regime in NAMES
 
 
 def test_spectra_say_the_same():

@@ -156,6 +156,9 @@ def test_a_step_of_the_slip_law_is_measured_exactly(sign, exact):
         assert row["integral_displacement"] == pytest.approx(LAW.slip_distance, rel=5e-2)
         assert math.isnan(row["overshoot"])
         assert row["rate_dependence_ratio"] == pytest.approx(-0.01, rel=1e-3)
+        # a and b of the law itself, whatever the ratio of the velocities and the direction.
+        assert row["apparent_a"] == pytest.approx(LAW.a - LAW.b * (1 - late), rel=1e-2)
+        assert row["apparent_b"] == pytest.approx(LAW.b * late, rel=2e-3)
     assert up["velocity_before"] == sign * 1e-7
 
 

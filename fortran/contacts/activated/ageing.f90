@@ -10,18 +10,19 @@
 module mesoslip_contacts_activated_ageing
    use mesoslip_contacts_activated_contacts, only: contact_activated_type, initialize_activated, &
       & offer_activated, respond_activated
-   use mesoslip_contacts_activated_keys, only: exchange_activated, life_left, never, &
-      & set_up_activated
+   use mesoslip_contacts_activated_keys, only: exchange_activated, life_left, set_up_activated
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_hazard, only: never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_random, only: uniform_pair
+   use mesoslip_schedule, only: schedule_type
    implicit none
    private
 
@@ -56,6 +57,7 @@ module mesoslip_contacts_activated_ageing
       procedure :: initialize
       procedure :: offer
       procedure :: respond
+      procedure :: plan
       procedure :: prepare
       procedure :: confirms
       procedure :: renew_due
@@ -134,6 +136,20 @@ contains
       call respond_activated(self, before, after)
    end subroutine respond
 
+   !> Write no schedule: bounds of thresholds change with the time.
+   subroutine plan(self, pose, limit, schedule)
+      !> The contacts
+      class(contact_activated_ageing_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
+      !> The schedule, at its end
+      type(schedule_type), intent(inout) :: schedule
+
+      schedule%is_over = .true.
+   end subroutine plan
+
    !> Prepare the life of a contact that has attached.
    subroutine prepare(self, contact, pose)
       !> The contacts
@@ -174,7 +190,8 @@ contains
          if (self%ageing%falls(age(age_limit), self%stretch) &
             & .and. here > age(age_limit)) then
             gap = here - abs(pose%displacement - self%record(row_origin, contact))
-            gap = min(max_drop / self%slope, max_gap_part * max(gap, tiny_gap * self%stretch))
+            gap = min(max_drop / self%hazard%slope, &
+               & max_gap_part * max(gap, tiny_gap * self%stretch))
             if (here - gap > age(age_limit)) then
                lack = self%ageing%lack(age(age_limit), self%stretch)
                age(age_renewal) = max(nearest(pose%time, huge(1.0_wp)), age(age_birth) &
@@ -223,7 +240,7 @@ contains
       if (by_clock .and. .not. confirms) then
          attempt = int(self%age(age_attempts, contact), i8)
          call draw(attempt)
-         confirms = uniform(2) <= exp(-self%slope * (here - self%record(row_limit, contact)))
+         confirms = uniform(2) <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
       end if
       if (confirms) then
          call self%order_renewal%remove(contact)

@@ -1,14 +1,15 @@
 !> Contacts that break by thermal activation: their clocks, keys and order.
 !>
 !> A contact goes by the clock of the sign of its force. Its key is the reading at which it breaks,
-!> relative to a reference displacement near the slider's, so that no exponent is beyond all
-!> numbers; the reference moves along. In a motion up or down a contact comes to its threshold, or
-!> to where its force changes its sign.
+!> relative to a reference displacement near the slider's, which moves along. In a motion ahead, the
+!> direction that is kept until something happens on the way back, a contact comes to its threshold,
+!> or to where its force changes its sign; on the way back that is bounded.
 module mesoslip_contacts_activated_keys
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type
-   use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
+   use mesoslip_contacts_individual_scan_order, only: new_scan_order, scan_order_type
    use mesoslip_contacts_mechanics, only: coupling_equal
+   use mesoslip_hazard, only: force_sign, hazard_type, never
    use mesoslip_interface_law, only: clocks
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
@@ -18,53 +19,54 @@ module mesoslip_contacts_activated_keys
    private
 
    public :: activated_keys_type, set_up_activated, exchange_activated
-   public :: life_clock, life_left, life_key, never, max_clock_exponent
+   public :: life_clock, life_left, life_key
 
-   !> Sign of the force of the contacts that go by each clock
-   real(wp), parameter :: force_sign(clocks) = [1.0_wp, -1.0_wp]
-   !> Key of a contact that does not break; no other contact has it
-   real(wp), parameter :: never = huge(1.0_wp)
-   !> Maximum exponents: of a key, and of a clock before its reference moves
-   real(wp), parameter :: max_key_exponent = 690.0_wp, max_clock_exponent = 300.0_wp
-   !> By how much an exponent of a clock may fall before its reference moves: what is added to a
-   !> reading loses as many digits
-   real(wp), parameter :: max_fall = 8.0_wp
    !> Stretch over the mean breaking stretch beyond zero at which the sign of a force changes: less
    !> than matters, and more than rounding
    real(wp), parameter :: tiny_stretch = 1.0e-12_wp
+   !> Maximum change of the exponents by which keys are rescaled, rather than found anew
+   real(wp), parameter :: max_rescaling = 310.0_wp
    !> Numbers of the life of a contact: the clock it goes by, what was left of its deviate when its
-   !> key was made, and the key
+   !> key was made, and the key. While it is detached the clock is none, and the deviate that of its
+   !> next life, if it has been drawn, or 0
    integer, parameter :: life_length = 3
    integer, parameter :: life_clock = 1, life_left = 2, life_key = 3
 
    !> Contacts that break by thermal activation, in order.
    type, abstract, extends(individual_contacts_type) :: activated_keys_type
-      !> Rate at the threshold, omega_0 [1/s], and k/f_T [1/m]
-      real(wp) :: rate = 0.0_wp, slope = 0.0_wp
+      !> The clocks
+      type(hazard_type) :: hazard
       !> Mean breaking stretch [m]
       real(wp) :: stretch = 1.0_wp
       !> Numbers of their lives, shape (life_length, count)
       real(wp), allocatable :: life(:, :)
-      !> Reading of each clock since its reference was set [s], the reference [m], and the maximum
-      !> exponent of its rate since then
-      real(wp) :: reading(clocks) = 0.0_wp, reference(clocks) = 0.0_wp, &
-         & max_exponent(clocks) = 0.0_wp
       !> Contacts in the order of what comes next in a motion up and down, a break at the threshold
       !> or a change of the force's sign, and in that of their keys
-      type(break_tree_type) :: order_up, order_down, order_clock(clocks)
+      type(scan_order_type) :: order_motion(2), order_clock(clocks)
+      !> The order of a motion ahead
+      integer :: ahead = 1
       !> Number of contacts that go by each clock
       integer :: members(clocks) = 0
    contains
       procedure :: rebuild
       procedure :: shift_order
+      procedure :: behind_of
       !> Find what is left of the deviate of a contact now
       procedure, non_overridable :: settle_deviate
       !> Put a contact into all orders, and take it out
       procedure, non_overridable :: put, take_out
+      !> Put a contact with a key into all orders
+      procedure, non_overridable :: place
       !> The force of a contact changes its sign
       procedure, non_overridable :: change_sign
-      !> Exponent of the rate of a clock, and moving its reference to the slider
-      procedure, non_overridable :: exponent, move_reference
+      !> Distance ahead of its origin at which something happens to a contact
+      procedure, non_overridable :: distance_ahead
+      !> Coordinate behind which nothing happens to a contact at first
+      procedure, non_overridable :: distance_behind
+      !> Move the reference of a clock to the slider
+      procedure, non_overridable :: move_reference
+      !> Turn to the other direction of motion
+      procedure, non_overridable :: turn_round
       procedure, non_overridable, private :: set_key
    end type activated_keys_type
 
@@ -84,22 +86,22 @@ contains
 
       call parameters%take("columns", columns, error)
       call parameters%take("rows", rows, error)
-      call parameters%take("activation_rate", self%rate, error)
+      call parameters%take("activation_rate", self%hazard%rate, error)
       call parameters%take("activation_force", force, error)
       call parameters%finish(error)
       if (allocated(error)) return
       associate (common => self%parameters)
-         if (.not. (self%rate > 0.0_wp .and. force > 0.0_wp) &
+         if (.not. (self%hazard%rate > 0.0_wp .and. force > 0.0_wp) &
             & .or. common%coupling /= coupling_equal) then
             call raise(error, status_invalid, "rate and force of activation must be positive, " &
                & // "and contacts of one stiffness")
             return
          end if
          self%stretch = common%static_force / common%stiffness
-         self%slope = common%stiffness / force
+         self%hazard%slope = common%stiffness / force
       end associate
       self%has_clocks = .true.
-      self%clock%slope = force_sign * self%slope
+      self%clock%slope = force_sign * self%hazard%slope
       call self%allocate_records(columns, rows, error)
       if (allocated(error)) return
       allocate (self%life(life_length, self%parameters%count), source=0.0_wp, stat=stat)
@@ -107,13 +109,12 @@ contains
          call raise(error, status_memory, "not enough memory for the lives of contacts")
          return
       end if
-      call new_break_tree(self%order_up, self%parameters%count, error)
-      if (.not. allocated(error)) then
-         call new_break_tree(self%order_down, self%parameters%count, error)
-      end if
       do number = 1, clocks
          if (.not. allocated(error)) then
-            call new_break_tree(self%order_clock(number), self%parameters%count, error)
+            call new_scan_order(self%order_motion(number), self%parameters%count, error)
+         end if
+         if (.not. allocated(error)) then
+            call new_scan_order(self%order_clock(number), self%parameters%count, error)
          end if
       end do
    end subroutine set_up_activated
@@ -137,15 +138,29 @@ contains
       class(activated_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
+      call self%set_key(contact)
+      call self%place(contact)
+      self%behind = max(self%behind, self%behind_of(contact))
+   end subroutine put
+
+   !> Put a contact with a key into all orders.
+   subroutine place(self, contact)
+      class(activated_keys_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
       integer :: number
 
       number = int(self%life(life_clock, contact))
-      call self%set_key(contact)
-      call self%order_clock(number)%set(contact, self%life(life_key, contact))
-      call self%order_up%set(contact, next_up(self, contact))
-      call self%order_down%set(contact, -next_down(self, contact))
+      call self%order_clock(number)%put(contact, self%life(life_key, contact))
+      associate (origin => self%record(row_origin, contact), &
+         & limit => self%record(row_limit, contact))
+         call self%order_motion(self%ahead)%put(contact, self%direction * origin &
+            & + self%distance_ahead(number, limit))
+         call self%order_motion(3 - self%ahead)%put(contact, -(self%direction * origin &
+            & - self%distance_behind(number, limit)))
+      end associate
       self%members(number) = self%members(number) + 1
-   end subroutine put
+   end subroutine place
 
    !> Take a contact out of all orders.
    subroutine take_out(self, contact)
@@ -156,69 +171,60 @@ contains
 
       number = int(self%life(life_clock, contact))
       call self%order_clock(number)%remove(contact)
-      call self%order_up%remove(contact)
-      call self%order_down%remove(contact)
+      call self%order_motion(1)%remove(contact)
+      call self%order_motion(2)%remove(contact)
       self%members(number) = self%members(number) - 1
    end subroutine take_out
 
-   !> Displacement at which a contact breaks at its threshold, or its force becomes positive, in a
-   !> motion up.
-   pure function next_up(self, contact) result(displacement)
+   !> Distance ahead of its origin at which a contact breaks at its threshold, or its force gets the
+   !> sign of the motion.
+   pure function distance_ahead(self, number, limit) result(distance)
       class(activated_keys_type), intent(in) :: self
-      integer, intent(in) :: contact
-      real(wp) :: displacement
-
-      displacement = self%record(row_origin, contact) + merge(self%record(row_limit, contact), &
-         & tiny_stretch * self%stretch, int(self%life(life_clock, contact)) == 1)
-   end function next_up
-
-   !> The same in a motion down.
-   pure function next_down(self, contact) result(displacement)
-      class(activated_keys_type), intent(in) :: self
-      integer, intent(in) :: contact
-      real(wp) :: displacement
-
-      displacement = self%record(row_origin, contact) - merge(self%record(row_limit, contact), &
-         & tiny_stretch * self%stretch, int(self%life(life_clock, contact)) == 2)
-   end function next_down
-
-   !> Exponent of the rate of a clock.
-   pure function exponent(self, number, displacement)
-      class(activated_keys_type), intent(in) :: self
+      !> The clock it goes by
       integer, intent(in) :: number
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
-      real(wp) :: exponent
+      !> Stretch at which it breaks [m]
+      real(wp), intent(in) :: limit
+      real(wp) :: distance
 
-      exponent = force_sign(number) * self%slope * (displacement - self%reference(number))
-   end function exponent
+      distance = merge(limit, tiny_stretch * self%stretch, &
+         & force_sign(number) * self%direction > 0.0_wp)
+   end function distance_ahead
 
-   !> Exponent of the factor between a contact's deviate and what its clock goes on by.
-   pure function life_exponent(self, contact) result(exponent)
+   !> The same on the way back.
+   pure function distance_behind(self, number, limit) result(distance)
       class(activated_keys_type), intent(in) :: self
+      !> The clock it goes by
+      integer, intent(in) :: number
+      !> Stretch at which it breaks [m]
+      real(wp), intent(in) :: limit
+      real(wp) :: distance
+
+      distance = merge(tiny_stretch * self%stretch, limit, &
+         & force_sign(number) * self%direction > 0.0_wp)
+   end function distance_behind
+
+   !> Coordinate at which a pinned contact breaks on the way back, or its force changes its sign.
+   pure function behind_of(self, contact) result(coordinate)
+      !> The contacts
+      class(activated_keys_type), intent(in) :: self
+      !> Number of the contact
       integer, intent(in) :: contact
-      real(wp) :: exponent
+      !> The coordinate [m]
+      real(wp) :: coordinate
 
-      integer :: number
+      coordinate = self%direction * self%record(row_origin, contact) &
+         & - self%distance_behind(int(self%life(life_clock, contact)), &
+         & self%record(row_limit, contact))
+   end function behind_of
 
-      number = int(self%life(life_clock, contact))
-      exponent = self%slope * (self%record(row_limit, contact) + force_sign(number) &
-         & * (self%record(row_origin, contact) - self%reference(number)))
-   end function life_exponent
-
-   !> Set the key of a contact from what is left of its deviate; never if it is beyond all numbers:
-   !> it is set again when the reference has moved.
+   !> Set the key of a contact from what is left of its deviate.
    subroutine set_key(self, contact)
       class(activated_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
-      real(wp) :: exponent
-
-      exponent = life_exponent(self, contact)
-      self%life(life_key, contact) = never
-      if (exponent > max_key_exponent) return
-      self%life(life_key, contact) = self%reading(int(self%life(life_clock, contact))) &
-         & + self%life(life_left, contact) * exp(exponent)
+      self%life(life_key, contact) = self%hazard%key(int(self%life(life_clock, contact)), &
+         & self%life(life_left, contact), self%record(row_limit, contact), &
+         & self%record(row_origin, contact))
    end subroutine set_key
 
    !> Find what is left of the deviate of a contact now.
@@ -226,47 +232,104 @@ contains
       class(activated_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
+      integer :: number
+
       if (.not. self%life(life_key, contact) < never) return
+      number = int(self%life(life_clock, contact))
       self%life(life_left, contact) = max(0.0_wp, self%life(life_key, contact) &
-         & - self%reading(int(self%life(life_clock, contact)))) &
-         & * exp(-life_exponent(self, contact))
+         & - self%hazard%reading(number)) * exp(-self%hazard%life_exponent(number, &
+         & self%record(row_limit, contact), self%record(row_origin, contact)))
    end subroutine settle_deviate
 
-   !> Move the reference of a clock to the slider, if that is far from it.
+   !> Move the reference of a clock to the slider, if that is far from it or no contact goes by it.
    subroutine move_reference(self, number, displacement)
       class(activated_keys_type), intent(inout) :: self
       integer, intent(in) :: number
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
-      real(wp) :: exponent
+      real(wp) :: exponent, reading
+      logical :: far, is_done
+
+      is_done = self%members(number) == 0
+      exponent = self%hazard%rate_exponent(number, displacement)
+      reading = self%hazard%reading(number)
+      if (.not. is_done) then
+         call self%hazard%is_far(number, displacement, far)
+         if (.not. far) return
+         ! What is left until a key changes by one factor for all.
+         if (abs(exponent) < max_rescaling) call self%order_clock(number)%rescale(reading, &
+            & exp(-exponent), self%members(number), is_done)
+         if (is_done) then
+            call rescale_lives(self, number, reading, exp(-exponent))
+         else
+            call settle_deviates(self, number)
+         end if
+      end if
+      self%hazard%reference(number) = displacement
+      self%hazard%reading(number) = 0.0_wp
+      self%hazard%max_exponent(number) = 0.0_wp
+      if (.not. is_done) call set_keys(self, number)
+   end subroutine move_reference
+
+   !> Count the keys in the lives of the contacts of a clock from its reading, in another unit.
+   subroutine rescale_lives(self, number, reading, factor)
+      class(activated_keys_type), intent(inout) :: self
+      integer, intent(in) :: number
+      real(wp), intent(in) :: reading, factor
+
       integer :: contact
 
-      exponent = self%exponent(number, displacement)
-      self%max_exponent(number) = max(self%max_exponent(number), exponent)
-      if (self%members(number) > 0) then
-         ! Rounding may leave the slider a little before the bound of its window.
-         if (exponent < 0.999_wp * max_clock_exponent &
-            & .and. exponent > self%max_exponent(number) - max_fall) return
-         do contact = 1, self%parameters%count
-            if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-            if (int(self%life(life_clock, contact)) == number) then
-               call self%settle_deviate(contact)
-            end if
-         end do
-      end if
-      self%reference(number) = displacement
-      self%reading(number) = 0.0_wp
-      self%max_exponent(number) = 0.0_wp
-      if (self%members(number) == 0) return
       do contact = 1, self%parameters%count
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         associate (life => self%life(:, contact))
+            if (int(life(life_clock)) /= number .or. .not. life(life_key) < never) cycle
+            life(life_key) = (life(life_key) - reading) * factor
+         end associate
+      end do
+   end subroutine rescale_lives
+
+   !> Find what is left of the deviates of the contacts of a clock now.
+   subroutine settle_deviates(self, number)
+      class(activated_keys_type), intent(inout) :: self
+      integer, intent(in) :: number
+
+      integer :: contact
+
+      do contact = 1, self%parameters%count
+         if (int(self%life(life_clock, contact)) == number) call self%settle_deviate(contact)
+      end do
+   end subroutine settle_deviates
+
+   !> Set the keys of the contacts of a clock.
+   subroutine set_keys(self, number)
+      class(activated_keys_type), intent(inout) :: self
+      integer, intent(in) :: number
+
+      integer :: contact
+
+      call self%order_clock(number)%clear()
+      do contact = 1, self%parameters%count
          if (int(self%life(life_clock, contact)) /= number) cycle
          call self%set_key(contact)
          call self%order_clock(number)%put(contact, self%life(life_key, contact))
       end do
-      call self%order_clock(number)%arrange()
-   end subroutine move_reference
+   end subroutine set_keys
+
+   !> Turn to the other direction of motion, if something happens to a contact where the slider is
+   !> on the way back: the bound may be that of a contact which has broken since.
+   subroutine turn_round(self, displacement)
+      class(activated_keys_type), intent(inout) :: self
+      !> Displacement of the slider [m]
+      real(wp), intent(in) :: displacement
+
+      if (self%direction * displacement > self%behind) return
+      self%behind = -self%order_motion(3 - self%ahead)%lowest()
+      if (self%direction * displacement > self%behind) return
+      self%ahead = 3 - self%ahead
+      self%direction = -self%direction
+      self%behind = -self%order_motion(3 - self%ahead)%lowest()
+      if (self%direction > 0.0_wp) call self%order_motion(2)%rest()
+   end subroutine turn_round
 
    !> Order all contacts anew, from the records and lives.
    subroutine rebuild(self, displacement)
@@ -277,24 +340,14 @@ contains
 
       integer :: contact, number
 
-      call self%order_up%clear()
-      call self%order_down%clear()
+      self%ahead = merge(1, 2, self%direction > 0.0_wp)
       do number = 1, clocks
+         call self%order_motion(number)%clear()
          call self%order_clock(number)%clear()
       end do
       self%members = 0
       do contact = 1, self%parameters%count
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         number = int(self%life(life_clock, contact))
-         call self%order_up%put(contact, next_up(self, contact))
-         call self%order_down%put(contact, -next_down(self, contact))
-         call self%order_clock(number)%put(contact, self%life(life_key, contact))
-         self%members(number) = self%members(number) + 1
-      end do
-      call self%order_up%arrange()
-      call self%order_down%arrange()
-      do number = 1, clocks
-         call self%order_clock(number)%arrange()
+         if (self%record(row_stiffness, contact) > 0.0_wp) call self%place(contact)
       end do
    end subroutine rebuild
 
@@ -305,7 +358,7 @@ contains
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
-      self%reference = self%reference - shift
+      self%hazard%reference = self%hazard%reference - shift
    end subroutine shift_order
 
    !> Put what all activated contacts keep into an archive or take it out.
@@ -321,9 +374,9 @@ contains
       call exchange_individual(self, archive)
       call archive%exchange("life", self%life)
       do number = 1, clocks
-         call archive%exchange("reading", self%reading(number))
-         call archive%exchange("reference", self%reference(number))
-         call archive%exchange("max_exponent", self%max_exponent(number))
+         call archive%exchange("reading", self%hazard%reading(number))
+         call archive%exchange("reference", self%hazard%reference(number))
+         call archive%exchange("max_exponent", self%hazard%max_exponent(number))
       end do
    end subroutine exchange_activated
 

@@ -274,7 +274,7 @@ contains
    end subroutine attach_next
 
    !> List the next contacts to attach in a schedule, up to a maximum number.
-   subroutine list_attachments(self, limit, direction, schedule)
+   subroutine list_attachments(self, limit, direction, schedule, contact)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
       !> Maximum number
@@ -283,8 +283,10 @@ contains
       real(wp), intent(in) :: direction
       !> The schedule
       type(schedule_type), intent(inout) :: schedule
+      !> Their numbers
+      integer, intent(out) :: contact(max_events)
 
-      integer :: number, event, contact(max_events)
+      integer :: number, event
       real(wp) :: threshold(max_events), back_force
 
       call self%detached%preview(limit, number, contact, schedule%attach_time, &

@@ -65,7 +65,7 @@ contains
             key(draw) = int(drawn + draw - 1, i8)
          end do
          call uniform_pairs(parameters%seed, parameters%realization, key(:number), &
-            & renewal(:number), first(:number), second(:number))
+            & renewal(:number), 0_i8, first(:number), second(:number))
          if (state == initial_steady) then
             do draw = 1, number
                threshold(draw) = carried%quantile(first(draw))
@@ -143,7 +143,7 @@ contains
       if (self%count == 0) return
       associate (count => self%count)
          call uniform_pairs(parameters%seed, parameters%realization, self%key(:count), &
-            & self%renewal(:count), first(:count), second(:count))
+            & self%renewal(:count), 0_i8, first(:count), second(:count))
          call parameters%law%quantiles(first(:count), threshold(:count))
          do event = 1, count
             record(row_next, self%key(event) + 1_i8) = threshold(event)

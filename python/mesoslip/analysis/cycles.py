@@ -93,14 +93,16 @@ def variation(values: Array) -> float:
     return defined(np.std, values, 2) / defined(np.mean, values, 2)
 
 
-def irregularity(values: Array) -> float:
+def irregularity(values: Array, scale: float | None = None) -> float:
     """Smallest coefficient of variation of the values and of sums of successive values.
+
+    Over another scale than the mean, if there is one.
 
     Sums of m values are compared with m^(1/2) times a single value, the variation of independent
     ones: alternating values are regular, and random ones stay irregular in sums.
     """
-    mean = defined(np.mean, values, 2)
-    found = [variation(values)]
+    mean = defined(np.mean, values, 2) if scale is None else scale
+    found = [defined(np.std, values, 2) / mean]
     for length in range(2, MAX_PATTERN + 1):
         sums = np.convolve(values, np.ones(length), "valid") if len(values) else values
         if len(values) >= MIN_PATTERNS * length:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from mesoslip.campaign.measures import Measure
 
 # Incremented when values of measures change, so that older points are not used.
-FORMAT = 1
+FORMAT = 2
 
 # One thread of a process uses HDF5 at a time.
 _HDF5 = threading.Lock()

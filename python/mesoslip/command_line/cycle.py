@@ -15,10 +15,15 @@ from mesoslip.command_line.options import (
     SetOption,
     load,
     print_json,
+    print_table,
+    quantity,
     show,
 )
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from mesoslip.configuration.config import Config
     from mesoslip.cycles.cycle import Cycle
 
 StartOption = Annotated[
@@ -31,6 +36,8 @@ StartOption = Annotated[
     ),
 ]
 
+# Parts of FROM:TO:POINTS.
+SPAN_PARTS = 3
 # Significant digits.
 DIGITS = 5
 # Meanings for a motion that is irregular.
@@ -48,6 +55,15 @@ def cycle(
         typer.Option("-o", "--output", help="Write the cycle to a file", metavar="OUT.nc"),
     ] = None,
     start: StartOption = None,
+    continued: Annotated[
+        str | None,
+        typer.Option(
+            "--continue",
+            help="Follow the motion over a key, up and down: KEY=FROM:TO:POINTS, logarithmically "
+            "spaced, such as drive.velocity=0.1um/s:10um/s:20",
+            metavar="KEY=FROM:TO:POINTS",
+        ),
+    ] = None,
     changes: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -62,6 +78,9 @@ def cycle(
         typer.echo(
             "computed without [interaction]: the master equation has no neighbours", err=True
         )
+    if continued is not None:
+        _follow(checked, continued, start, output, as_json=as_json)
+        return
     found = settled_cycle(checked, start=start)
     if output is not None:
         writing.write(found.to_tree(), output)
@@ -69,6 +88,68 @@ def cycle(
         print_json(found.summary())
     else:
         _print(found)
+
+
+def _follow(
+    config: Config, text: str, start: str | None, output: Path | None, *, as_json: bool
+) -> None:
+    """Follow the motion over a key; write and print its branches."""
+    import xarray as xr
+
+    from mesoslip.cycles.branch import branches
+    from mesoslip.output import writing
+
+    if start is not None:
+        config = config.replace({"contacts.initial": start})
+    key, values = _values(text)
+    data = branches(config, key, values)
+    if output is not None:
+        writing.write(xr.DataTree(data), output)
+    if as_json:
+        print_json({str(name): data[name].values.tolist() for name in data.variables})
+        return
+    _print_branches(data, key)
+
+
+def _values(text: str) -> tuple[str, list[float]]:
+    """Key and values of an option KEY=FROM:TO:POINTS."""
+    import numpy as np
+
+    from mesoslip.configuration.keys import key_kind
+    from mesoslip.errors import ConfigError, Problem
+
+    key, _, span = text.partition("=")
+    parts = span.split(":")
+    kind = key_kind(key)
+    if kind is None or len(parts) != SPAN_PARTS or not parts[2].isdigit() or int(parts[2]) < 2:
+        message = "must be KEY=FROM:TO:POINTS, such as drive.velocity=0.1um/s:10um/s:20"
+        raise ConfigError([Problem("", "--continue", message, text)])
+    low, high = (
+        quantity(part, "--continue", kind.unit or "1", kind.example, positive=True)
+        for part in parts[:2]
+    )
+    return key, np.geomspace(low, high, int(parts[2])).tolist()
+
+
+def _print_branches(data: xr.Dataset, key: str) -> None:
+    """Print a line for each value: motion and amplitude, up and down."""
+    from mesoslip.configuration.units import from_cf_units
+    from mesoslip.quantities import with_unit
+
+    words = str(data["motion"].attrs["flag_meanings"]).split()
+    rows: list[list[str]] = [[key, "smooth sliding", "up", "A/F_s", "down", "A/F_s"]]
+    unit = from_cf_units(str(data[key].attrs["units"]))
+    for at, value in enumerate(data[key].values):
+        growth = float(data["growth_rate"].values[at])
+        stable = "unknown" if math.isnan(growth) else "unstable" if growth > 0 else "stable"
+        row = [with_unit(float(value), unit, 3), stable]
+        for direction in range(2):
+            row += [
+                words[int(data["motion"].values[direction, at])],
+                f"{float(data['amplitude_ratio'].values[direction, at]):.3g}",
+            ]
+        rows.append(row)
+    print_table(rows)
 
 
 def _print(found: Cycle) -> None:

@@ -28,6 +28,13 @@ def explore(
         ),
     ] = None,
     changes: SetOption = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            help="Measured trace, an output of mesoslip trace, to draw beside the model",
+            metavar="TRACE.nc",
+        ),
+    ] = None,
     port: Annotated[
         int,
         typer.Option(
@@ -63,10 +70,13 @@ def explore(
     else:
         start = load(config, changes)
         source = config
+    from mesoslip.explorer.pictures import Measured
     from mesoslip.explorer.server import serve
+
+    measured = None if trace is None else Measured(trace)
 
     def report(address: str) -> None:
         typer.echo(f"mesoslip explore: {address} (Ctrl-C ends it)")
 
     with suppress(KeyboardInterrupt):
-        serve(start, source, port=port, opens=browser, report=report)
+        serve(start, source, trace=measured, port=port, opens=browser, report=report)

@@ -118,6 +118,13 @@ class Coordinates:
         step = self._pinned.step
         return np.concatenate([slider, step**1.5 * np.cumsum(pinned), step * detached])
 
+    def modulation(self, words: Words, part: float) -> Array:
+        """The change that modulates the density of pinned contacts over their stretch by a part."""
+        pinned = np.split(self.of(words), [2, 2 + self._pinned.count])[1]
+        wave = part * np.sin(2 * np.pi * np.arange(pinned.size) / pinned.size) * pinned
+        wave -= pinned * (np.sum(wave) / np.sum(pinned))
+        return np.concatenate([np.zeros(2), wave, np.zeros(self._detached.count)])
+
     def _rows(self, archive: Archive) -> tuple[Array, Array]:
         count = int(archive.number(PINNED, "count"))
         return archive.matrix(PINNED, "population")[:count], archive.matrix(PINNED, "left")[

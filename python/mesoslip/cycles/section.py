@@ -31,7 +31,7 @@ LEVEL, RESET = 0.8, 0.5
 MIN_LEVEL, MAX_LEVEL = 0.65, 0.93
 # Time in which the next passage is sought, in times of loading to the static force and periods of
 # the setup.
-MAX_LOADINGS, MAX_PERIODS = 12.0, 100.0
+MAX_LOADINGS, MAX_PERIODS = 8.0, 30.0
 # No bound on the work of a chunk.
 ANY_WORK = 1e18
 # Steps of Newton's method for the time of a passage.

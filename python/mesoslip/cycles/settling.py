@@ -27,6 +27,10 @@ TOLERANCE, MAX_CYCLES = 1e-5, 80
 # same, and number of these passages: steps of the solver, or a fine structure, may keep it from
 # settling any further.
 MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
+# Ratio of mean amplitudes, in the last third of the passages and in the first, outside of which the
+# motion still drifts; passages of a third at least; and how many times the maximum number of
+# passages it may then take.
+DRIFT, MIN_THIRD, MAX_EXTENSION = 0.85, 8, 6
 # Ratio of successive changes below which they shrink.
 SHRINKING = 0.98
 # Ratio of spreads that are equal: the shorter cycle is taken.
@@ -163,11 +167,13 @@ class _Settling:
         """Iterate with one section: state, next section, and what the motion is if it is known."""
         self._restart()
         self._level = level
-        while self._count < max_cycles:
+        while self._count < max_cycles or (
+            self._drifts() and self._count < MAX_EXTENSION * max_cycles
+        ):
             passage = self._motion.next_passage(words, level)
             self._count += 1
             if progress is not None:
-                progress(self._count / max_cycles)
+                progress(min(1.0, self._count / max_cycles))
             if passage is None:
                 words, trace = self._motion.go_on(words, self.window)
                 return words, self.level_of(trace), ""
@@ -187,6 +193,17 @@ class _Settling:
                 return words, level, "periodic"
             words = self._extrapolated(words, multiple)
         return words, level, "periodic" if self._spread()[1] < MAX_SPREAD else "irregular"
+
+    def _drifts(self) -> bool:
+        """Whether the amplitude still grows or decays from the first part of the passages to the
+        last."""
+        rows = np.array(self._rows)
+        third = len(rows) // 3
+        if third < MIN_THIRD:
+            return True
+        sizes = rows[:, 1] - rows[:, 2]
+        early, late = float(np.mean(sizes[:third])), float(np.mean(sizes[-third:]))
+        return not DRIFT < late / early < 1 / DRIFT
 
     def _spread(self) -> tuple[int, float]:
         """Passages of a cycle, and the relative spread of the last ones, the least of all."""

@@ -105,9 +105,18 @@ class MotionView:
         Heading, and color of the lines.
     drawn
         Called when the browser has drawn a picture.
+    has_trace
+        Whether a measured trace is drawn beside the force.
     """
 
-    def __init__(self, prefix: str, title: str, color: str, drawn: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        prefix: str,
+        title: str,
+        color: str,
+        drawn: Callable[[], None],
+        has_trace: bool = False,
+    ) -> None:
         self.pace = Pace()
         self._count = 0
         self._range = Range1d(start=0, end=1)
@@ -115,8 +124,13 @@ class MotionView:
         self.summary = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
         self.now = Span(location=0, dimension="height", line_color="gray", visible=False)
         self.force = Plot(
-            f"{prefix}force", "Spring force", {"force": color}, 210, x_range=self._range
+            f"{prefix}force",
+            "Spring force",
+            {"measured": "#999999", "force": color} if has_trace else {"force": color},
+            210,
+            x_range=self._range,
         )
+        self._has_trace = has_trace
         self.force.figure.add_layout(self.now)
         self._done = BoxAnnotation(left=0, fill_color="#888888", fill_alpha=0.12, visible=False)
         self.force.figure.add_layout(self._done)
@@ -149,7 +163,8 @@ class MotionView:
 
     def show(self, shown: Motion) -> None:
         """Draw a run as far as it is done; the rest of the time axis is grey."""
-        self.force.show(force=shown.force)
+        beside = {"measured": shown.measured} if self._has_trace else {}
+        self.force.show(force=shown.force, **beside)
         self.velocity.show(velocity=shown.velocity)
         self.detached.show(detached=shown.detached)
         self.slip.show(spring_force=shown.slip_force, contact_force=shown.slip_contact_force)

@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis import slips
 from mesoslip.analysis.regime import regimes, results_of
 from mesoslip.configuration.config import Config
-from mesoslip.errors import MesoslipError
+from mesoslip.errors import FileError, MesoslipError
 from mesoslip.output.access import group_of
+from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line
 from mesoslip.plots.trace import NAMES, UNITS, force_of
-from mesoslip.quantities import Scale, scale_for, with_unit
+from mesoslip.quantities import UNKNOWN, Scale, scale_for, with_unit
 from mesoslip.simulation.runner import Results
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.steady_sliding import steady_sliding
@@ -40,6 +42,9 @@ MIN_PART = 0.2
 CURVE_POINTS = 800
 CURVE_LENGTH = 6.0
 CURVE_TOLERANCE = 1e-6
+# Force of a measured trace, and means over its slips that are compared, with their units.
+MEASURED_FORCE = "spring_force"
+COMPARED = {"force_drop": "N", "duration": "s", "waiting_time": "s"}
 # Work that the stability of steady sliding may take.
 MAX_WORK = 10_000
 # Configurations whose theory is kept.
@@ -64,6 +69,34 @@ class Line:
 
 
 NOTHING = Line(np.empty(0), np.empty(0), "", "")
+
+
+class Measured:
+    """A measured trace that is drawn beside runs.
+
+    Attributes
+    ----------
+    tree
+        The trace.
+    means
+        Statistics of its slips.
+    """
+
+    def __init__(self, output: OutputLike) -> None:
+        """Read a trace.
+
+        Raises
+        ------
+        FileError
+            If it is none, or has friction coefficients instead of forces.
+        """
+        self.tree = as_run(output)
+        if MEASURED_FORCE not in self.tree.data_vars:
+            raise FileError(
+                "the trace has friction coefficients, and the model forces: give the "
+                "normal_force in the table [trace] of mesoslip trace"
+            )
+        self.means = slips.statistics(self.tree)
 
 
 @dataclass(frozen=True)
@@ -99,6 +132,8 @@ class Motion:
         Against time.
     slip_force, slip_contact_force
         The largest slip in close-up: spring force and contact force.
+    measured
+        The force of a measured trace against time, on the axes of ``force``.
     end
         End of the time axis, in its unit: that of the run, or nearer if little of it is done.
     regime
@@ -118,6 +153,7 @@ class Motion:
     detached: Line
     slip_force: Line
     slip_contact_force: Line
+    measured: Line
     end: float
     regime: str
     numbers: tuple[tuple[str, str], ...]
@@ -151,8 +187,8 @@ class Theory:
     numbers: tuple[tuple[str, str], ...]
 
 
-def motion(results: Results) -> Motion:
-    """The pictures of a run, as far as it is done."""
+def motion(results: Results, measured: Measured | None = None) -> Motion:
+    """The pictures of a run, as far as it is done, with a measured trace beside it if given."""
     config, (realization,) = results.config, results.realizations
     tree = build_tree(results)
     extent = Extent(0, parts=PARTS)
@@ -162,10 +198,11 @@ def motion(results: Results) -> Motion:
     if 0 < reached < MIN_PART * end:
         end = reached / MIN_PART
     along = scale_for(end, "s")
-    force, velocity, detached = (
+    velocity, detached = (
         _line(tree, name, extent, extent.window(tree) if len(times) else (0.0, 0.0), along)
-        for name in (force_of(tree), "velocity", "detached_contacts")
+        for name in ("velocity", "detached_contacts")
     )
+    force, beside = _forces(tree, measured, extent, end, along)
     close, close_contact = _close_up(tree)
     numbers = [
         ("breaks", f"{realization.breaks:.6g}"),
@@ -176,6 +213,8 @@ def motion(results: Results) -> Motion:
         numbers.append(("energy balance", f"to {abs(realization.energy_residual):.0e}"))
     if config.has_avalanches:
         numbers.insert(1, ("avalanches", str(realization.avalanche_count)))
+    if measured is not None:
+        numbers += _comparison(tree, measured)
     summary = results_of(regimes(tree))[0].summary
     return Motion(
         force,
@@ -183,6 +222,7 @@ def motion(results: Results) -> Motion:
         detached,
         close,
         close_contact,
+        beside,
         end / along.size,
         summary if results.complete else f"{summary} (so far)",
         tuple(numbers),
@@ -190,6 +230,37 @@ def motion(results: Results) -> Motion:
         1.0 if results.complete else realization.part_done,
         _progress(results),
     )
+
+
+def _forces(
+    tree: xr.DataTree, measured: Measured | None, extent: Extent, end: float, along: Scale
+) -> tuple[Line, Line]:
+    """The spring force of a run, and that of a measured trace, in one unit."""
+    name = force_of(tree)
+    found = [(tree, name, extent.window(tree))] if tree.sizes.get("time") else []
+    if measured is not None:
+        times = times_of(measured.tree)
+        window = float(times[0]), max(float(times[0]), min(end, float(times[-1])))
+        found.append((measured.tree, MEASURED_FORCE, window))
+    drawn = [line(one, ("time", which), extent, window) for one, which, window in found]
+    scale = scale_for(max((_largest(values) for _, values in drawn), default=0.0), "N")
+    lines = [
+        Line(times / along.size, values / scale.size, along.label("time"), scale.label(NAMES[name]))
+        for times, values in drawn
+    ]
+    beside = lines.pop() if measured is not None else NOTHING
+    return (lines[0] if lines else NOTHING), beside
+
+
+def _comparison(tree: xr.DataTree, measured: Measured) -> list[tuple[str, str]]:
+    """Means over the slips of a run, and of a measured trace."""
+    means = slips.statistics(tree)
+    found = []
+    for name, unit in COMPARED.items():
+        both = (one[name]["mean"] if name in one else None for one in (means, measured.means))
+        run, trace = (UNKNOWN if one is None else with_unit(one, unit, 3) for one in both)
+        found.append((f"mean {name.replace('_', ' ')}", f"{run} (measured {trace})"))
+    return found
 
 
 def _progress(results: Results) -> str:

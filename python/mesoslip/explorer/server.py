@@ -24,6 +24,7 @@ from tornado.web import HTTPError, RequestHandler
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
+from mesoslip.explorer.pictures import Measured
 from mesoslip.explorer.view import Page
 
 ADDRESS = "127.0.0.1"
@@ -50,9 +51,9 @@ class Pages(Handler):
     One at a time: several would not be done sooner, and would slow the server down.
     """
 
-    def __init__(self, config: Config, source: str) -> None:
+    def __init__(self, config: Config, source: str, trace: Measured | None = None) -> None:
         super().__init__()
-        self._config, self._source = config, source
+        self._config, self._source, self._trace = config, source, trace
         self._turn = asyncio.Lock()
 
     async def on_session_created(self, session_context: SessionContext) -> None:
@@ -61,7 +62,7 @@ class Pages(Handler):
 
     async def _build(self, document: Document) -> None:
         document.template = TEMPLATE
-        await asyncio.to_thread(Page, document, self._config, self._source)
+        await asyncio.to_thread(Page, document, self._config, self._source, self._trace)
 
     def modify_document(self, doc: Document) -> None:
         """Nothing is left to do."""
@@ -105,6 +106,7 @@ def serve(
     config: Config,
     source: str,
     *,
+    trace: Measured | None = None,
     port: int,
     opens: bool,
     report: Callable[[str], None],
@@ -117,6 +119,8 @@ def serve(
         Configuration at the start.
     source
         Its name on the command line.
+    trace
+        A measured trace to draw beside the run.
     port
         Port of the loopback address; the first free one from there on.
     opens
@@ -129,7 +133,7 @@ def serve(
     RunError
         If no port is free.
     """
-    server = make_server(config, source, port)
+    server = make_server(config, source, port, trace)
     address = f"http://{ADDRESS}:{server.port}/"
     report(address)
     if opens:
@@ -141,7 +145,7 @@ def serve(
         server.stop()
 
 
-def make_server(config: Config, source: str, port: int) -> Server:
+def make_server(config: Config, source: str, port: int, trace: Measured | None = None) -> Server:
     """A server of the page that is not started; see `serve`."""
     # Objects that exist now stay: the garbage collector, which runs after each change, skips them.
     gc.collect()
@@ -167,7 +171,7 @@ def make_server(config: Config, source: str, port: int) -> Server:
             "check_unused_sessions_milliseconds": UNUSED_MILLISECONDS // 3,
         }
         try:
-            server = Server({"/": Application(Pages(config, source))}, **options)
+            server = Server({"/": Application(Pages(config, source, trace))}, **options)
         except OSError:
             continue
         gate.hosts = {f"{name}:{server.port}" for name in (ADDRESS, "localhost")}

@@ -29,7 +29,8 @@ from mesoslip.explorer.controls import BY_KEY
 from mesoslip.explorer.figures import FIRST, SECOND, LatticeView, MotionView, TheoryView
 from mesoslip.explorer.knobs import PLAIN, RED, ControlView, set_changed
 from mesoslip.explorer.live_run import explored, run_live, runnable
-from mesoslip.explorer.pictures import Motion, Theories, Theory, motion
+from mesoslip.explorer.movies import movie_of
+from mesoslip.explorer.pictures import Measured, Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
 from mesoslip.output.writing import write_results
 from mesoslip.simulation.runner import Results
@@ -70,8 +71,10 @@ FOUND = "document.body.classList.remove('lost')"
 class Page:
     """The page of one tab, with its own changes and runs."""
 
-    def __init__(self, document: Document, start: Config, source: str) -> None:
-        self._document = document
+    def __init__(
+        self, document: Document, start: Config, source: str, trace: Measured | None = None
+    ) -> None:
+        self._document, self._trace = document, trace
         self._stem = Path(source).stem or "run"
         self.session = Session(start, source)
         self._results: Results | None = None
@@ -83,6 +86,7 @@ class Page:
             "run": Newest(),
             "limit": Newest(),
             "theory": Newest(REST),
+            "movie": Newest(),
         }
         self._theories = Theories()
         self._controls = {
@@ -98,9 +102,9 @@ class Page:
         self._limit = Toggle(label="compare with N → ∞", name="limit", width=150)
         self._limit.on_change("active", lambda _a, _o, _n: self._update())
         self._limit_message = Div(visible=False, styles=RED, name="limit:message")
-        self._motion = MotionView("", "N contacts", FIRST, self._explain)
+        self._motion = MotionView("", "N contacts", FIRST, self._explain, trace is not None)
         self._limit_motion = MotionView(
-            "limit:", "N → ∞, the master equation", SECOND, lambda: None
+            "limit:", "N → ∞, the master equation", SECOND, lambda: None, trace is not None
         )
         self._theory = TheoryView()
         self._lattice = LatticeView(document, self._motion.now)
@@ -136,6 +140,7 @@ class Page:
             "reset": ("reset all", self._reset),
             "save": ("save as TOML", self._save),
             "download": ("download the output", self._download),
+            "movie": ("make the movie", self._make_movie),
         }
         made: list[UIElement] = []
         for name, (label, callback) in buttons.items():
@@ -230,7 +235,7 @@ class Page:
 
         def job(stop: Stop) -> None:
             def look(results: Results) -> None:
-                shown = motion(results), results if results.complete else None
+                shown = motion(results, self._trace), results if results.complete else None
                 view.pace.wait()
                 view.pace.sent()
                 self._publish(show, turn, shown)
@@ -337,6 +342,32 @@ class Page:
             path = Path(folder) / f"{self._stem}.nc"
             write_results(self._results, path)
             self._send(path.name, path.read_bytes())
+
+    def _make_movie(self) -> None:
+        """Run once more with what a movie needs, and hand it to the browser."""
+        if not self.session.is_runnable:
+            self._report("no movie: correct the values marked in red")
+            return
+        turn, config = self._turn, self.session.config
+
+        def say(text: str) -> None:
+            self._publish(lambda _turn, shown: self._report(shown), turn, text)
+
+        def job(stop: Stop) -> None:
+            try:
+                content = movie_of(config, stop, say)
+            except MesoslipError as error:
+                say(f"no movie: {error}")
+                return
+            if content is not None:
+                self._publish(self._send_movie, turn, content)
+
+        self._report("the movie: running …")
+        self._workers["movie"].submit(job)
+
+    def _send_movie(self, _turn: int, content: bytes) -> None:
+        self._send(f"{self._stem}.gif", content)
+        self._report("the movie is done")
 
     def _send(self, name: str, content: bytes) -> None:
         """Send a file to the browser to save."""

@@ -27,6 +27,7 @@ KINDS = {
     "run": Kind("a run", lambda tree: has_force(tree.data_vars)),
     "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
     "cycle": Kind("a cycle", lambda tree: "settled_motion" in tree.attrs),
+    "branches": Kind("branches of cycles", lambda tree: "continued_key" in tree.attrs),
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
     "lyapunov": Kind("a Lyapunov exponent", lambda tree: "lyapunov_exponent" in tree.data_vars),

@@ -26,6 +26,8 @@ SUMMARIES = {
     "equation of multicontact friction",
     "lyapunov": "Largest Lyapunov exponent of a slider pulled over contacts with random breaking "
     "thresholds, from runs that start a small distance apart",
+    "branches": "Motions that a slider on infinitely many contacts settles to, followed over a "
+    "parameter up and down, from the master equation of multicontact friction",
     "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
     "over a range of parameters",
     "trace": "A measured trace of the spring force of a slider, with the slips found in it",

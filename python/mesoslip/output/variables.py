@@ -309,6 +309,25 @@ CYCLE = Group(
     multiplier_imaginary=Meaning("1", "imaginary part of the multipliers of the cycle"),
 )
 
+BRANCHES = Group(
+    amplitude=Meaning("N", "maximum less minimum of the spring force in the settled motion"),
+    amplitude_ratio=Meaning("1", "amplitude over the static force"),
+    spread=Meaning("1", "variation of the amplitude between passages"),
+    period=Meaning("s", "period, or mean time between passages of an irregular motion"),
+    peak_force=Meaning("N", "maximum of the spring force"),
+    low_force=Meaning("N", "minimum of the spring force"),
+    multiplier=Meaning("1", "modulus of the leading multiplier of the cycle"),
+    motion=Meaning(
+        "1",
+        "settled motion",
+        np.int8,
+        further={"flag_meanings": "smooth periodic irregular"},
+    ),
+    multiple=Meaning("1", "passages of the section in a cycle", np.int8),
+    steady_force=Meaning("N", "force of steady sliding"),
+    growth_rate=Meaning("s-1", "growth rate of small perturbations of steady sliding"),
+)
+
 CYCLE_TRACE = Group(
     time=Meaning("s", "time since the first passage of the section"),
     spring_force=Meaning("N", "force of the spring of the drive"),

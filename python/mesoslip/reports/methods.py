@@ -75,6 +75,19 @@ def cycle_method(_tree: xr.DataTree, config: Config) -> str:
     )
 
 
+def branches_method(tree: xr.DataTree, config: Config) -> str:
+    """The method of branches over a parameter."""
+    return " ".join(
+        (
+            *_engine(config),
+            "At each value it was iterated from one passage of the spring force through a section "
+            "to the next, from the state of the value before, up and down over "
+            f"{tree.attrs['continued_key']}.",
+            *model(config),
+        )
+    )
+
+
 def onset_method(_tree: xr.DataTree, config: Config) -> str:
     """The method of an onset of slip."""
     return " ".join(

@@ -13,6 +13,7 @@ from mesoslip.analysis.cycles import MIN_CYCLES
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.noise import noise_level, without_impulses
+from mesoslip.analysis.regime.events import NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
@@ -57,12 +58,13 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
 
     root = tree.to_dataset()
     apparatus = apparatus_of(tree, name)
-    owner, starts, drops = _slips(tree)
+    owner, slips = _slips(tree)
     results = []
     for number in range(root.sizes["realization"]):
         mine = owner == number
+        own = Slips(slips.start[mine], slips.before[mine], slips.drop[mine])
         window = _window(root.isel(realization=number), apparatus, tree)
-        results.append(classify(*window, starts[mine], drops[mine]))
+        results.append(classify(*window, own))
     motion = None
     config = apparatus.config
     if config is not None and config.drive.is_force and not config.slider.jumps:
@@ -81,23 +83,22 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     return xr.Dataset(variables, {"realization": root["realization"]}, attributes)
 
 
-def _slips(tree: xr.DataTree) -> tuple[Array, Array, Array]:
-    """Realization, start [s] and force drop of each slip; none without a catalogue."""
+def _slips(tree: xr.DataTree) -> tuple[Array, Slips]:
+    """Realization of each slip, and all slips; none without a catalogue."""
     if "slips" not in tree.children:
-        return np.empty(0), np.empty(0), np.empty(0)
+        return np.empty(0), NO_SLIPS
     data = group_of(tree, "slips")
-    return (
-        data["realization_index"].values,
-        data["start_time"].values,
-        data["force_drop"].values,
-    )
+    columns = (data[name].values for name in ("start_time", "force_before", "force_drop"))
+    return data["realization_index"].values, Slips(*columns)
 
 
 def _window(
     one: xr.Dataset, apparatus: Apparatus, tree: xr.DataTree
 ) -> tuple[Scales, Array, Array, Array]:
     """What a realization is compared with; time, force and velocity in its evaluated window."""
-    time, force = one["time"].values, one[apparatus.force_name].values
+    # The catalogue of an elastic slider is that of its mean force.
+    name = "elastic_force" if "elastic_force" in one else apparatus.force_name
+    time, force = one["time"].values, one[name].values
     # Samples after the end of an interrupted run are missing.
     reached = int(np.sum(np.isfinite(force)))
     last_time = float(time[reached - 1]) if reached else 0.0
@@ -158,7 +159,7 @@ def regime(output: OutputLike) -> xr.Dataset:
 def regimes_of_results(results: RunResults) -> Iterator[RegimeResult]:
     """The regimes of the realizations of a run; only the evaluated samples are held in memory."""
     index = {name: number for number, name in enumerate(TRACE_COLUMNS)}
-    wanted = [index[name] for name in ("time", "spring_force", "velocity")]
+    wanted = [index[name] for name in ("time", "elastic_force", "velocity")]
     slip_index = {name: number for number, name in enumerate(SLIP_COLUMNS)}
     for one in results.realizations:
         rows = one.rows("trace")
@@ -175,8 +176,9 @@ def regimes_of_results(results: RunResults) -> Iterator[RegimeResult]:
         slips = np.concatenate(
             [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
         )
-        drops = slips[:, slip_index["force_before"]] - slips[:, slip_index["force_after"]]
-        yield classify(scales, time, force, velocity, slips[:, slip_index["start_time"]], drops)
+        columns = ("start_time", "force_before", "force_after")
+        began, before, after = (slips[:, slip_index[name]] for name in columns)
+        yield classify(scales, time, force, velocity, Slips(began, before, before - after))
 
 
 def _step(count: int) -> int:

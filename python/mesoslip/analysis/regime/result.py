@@ -11,7 +11,7 @@ import numpy as np
 
 from mesoslip.analysis.cycles import MIN_CYCLES
 from mesoslip.output.variables import Group, Meaning
-from mesoslip.quantities import percent, with_unit
+from mesoslip.quantities import percent, with_error, with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,10 +27,15 @@ REGIME = Group(
         further={"flag_meanings": " ".join(NAMES)},
     ),
     relative_amplitude=Meaning(
-        "1", "half the distance of the 5th and 95th percentiles of the spring force, over its mean"
+        "1",
+        "half the distance of the 5th and 95th percentiles of the force, over the static force",
     ),
-    smooth_amplitude=Meaning("1", "upper limit for smooth sliding with N contacts"),
-    cycles=Meaning("1", "cycles of the spring force", np.int64),
+    smooth_amplitude=Meaning(
+        "1", "upper limit for smooth sliding with N contacts, over the static force"
+    ),
+    cycles=Meaning("1", "cycles of the motion: from slip to slip, or of the force", np.int64),
+    are_slips=Meaning("1", "whether the cycles are those from slip to slip", np.int8),
+    slip_share=Meaning("1", "force drops of the slips over the loading by the drive, K v t"),
     period=Meaning("s", "mean period of the cycles"),
     period_variation=Meaning("1", "coefficient of variation of the periods"),
     period_irregularity=Meaning(
@@ -43,11 +48,18 @@ REGIME = Group(
     peak_spread=Meaning(
         "1", "standard deviation of the peaks of the force, over the distance of its percentiles"
     ),
+    peak_irregularity=Meaning(
+        "1",
+        "smallest standard deviation of the peaks over the mean fall, allowing patterns of 2 or 3 "
+        "cycles",
+    ),
     peak_correlation=Meaning("1", "correlation of each peak with the next one (the return map)"),
     amplitude_change=Meaning("1", "change of the falls over the evaluated window, over their mean"),
     amplitude_change_error=Meaning("1", "standard error of the amplitude change"),
     drift=Meaning(
-        "1", "change of the mean force between the halves of the evaluated window, over the mean"
+        "1",
+        "change of the mean force between the halves of the evaluated window, over the static "
+        "force",
     ),
     fast_share=Meaning("1", "share of the time in which the slider is faster than the drive"),
     stick_share=Meaning(
@@ -67,12 +79,15 @@ class RegimeResult:
     relative_amplitude: float = math.nan
     smooth_amplitude: float = math.nan
     cycles: int = 0
+    are_slips: bool = False
+    slip_share: float = math.nan
     period: float = math.nan
     period_variation: float = math.nan
     period_irregularity: float = math.nan
     fall_variation: float = math.nan
     fall_irregularity: float = math.nan
     peak_spread: float = math.nan
+    peak_irregularity: float = math.nan
     peak_correlation: float = math.nan
     amplitude_change: float = math.nan
     amplitude_change_error: float = math.nan
@@ -89,7 +104,7 @@ class RegimeResult:
         name = NAMES[self.regime].replace("_", "-")
         if not math.isfinite(self.relative_amplitude):
             return f"{name}: too few samples to determine a regime"
-        text = f"{name}: force amplitude {percent(self.relative_amplitude)} of the mean"
+        text = f"{name}: force amplitude {percent(self.relative_amplitude)} of the static force"
         if self.regime == SMOOTH:
             return text
         if self.cycles < MIN_CYCLES:
@@ -98,8 +113,10 @@ class RegimeResult:
                 f"and {with_unit(self.window_end, 's')}, at least {MIN_CYCLES} are needed: give a "
                 "longer duration"
             )
-        text += f", {self.cycles} cycles of {with_unit(self.period, 's', 3)}"
-        return f"{text} varying by {percent(self.period_variation)}"
+        period = with_error(self.period, self.period * self.period_variation, "s", 3)
+        if self.are_slips:
+            return f"{text}, a slip every {period} ({self.cycles} times)"
+        return f"{text}, {self.cycles} oscillations of {period}"
 
 
 def results_of(data: xr.Dataset) -> list[RegimeResult]:

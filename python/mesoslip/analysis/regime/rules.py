@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.cycles import (
-    MAX_PATTERN,
     MIN_CYCLES,
-    Cycles,
     correlation,
     defined,
     find_cycles,
@@ -19,6 +17,7 @@ from mesoslip.analysis.cycles import (
     trend,
     variation,
 )
+from mesoslip.analysis.regime.events import Slips, events_of
 from mesoslip.analysis.regime.result import IRREGULAR, SMOOTH, STICK_SLIP, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.scales import Scales
 
@@ -34,25 +33,27 @@ MIN_MEAN = 0.05
 # excursion beyond the percentiles that counts, such as the rebound of a slip.
 TURNING = 0.5
 MAX_EXCURSION = 0.1
-# Maximum variation of periods, and of the falls of the force in a cycle, of stick-slip.
-IRREGULAR_PERIODS = 0.3
-IRREGULAR_FALLS = 0.35
+# Maximum variation of periods, and of the falls of the force in a cycle, of stick-slip; and a
+# smaller one where the peaks of the force vary by more than a part of the mean fall.
+IRREGULAR_PERIODS = IRREGULAR_FALLS = 0.3
+IRREGULAR_PEAKS, WITH_PEAKS = 0.07, 0.2
 # Maximum variations of an oscillation that is not noise, though as small.
 REGULAR_PERIODS = 0.15
 REGULAR_FALLS = 0.2
-# A motion is transient if its amplitude changes by more than this fraction, and by as many standard
-# errors; or if one half of the window is smooth and the amplitude of the other exceeds the limit of
-# smooth sliding by this factor.
-MAX_CHANGE = 0.4
+# A motion is transient if its falls change by more than this fraction, and by as many standard
+# errors; if one half of the window is smooth and the amplitude of the other exceeds the limit of
+# smooth sliding by this factor; or if an oscillation has so much more amplitude in one half.
+MAX_CHANGE = 0.1
 SIGNIFICANCE = 4.0
 SMOOTH_FACTOR = 1.5
+HALVES_FACTOR = 1.5
 # Maximum velocity of a sticking slider over that of the drive: pinned contacts let it move at
 # K/(K + Nk) of the drive's velocity.
 STICKING = 0.5
 
 
 def classify(
-    scales: Scales, time: Array, force: Array, velocity: Array, starts: Array, drops: Array
+    scales: Scales, time: Array, force: Array, velocity: Array, slips: Slips
 ) -> RegimeResult:
     """The regime of a motion.
 
@@ -63,17 +64,17 @@ def classify(
     time, force, velocity
         The evaluated window of the trace: time [s], force, velocity of the slider [m/s], NaN if it
         is unknown.
-    starts, drops
-        Starts [s] of the slips of the realization, and their force drops.
+    slips
+        Slips of the realization.
     """
     if len(time) < 2 * MIN_CYCLES:
         return RegimeResult()
     stage = scales.stage
     force, velocity = stage.direction * force, stage.direction * velocity
-    is_inside = (starts >= time[0]) & (starts <= time[-1])
-    starts, drops = starts[is_inside], np.abs(drops[is_inside])
+    slips = slips.between(time[0], time[-1], stage.direction)
     mean = float(np.mean(force))
-    scale = max(abs(mean), MIN_MEAN * scales.static_force)
+    static = scales.static_force or 1.0
+    scale = max(abs(mean), MIN_MEAN * static)
     smooth = SMOOTH_AMPLITUDE * scale + scales.noise_amplitude
     low, high = np.percentile(force, [LOW, HIGH])
     amplitude = float(high - low) / 2
@@ -83,24 +84,16 @@ def classify(
     cycles = find_cycles(
         time, force, np.clip(force, low - excursion, high + excursion), TURNING * (high - low)
     )
-    min_drop = TURNING * (high - low)
-    if scales.is_measured and drops.size:
-        # The strength may vary along the track by more than slips are deep.
-        min_drop = min(min_drop, TURNING * float(np.median(drops)))
-    is_large = drops >= min_drop
-    slips = Cycles(np.diff(starts[is_large]), drops[is_large], cycles.peaks)
-    # In the catalogue a slip and its rebounds are one, but oscillations without slips are missing;
-    # a trace with few samples may miss slips. The more regular of the two descriptions counts,
-    # unless it leaves out most cycles.
-    has_most = len(slips.periods) >= max(MIN_CYCLES, len(cycles.periods) / MAX_PATTERN)
-    is_regular = not irregularity(slips.periods) >= irregularity(cycles.periods)
-    if (has_most and is_regular) or (scales.is_measured and len(slips.periods) >= MIN_CYCLES):
-        cycles = slips
-    change, error = trend(cycles.falls)
     moved = abs(stage.velocity) * (time[-1] - time[0])
+    loading = scales.stiffness * moved
+    slip_share = float(slips.drop.sum()) / loading if 0 < loading < math.inf else math.nan
+    if scales.is_measured:
+        loading = 0.0
+    cycles, are_slips = events_of(slips, cycles, loading)
+    change, error = trend(cycles.falls)
     numbers = {
-        "relative_amplitude": amplitude / scale,
-        "smooth_amplitude": smooth / scale,
+        "relative_amplitude": amplitude / static,
+        "smooth_amplitude": smooth / static,
         "cycles": len(cycles.periods),
         "period": defined(np.mean, cycles.periods),
         "period_variation": variation(cycles.periods),
@@ -111,10 +104,13 @@ def classify(
         "peak_correlation": correlation(cycles.peaks),
         "amplitude_change": change,
         "amplitude_change_error": error,
-        "drift": float(np.mean(force[half:]) - np.mean(force[:half])) / scale,
+        "drift": float(np.mean(force[half:]) - np.mean(force[:half])) / static,
         "fast_share": math.nan,
         "stick_share": math.nan,
-        "slips": len(starts),
+        "slips": len(slips),
+        "are_slips": are_slips,
+        "slip_share": slip_share,
+        "peak_irregularity": irregularity(cycles.peaks, defined(np.mean, cycles.falls)),
         "window_start": float(time[0]),
         "window_end": float(time[-1]),
     }
@@ -129,15 +125,19 @@ def classify(
         }
     is_renewed = moved >= scales.renewal_displacement
     result = RegimeResult(**numbers)  # type: ignore[arg-type]
-    regime = _regime(result, [one / scale for one in halves], is_renewed=is_renewed)
+    regular = SMOOTH_AMPLITUDE * scale / static
+    regime = _regime(
+        result, [one / static for one in halves], regular=regular, is_renewed=is_renewed
+    )
     # A prescribed slider neither sticks nor slips.
     if scales.is_rigid and regime in {STICK_SLIP, IRREGULAR}:
         regime = SMOOTH
     return replace(result, regime=regime)
 
 
-def _regime(found: RegimeResult, halves: list[float], *, is_renewed: bool) -> int:
-    """The rules; ``halves`` are the amplitudes in the halves of the window, over the mean force."""
+def _regime(found: RegimeResult, halves: list[float], *, regular: float, is_renewed: bool) -> int:
+    """The rules; ``halves`` are the amplitudes in the halves of the window, and ``regular`` is the
+    limit of a regular oscillation, all over the static force."""
     smooth = found.smooth_amplitude
     if min(halves) <= smooth and max(halves) > SMOOTH_FACTOR * smooth:
         return TRANSIENT
@@ -146,16 +146,20 @@ def _regime(found: RegimeResult, halves: list[float], *, is_renewed: bool) -> in
         and found.period_irregularity < REGULAR_PERIODS
         and found.fall_irregularity < REGULAR_FALLS
     )
-    if found.relative_amplitude <= (SMOOTH_AMPLITUDE if is_regular else smooth):
+    if found.relative_amplitude <= (regular if is_regular else smooth):
         return SMOOTH if is_renewed else TRANSIENT
     if found.cycles < MIN_CYCLES:
+        return TRANSIENT
+    if not found.are_slips and max(halves) > HALVES_FACTOR * min(halves):
         return TRANSIENT
     is_certain = abs(found.amplitude_change) > SIGNIFICANCE * found.amplitude_change_error
     if is_certain and abs(found.amplitude_change) > MAX_CHANGE:
         return TRANSIENT
-    if found.period_irregularity > IRREGULAR_PERIODS or found.fall_irregularity > IRREGULAR_FALLS:
-        return IRREGULAR
-    return STICK_SLIP
+    has_peaks = found.peak_irregularity > IRREGULAR_PEAKS
+    is_irregular = found.period_irregularity > (
+        WITH_PEAKS if has_peaks else IRREGULAR_PERIODS
+    ) or found.fall_irregularity > (WITH_PEAKS if has_peaks else IRREGULAR_FALLS)
+    return IRREGULAR if is_irregular else STICK_SLIP
 
 
 def _scatter(values: Array) -> float:

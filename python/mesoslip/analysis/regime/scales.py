@@ -56,6 +56,8 @@ class Scales:
         Amplitude that noise gives to smooth sliding, in the unit of the force.
     renewal_displacement
         Displacement of the drive in which all contacts break [m]; 0 if unknown.
+    stiffness
+        Stiffness of the spring, unit of the force per metre.
     is_rigid
         Whether the slider moves as the drive, so that it neither sticks nor slips.
     has_velocity
@@ -68,6 +70,7 @@ class Scales:
     static_force: float
     noise_amplitude: float
     renewal_displacement: float
+    stiffness: float
     is_rigid: bool
     has_velocity: bool
     is_measured: bool = False
@@ -92,6 +95,7 @@ class Scales:
             static,
             noise,
             config.contacts.break_stretch,
+            config.spring_stiffness,
             math.isinf(config.spring_stiffness),
             config.drive.force_rate is None,
         )
@@ -121,6 +125,7 @@ class Scales:
             float(np.max(np.abs(force), initial=0.0)),
             MEASURED_NOISE_AMPLITUDE * noise,
             0.0,
+            apparatus.stiffness,
             math.isinf(apparatus.stiffness),
             math.isfinite(stage.velocity),
             is_measured=True,

@@ -45,7 +45,8 @@ class PopulationContacts(ContactKind):
             yield Complaint(
                 "interaction",
                 'needs engine "eq": the master equation has no neighbours; on average, '
-                "interaction acts like a smaller contacts.threshold.relative_width",
+                "interaction acts like a smaller contacts.threshold.relative_width: "
+                "mesoslip mean-field measures it",
             )
         if run.realizations > self.max_realizations:
             yield Complaint(

@@ -37,6 +37,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
     ),
     "sweep": (sweep, maps, methods, provenance),
     "cycle": (changes, pictures, cycle, methods, configuration, provenance),
+    "branches": (changes, pictures, methods, configuration, provenance),
     "curve": (changes, pictures, curve, methods, configuration, provenance),
     "onset": (changes, pictures, onset, methods, configuration, provenance),
     "lyapunov": (changes, pictures, lyapunov, methods, configuration, provenance),

@@ -12,6 +12,7 @@ from mesoslip.output.access import is_measured
 from mesoslip.output.kinds import kind_of
 from mesoslip.reports.content import Block, Section, Source, Subject, Text
 from mesoslip.reports.methods import (
+    branches_method,
     curve_method,
     cycle_method,
     fit_method,
@@ -27,6 +28,7 @@ METHODS: dict[str, Callable[[xr.DataTree, Config], str]] = {
     "run": run_method,
     "sweep": sweep_method,
     "cycle": cycle_method,
+    "branches": branches_method,
     "curve": curve_method,
     "onset": onset_method,
     "fit": fit_method,

@@ -1,0 +1,461 @@
+!> Contacts in the order of a key, any of which may leave at any time.
+!>
+!> The keys of all contacts are side by side. Those below a horizon are sorted; when they are used
+!> up, all keys are scanned for the next ones, of which there are so many that a contact costs the
+!> same whatever the number of contacts. One that has left is found to be gone at its turn, as its
+!> key is another one.
+module mesoslip_contacts_individual_scan_order
+   use mesoslip_contacts_individual_sorting, only: before, push, remove_first, sort
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: scan_order_type, new_scan_order
+
+   !> Maximum of keys that are counted in another unit
+   real(wp), parameter :: max_key = 1.0e290_wp
+   !> Key of a contact that is not in the order
+   real(wp), parameter :: none = huge(1.0_wp)
+   !> Contacts in a scan: so many at first, then twice as many each time, up to this part of all
+   integer, parameter :: part = 8, min_scan = 64
+   !> Room for contacts that come late, before the sorted ones
+   integer, parameter :: slack = 64
+   !> Bins in which contacts are sorted: their number, contacts in one, and the maximum
+   integer, parameter :: max_bins = 4096, bin_load = 4, max_load = 64
+   !> Keys that are drawn to find a horizon
+   integer, parameter :: samples = 64
+   !> Factor by which the distance to the next horizon is another one, at most
+   real(wp), parameter :: max_factor = 4.0_wp
+
+   !> Contacts in the order of their keys, then of their numbers.
+   type :: scan_order_type
+      private
+      !> Key of each contact, shape (capacity)
+      real(wp), allocatable :: key(:)
+      !> Contacts with keys below the horizon are sorted, or are late; the distance to the next one
+      real(wp) :: horizon = -none, reach = 0.0_wp
+      integer :: wanted = min_scan
+      !> Those sorted that are left
+      integer :: next = 1, last = 0
+      real(wp), allocatable :: near_key(:)
+      integer, allocatable :: near_contact(:)
+      !> A heap of those that came after the scan
+      integer :: late_count = 0
+      real(wp), allocatable :: late_key(:)
+      integer, allocatable :: late_contact(:)
+   contains
+      !> Forget all contacts
+      procedure, non_overridable :: clear
+      !> Put a contact in, or change its key
+      procedure, non_overridable :: put
+      !> Take a contact out
+      procedure, non_overridable :: remove
+      !> Count all keys from another origin and in another unit
+      procedure, non_overridable :: rescale
+      !> The lowest key, once or again and again
+      procedure, non_overridable :: lowest
+      procedure, non_overridable :: first
+      !> Forget which contacts come next, so that putting one in takes less time
+      procedure, non_overridable :: rest
+      !> A contact the key of which has come
+      procedure, non_overridable :: due
+      !> The first contacts in their order
+      procedure, non_overridable :: preview
+      procedure, non_overridable, private :: find_next, scan, estimate_reach, absorb
+   end type scan_order_type
+
+contains
+
+   !> Set up without contacts.
+   subroutine new_scan_order(self, capacity, error)
+      !> The order
+      type(scan_order_type), intent(out) :: self
+      !> Number of contacts
+      integer, intent(in) :: capacity
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
+
+      ! A scan writes one more, which it then does not count.
+      allocate (self%key(capacity), stat=stat)
+      if (stat == 0) allocate (self%near_key(slack + capacity + 1), stat=stat)
+      if (stat == 0) allocate (self%near_contact(slack + capacity + 1), stat=stat)
+      if (stat == 0) allocate (self%late_key(capacity), stat=stat)
+      if (stat == 0) allocate (self%late_contact(capacity), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the order of breaking")
+         return
+      end if
+      call self%clear()
+   end subroutine new_scan_order
+
+   !> Forget all contacts.
+   pure subroutine clear(self)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+
+      self%key = none
+      call self%rest()
+   end subroutine clear
+
+   !> Forget which contacts come next, so that putting one in takes less time.
+   pure subroutine rest(self)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+
+      self%horizon = -none
+      self%reach = 0.0_wp
+      self%wanted = min_scan
+      self%next = 1
+      self%last = 0
+      self%late_count = 0
+   end subroutine rest
+
+   !> The lowest key, once.
+   pure function lowest(self) result(key)
+      !> The order
+      class(scan_order_type), intent(in) :: self
+      !> The key, huge without contacts
+      real(wp) :: key
+
+      real(wp) :: least(4)
+      integer :: position
+
+      ! Four at a time, which do not wait for each other.
+      least = none
+      do position = 1, size(self%key) - 3, 4
+         least = min(least, self%key(position:position + 3))
+      end do
+      key = minval(least)
+      do position = 4 * (size(self%key) / 4) + 1, size(self%key)
+         key = min(key, self%key(position))
+      end do
+   end function lowest
+
+   !> Put a contact in, or change its key.
+   pure subroutine put(self, contact, key)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Its key
+      real(wp), intent(in) :: key
+
+      self%key(contact) = key
+      if (.not. key < self%horizon) return
+      if (self%late_count == size(self%late_key)) then
+         ! Most of them have left since.
+         call self%rest()
+         return
+      end if
+      self%late_count = self%late_count + 1
+      call push(self%late_key, self%late_contact, self%late_count, key, contact)
+   end subroutine put
+
+   !> Take a contact out.
+   pure subroutine remove(self, contact)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+
+      self%key(contact) = none
+   end subroutine remove
+
+   !> Count all keys from another origin and in another unit, which keeps their order.
+   pure subroutine rescale(self, origin, factor, count, is_done)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+      !> The origin, and one over the unit
+      real(wp), intent(in) :: origin, factor
+      !> Number of contacts
+      integer, intent(in) :: count
+      !> Whether it was done; not if it is not all of them that have keys, or a key is too large
+      logical, intent(out) :: is_done
+
+      real(wp) :: highest
+      integer :: number, contact
+
+      highest = max_key / max(1.0_wp, factor)
+      number = 0
+      do contact = 1, size(self%key)
+         number = number + merge(1, 0, self%key(contact) < highest)
+      end do
+      is_done = number == count
+      if (.not. is_done) return
+      do contact = 1, size(self%key)
+         if (self%key(contact) < none) self%key(contact) = (self%key(contact) - origin) * factor
+      end do
+      if (.not. max(abs(self%horizon), self%reach) < highest) then
+         call self%rest()
+         return
+      end if
+      self%horizon = (self%horizon - origin) * factor
+      self%reach = self%reach * factor
+      self%near_key(self%next:self%last) = (self%near_key(self%next:self%last) - origin) * factor
+      self%late_key(:self%late_count) = (self%late_key(:self%late_count) - origin) * factor
+   end subroutine rescale
+
+   !> The lowest key, to be asked for again and again.
+   pure subroutine first(self, key)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+      !> The key, huge without contacts
+      real(wp), intent(out) :: key
+
+      logical :: is_late
+
+      call self%find_next(is_late)
+      key = none
+      if (is_late) then
+         key = self%late_key(1)
+      else if (self%next <= self%last) then
+         key = self%near_key(self%next)
+      end if
+   end subroutine first
+
+   !> A contact the key of which has come: the first one.
+   pure subroutine due(self, reading, contact)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+      !> What the key is not above
+      real(wp), intent(in) :: reading
+      !> Number of the contact, which stays; 0 if none is due
+      integer, intent(out) :: contact
+
+      logical :: is_late
+
+      contact = 0
+      call self%find_next(is_late)
+      if (is_late) then
+         if (self%late_key(1) <= reading) contact = self%late_contact(1)
+      else if (self%next <= self%last) then
+         if (self%near_key(self%next) <= reading) contact = self%near_contact(self%next)
+      end if
+   end subroutine due
+
+   !> Find the next contact.
+   pure subroutine find_next(self, is_late)
+      class(scan_order_type), intent(inout) :: self
+      !> Whether it is the first of those that came late; if not, the first sorted one, if any
+      logical, intent(out) :: is_late
+
+      do
+         do while (self%next <= self%last)
+            if (.not. abs(self%near_key(self%next) &
+               & - self%key(self%near_contact(self%next))) > 0.0_wp) exit
+            self%next = self%next + 1
+         end do
+         do while (self%late_count > 0)
+            if (.not. abs(self%late_key(1) - self%key(self%late_contact(1))) > 0.0_wp) exit
+            call drop_late(self)
+         end do
+         if (self%next <= self%last .or. self%late_count > 0 .or. self%horizon >= none) exit
+         call self%scan()
+      end do
+      is_late = self%late_count > 0
+      if (is_late .and. self%next <= self%last) then
+         is_late = before(self%late_key(1), self%late_contact(1), self%near_key(self%next), &
+            & self%near_contact(self%next))
+      end if
+   end subroutine find_next
+
+   !> Drop the first of those that came late.
+   pure subroutine drop_late(self)
+      class(scan_order_type), intent(inout) :: self
+
+      call remove_first(self%late_key, self%late_contact, self%late_count)
+      self%late_count = self%late_count - 1
+   end subroutine drop_late
+
+   !> Sort the contacts up to the next horizon, there being none before the present one.
+   pure subroutine scan(self)
+      class(scan_order_type), intent(inout) :: self
+
+      real(wp) :: start, horizon
+      integer :: contact, last
+
+      start = self%horizon
+      if (.not. (start > -none .and. self%reach > 0.0_wp)) then
+         start = self%lowest()
+         call self%estimate_reach(start)
+      end if
+      horizon = none
+      if (self%reach < none - start) horizon = max(start + self%reach, nearest(start, 1.0_wp))
+      last = slack
+      associate (key => self%key, near_key => self%near_key, near_contact => self%near_contact)
+         ! Without a branch of the program: each is written, and counted if it is below.
+         do contact = 1, size(key)
+            near_key(last + 1) = key(contact)
+            near_contact(last + 1) = contact
+            last = last + merge(1, 0, key(contact) < horizon)
+         end do
+      end associate
+      self%horizon = horizon
+      self%next = slack + 1
+      self%last = last
+      call sort_evenly(self%near_key(slack + 1:last), self%near_contact(slack + 1:last), start, &
+         & horizon)
+      if (last == slack) self%reach = 0.0_wp
+      if (self%reach < none / max_factor &
+         & .and. (last - slack < self%wanted / 2 .or. last - slack > 2 * self%wanted)) then
+         self%reach = self%reach * min(max_factor, max(1.0_wp / max_factor, &
+            & real(self%wanted, wp) / max(1, last - slack)))
+      end if
+      if (2 * part * self%wanted <= size(self%key)) then
+         self%wanted = 2 * self%wanted
+         if (self%reach < none / max_factor) self%reach = 2.0_wp * self%reach
+      end if
+   end subroutine scan
+
+   !> Sort contacts by key, then by number, whose keys lie between two rather evenly.
+   pure subroutine sort_evenly(key, contact, start, horizon)
+      real(wp), intent(inout), contiguous :: key(:)
+      integer, intent(inout), contiguous :: contact(:)
+      !> The two keys
+      real(wp), intent(in) :: start, horizon
+
+      integer :: filled(0:max_bins), bin(size(key)), last_contact(size(key))
+      real(wp) :: last_key(size(key)), scale
+      integer :: bins, position, place
+
+      bins = min(max_bins, size(key) / bin_load)
+      if (bins < 2 .or. .not. horizon < none) then
+         call sort(key, contact, size(key))
+         return
+      end if
+      scale = bins / (horizon - start)
+      filled(:bins) = 0
+      do position = 1, size(key)
+         bin(position) = min(bins, 1 + int((key(position) - start) * scale))
+         filled(bin(position)) = filled(bin(position)) + 1
+      end do
+      if (maxval(filled(:bins)) > max_load) then
+         call sort(key, contact, size(key))
+         return
+      end if
+      do position = 1, bins
+         filled(position) = filled(position) + filled(position - 1)
+      end do
+      do position = size(key), 1, -1
+         place = filled(bin(position))
+         filled(bin(position)) = place - 1
+         last_key(place) = key(position)
+         last_contact(place) = contact(position)
+      end do
+      do position = 1, size(key)
+         place = position
+         do while (place > 1)
+            if (.not. before(last_key(position), last_contact(position), key(place - 1), &
+               & contact(place - 1))) exit
+            key(place) = key(place - 1)
+            contact(place) = contact(place - 1)
+            place = place - 1
+         end do
+         key(place) = last_key(position)
+         contact(place) = last_contact(position)
+      end do
+   end subroutine sort_evenly
+
+   !> Estimate how far a horizon is before which there are as many contacts as wanted.
+   pure subroutine estimate_reach(self, start)
+      class(scan_order_type), intent(inout) :: self
+      !> The lowest key
+      real(wp), intent(in) :: start
+
+      real(wp) :: sample(samples)
+      integer :: number(samples), position, rank
+
+      do position = 1, samples
+         number(position) = 1 + int(real(position - 1, wp) * size(self%key) / samples)
+         sample(position) = self%key(number(position))
+      end do
+      call sort(sample, number, samples)
+      rank = max(1, min(samples, nint(real(samples, wp) * self%wanted / size(self%key))))
+      self%reach = none
+      if (sample(rank) < none) self%reach = 2.0_wp * (sample(rank) - start)
+      if (.not. self%reach > 0.0_wp) self%reach = none
+   end subroutine estimate_reach
+
+   !> Sort those that came late in among the first of the others.
+   pure subroutine absorb(self, limit)
+      class(scan_order_type), intent(inout) :: self
+      !> How many others
+      integer, intent(in) :: limit
+
+      integer :: position, contact
+      real(wp) :: key
+      logical :: is_late
+
+      do
+         call self%find_next(is_late)
+         if (self%late_count == 0 .or. self%next == 1) return
+         key = self%late_key(1)
+         contact = self%late_contact(1)
+         if (self%next <= self%last) then
+            position = min(self%next + limit - 1, self%last)
+            if (.not. before(key, contact, self%near_key(position), &
+               & self%near_contact(position))) then
+               return
+            end if
+         end if
+         call drop_late(self)
+         if (abs(key - self%key(contact)) > 0.0_wp) cycle
+         position = self%next - 1
+         do while (position < self%last)
+            if (before(key, contact, self%near_key(position + 1), &
+               & self%near_contact(position + 1))) exit
+            self%near_key(position) = self%near_key(position + 1)
+            self%near_contact(position) = self%near_contact(position + 1)
+            position = position + 1
+         end do
+         self%near_key(position) = key
+         self%near_contact(position) = contact
+         self%next = self%next - 1
+      end do
+   end subroutine absorb
+
+   !> The first contacts in their order: no other contact has the key of one of them.
+   pure subroutine preview(self, limit, contact, key, number)
+      !> The order
+      class(scan_order_type), intent(inout) :: self
+      !> Maximum number
+      integer, intent(in) :: limit
+      !> Their numbers and keys
+      integer, intent(out) :: contact(:)
+      real(wp), intent(out) :: key(:)
+      !> How many they are; none perhaps of those that are there
+      integer, intent(out) :: number
+
+      real(wp) :: beyond
+      integer :: position
+
+      call self%absorb(limit)
+      number = 0
+      beyond = none
+      if (self%late_count > 0) beyond = self%late_key(1)
+      do position = self%next, self%last
+         associate (one => self%near_contact(position))
+            if (abs(self%near_key(position) - self%key(one)) > 0.0_wp) cycle
+            ! One that has left and come back with the same key is there twice.
+            if (number > 0) then
+               if (contact(number) == one) cycle
+            end if
+            if (number == limit) then
+               beyond = min(beyond, self%near_key(position))
+               exit
+            end if
+            number = number + 1
+            contact(number) = one
+            key(number) = self%near_key(position)
+         end associate
+      end do
+      do while (number > 0)
+         if (key(number) < beyond) exit
+         number = number - 1
+      end do
+   end subroutine preview
+
+end module mesoslip_contacts_individual_scan_order

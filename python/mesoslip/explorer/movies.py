@@ -1,0 +1,100 @@
+"""The movie of a run: what must be recorded for it, and its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from mesoslip.configuration.config import Config
+from mesoslip.errors import ConfigError, Problem
+from mesoslip.execution.stop import StopRequest
+from mesoslip.explorer.controls import lattice_size
+from mesoslip.explorer.live_run import explored, run_live
+from mesoslip.output.tree import build_tree
+from mesoslip.plots.close_up import largest_slip, slip_window
+from mesoslip.plots.plot import plot
+from mesoslip.simulation.runner import Results
+
+# Snapshots of a movie, and the part of them in the largest slip.
+SNAPSHOTS = 100
+IN_SLIP = 0.7
+
+
+def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -> bytes | None:
+    """A movie of a run as a GIF; None if it was stopped.
+
+    On a lattice it shows the load of each contact, of an elastic slider its layers, and else the
+    stretches of the contacts.
+
+    Parameters
+    ----------
+    config
+        Configuration of the run.
+    stop
+        A request to stop.
+    report
+        Called with what is being done.
+
+    Raises
+    ------
+    ConfigError
+        If there is no movie of such a run.
+    RunError
+        If the run fails.
+    """
+    view, wanted = recorded_for_movie(config)
+    report("the movie: running …")
+    results = finished_run(wanted, stop)
+    if results is None:
+        return None
+    if view == "contacts":
+        results = finished_run(around_slip(wanted, results), stop)
+        if results is None:
+            return None
+    report("the movie: drawing …")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "movie.gif"
+        plot(build_tree(results), path, view=view)
+        return path.read_bytes()
+
+
+def recorded_for_movie(config: Config) -> tuple[str, Config]:
+    """The view of the movie, and the configuration of a run that records it."""
+    wanted = explored(config)
+    if wanted.contact_kind.on_lattice:
+        return "lattice", wanted
+    if wanted.slider.layer_count > 1:
+        return "layers", wanted.replace({"output.layers": True})
+    if not wanted.contact_kind.is_discrete:
+        message = 'a movie shows contacts one by one, which engine "eq" has'
+        raise ConfigError([Problem("", "run.engine", message, config.run.engine)])
+    count = wanted.contacts.count
+    columns, rows = lattice_size(count, "square")
+    if columns * rows != count:
+        message = f"has no movie, which needs columns and rows of contacts; {columns * rows} has"
+        raise ConfigError([Problem("", "contacts.count", message, count)])
+    # Contacts without interaction have no neighbours that matter: the motion is the same.
+    sites = {"lattice": "square", "columns": columns, "rows": rows, "strength": 0.0}
+    return "contacts", explored(wanted.replace({"interaction": sites}))
+
+
+def around_slip(config: Config, results: Results) -> Config:
+    """The same with most of the snapshots in the largest slip of a run."""
+    slip = largest_slip(build_tree(results))
+    if slip is None:
+        return config
+    end = config.expected_duration
+    low, high = slip_window(slip)
+    inside = np.linspace(max(low, 0.0), min(high, end), round(IN_SLIP * SNAPSHOTS))
+    around = np.linspace(0.0, end, round((1 - IN_SLIP) * SNAPSHOTS) + 1)[1:-1]
+    return config.replace({"output.snapshots": np.union1d(inside, around).tolist()})
+
+
+def finished_run(config: Config, stop: StopRequest) -> Results | None:
+    """The whole run; None if it was stopped."""
+    seen: list[Results] = []
+    run_live(config, stop, seen.append)
+    return seen[-1] if seen[-1].complete else None

@@ -1,0 +1,124 @@
+"""View of branches: amplitude and period over a parameter, up and down."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mesoslip.plots.style import (
+    BLUE,
+    RED,
+    Canvas,
+    canvas,
+    legend_above,
+    styled,
+    titles,
+)
+from mesoslip.plots.sweep_axis import SweptKey
+from mesoslip.plots.views.base import Options, View
+from mesoslip.quantities import scale_for
+
+Array = NDArray[np.float64]
+
+# Directions: colours, markers and sizes, so that both are seen where they agree.
+STYLES: dict[str, dict[str, Any]] = {
+    "up": {"color": RED, "marker": "^", "markersize": 6},
+    "down": {"color": BLUE, "marker": "v", "markersize": 4},
+}
+# Ratio of the amplitudes of the two directions from which on they are different motions.
+DIFFERENT = 2.0
+IRREGULAR = 2
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+    """Amplitude and period of the settled motion over the parameter."""
+    data, axis = _data(tree)
+    with styled():
+        figure = canvas(figure, (6.5, 5.0))
+        amplitude, period = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
+        draw_amplitude(amplitude, tree, options)
+        amplitude.set_xlabel("")
+        values = data["period"].values
+        scale = scale_for(float(np.nanmax(values, initial=0.0)) or 1.0, "s")
+        for row, (_, style) in enumerate(STYLES.items()):
+            period.plot(axis.values, values[row] / scale.size, linestyle="", **style)
+        period.set_ylabel(scale.label("period"))
+        period.set_ylim(bottom=0)
+        period.set_xlabel(axis.label)
+    return figure
+
+
+def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+    """Draw the amplitude over the parameter, with the linear boundary and hysteresis."""
+    data, axis = _data(tree)
+    ratio, motion = data["amplitude_ratio"].values, data["motion"].values
+    for row, (direction, style) in enumerate(STYLES.items()):
+        axes.plot(axis.values, ratio[row], linewidth=0.7, label=direction, **style)
+        irregular = motion[row] == IRREGULAR
+        axes.plot(
+            axis.values[irregular],
+            ratio[row][irregular],
+            linestyle="",
+            marker="o",
+            markersize=9,
+            markerfacecolor="none",
+            color=style["color"],
+            label="irregular" if row == 0 else None,
+        )
+    _mark_hysteresis(axes, axis.values, ratio)
+    _mark_boundary(axes, axis.values, data["growth_rate"].values)
+    if axis.is_logarithmic:
+        axes.set_xscale("log")
+    axes.set_ylabel("amplitude over $F_s$")
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel(axis.label)
+    titles(axes, tree, beside_legend=True)
+    legend_above(axes)
+
+
+def _data(tree: xr.DataTree) -> tuple[xr.Dataset, SweptKey]:
+    data = tree.to_dataset()
+    return data, SweptKey.of(data[tree.attrs["continued_key"]])
+
+
+def _mark_hysteresis(axes: Axes, values: Array, ratio: Array) -> None:
+    """Shade where the directions differ."""
+    low, high = ratio.min(axis=0), ratio.max(axis=0)
+    differs = np.flatnonzero(high > DIFFERENT * np.maximum(low, 1e-12))
+    for number, at in enumerate(differs):
+        left = values[at] if at == 0 else np.sqrt(values[at] * values[at - 1])
+        right = values[at] if at == len(values) - 1 else np.sqrt(values[at] * values[at + 1])
+        axes.axvspan(
+            left,
+            right,
+            color="0.9",
+            linewidth=0,
+            zorder=0,
+            label="directions differ" if number == 0 else None,
+        )
+
+
+def _mark_boundary(axes: Axes, values: Array, growth: Array) -> None:
+    """Mark where smooth sliding changes its linear stability."""
+    unstable = growth > 0
+    known = np.isfinite(growth[1:]) & np.isfinite(growth[:-1])
+    for number, at in enumerate(np.flatnonzero((unstable[1:] != unstable[:-1]) & known)):
+        axes.axvline(
+            float(np.sqrt(values[at] * values[at + 1])),
+            color="black",
+            linestyle="--",
+            label="linear stability of smooth sliding" if number == 0 else None,
+        )
+
+
+VIEW = View(
+    name="branches",
+    kind="branches",
+    summary="amplitude and period over the parameter",
+    draw=draw,
+    panel=draw_amplitude,
+)

@@ -42,7 +42,7 @@ PRESCRIBED = {"slider": {"kind": "prescribed"}, "contacts__coupling": "equal"}
     [
         kind
         for kind in KINDS
-        if not any(one in kind for one in ("lattice", "ageing", "table", "newborn"))
+        if not any(one in kind for one in ("lattice", "ageing", "table", "newborn", "thermal, me"))
     ],
 )
 @pytest.mark.parametrize("law", ["relax", "log"])

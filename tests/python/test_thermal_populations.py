@@ -121,12 +121,13 @@ def test_creep_under_a_force_is_the_inverse_of_the_steady_force():
 
 @pytest.mark.parametrize("kind", ["rigid, thermal", "layered, thermal", "prescribed, thermal"])
 def test_errors_are_of_second_order_with_slips_and_reversals(kind):
+    """Or smaller: with coarser steps slips come too early or too late."""
     coarse, middle, fine = (
         finished(configuration(kind, run__engine="me", run__resolution=resolution)).trace[:, 5]
-        for resolution in (1.0, 0.5, 0.25)
+        for resolution in (0.5, 0.25, 0.125)
     )
     ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
-    assert 3.0 < ratio < 6.5
+    assert ratio > 3
 
 
 def test_many_contacts_come_to_the_populations():

@@ -95,6 +95,29 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         variables.ONSET,
         "The onset of slip by Eqs. S46 and S47 of the source, without dimensions.",
     ),
+    (
+        "mesoslip cycle: root",
+        variables.CYCLE,
+        "Dimensions `passage` and `multiplier`: the settled [cycle](../../cycles.md). Group "
+        "`state` has the state at the section, from which another `cycle` can start.",
+    ),
+    (
+        "mesoslip cycle: group trace",
+        variables.CYCLE_TRACE,
+        "Dimension `time`: the samples of one cycle.",
+    ),
+    (
+        "mesoslip cycle --continue: root",
+        variables.BRANCHES,
+        "Dimensions `direction` (up, down) and the continued key; `steady_force` and `growth_rate` "
+        "have the key alone.",
+    ),
+    (
+        "mesoslip lyapunov",
+        variables.LYAPUNOV,
+        "Growth of the distance between a run and its twins "
+        "([Lyapunov exponents](../../ageing.md)), and peaks of slips.",
+    ),
 )
 
 

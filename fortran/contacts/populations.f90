@@ -23,6 +23,9 @@ module mesoslip_contacts_populations
 
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: max_attached_part = 0.1_wp
+   !> Part of a step for which nothing may attach in it. Contacts that break by activation do so in
+   !> every step, and gaps of rounding between steps would come back after each delay.
+   real(wp), parameter :: activated_gap = 1.0e-3_wp
    !> Populations of contacts.
    type, extends(population_state_type) :: contact_populations_type
    contains
@@ -142,6 +145,7 @@ contains
       call new_contact_populations(populations, common, resolution, error)
       if (allocated(error)) return
       call populations%pinned%activate(rate, force / common%static_force, resolution)
+      populations%detached%short_gap = activated_gap
       call move_alloc(populations, contacts)
    end subroutine make_activated_populations
 

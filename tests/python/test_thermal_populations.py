@@ -119,6 +119,22 @@ def test_creep_under_a_force_is_the_inverse_of_the_steady_force():
         assert abs(one.energy_residual) < 1e-5
 
 
+def test_a_long_hold_takes_few_steps():
+    """Of 2·10⁷ delays."""
+    config = configuration(
+        "rigid, thermal, me",
+        drive={"stage": [{"duration": 0.04, "velocity": 1e-5}, {"duration": 1e4, "hold": True}]},
+        output={"interval": 100.0},
+        run__resolution=0.5,
+    )
+    one = finished(config)
+    assert one.advances < 1e4
+    assert abs(one.energy_residual) < 1e-5
+    force = one.trace[1:, 5]
+    assert np.all(np.diff(force) < 0)
+    assert 0 < force[-1] < 0.8 * force[0]
+
+
 @pytest.mark.parametrize("kind", ["rigid, thermal", "layered, thermal", "prescribed, thermal"])
 def test_errors_are_of_second_order_with_slips_and_reversals(kind):
     """Or smaller: with coarser steps slips come too early or too late."""

@@ -83,8 +83,8 @@ contains
          max_span = min(max_span, growing)
       end if
       span = min(span, max_span)
-      call self%detached%expect(pose%time, span, max_births, &
-         & breaks .and. distance_in(expected, direction, span) > 0.0_wp, births)
+      call self%detached%expect(pose%time, span, max_births, breaks .and. &
+         & (self%pinned%is_activated .or. distance_in(expected, direction, span) > 0.0_wp), births)
       span = min(span, births%end_time - pose%time)
       distance = distance_in(expected, direction, span)
       reach = max(distance, min_part * self%pinned%step)

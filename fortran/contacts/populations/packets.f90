@@ -42,6 +42,8 @@ module mesoslip_contacts_populations_packets
    type :: detached_packets_type
       !> Number and mass of the detached contacts
       type(accumulator_type) :: number, mass
+      !> Part of a step for which nothing may attach in it, between packets
+      real(wp) :: short_gap = 0.0_wp
 
       !> Time between breaking and attaching [s], and whether contacts attach again
       real(wp), private :: delay = 0.0_wp
@@ -183,7 +185,7 @@ contains
       until = time
       do index = self%first, self%last
          call self%due_times(index, early, late)
-         if (early > until) then
+         if (early > until + self%short_gap * duration) then
             ! Nothing attaches for a while: the step ends where that changes.
             births%end_time = early
             if (births%number > 0.0_wp) births%end_time = until

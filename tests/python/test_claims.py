@@ -259,3 +259,72 @@ def test_every_figure_has_runs():
                 run = run.removesuffix(ending)
             there = [SOURCE / f"{run}.toml", ROOT / "runs" / f"{run}.toml"]
             assert sum(one.exists() for one in there) == 1
+
+
+def swept(sizes, **measures):
+    """An output of a sweep: coordinates by dimension, and measures, which are broadcast."""
+    shape = [len(values) for values in sizes.values()]
+    variables = {
+        name: (list(sizes), np.broadcast_to(values, shape).astype(float))
+        for name, values in measures.items()
+    }
+    return xr.DataTree(xr.Dataset(variables, sizes))
+
+
+def test_claims_of_ageing():
+    sizes = {
+        "contacts.ageing.young_force_ratio": [0.3, 1.0],
+        "slider.damping_ratio": [0.02, 0.2],
+        "drive.velocity": [1e-6, 1e-5],
+        "realization": [0, 1],
+    }
+    amplitudes = np.full((2, 2, 2, 2), 0.4)
+    assert judged("C21", swept(sizes, relative_amplitude=amplitudes)) is Verdict.FAILS
+    amplitudes[0, 1, 1] = 1e-3
+    assert judged("C21", swept(sizes, relative_amplitude=amplitudes)) is Verdict.QUALIFIED
+    amplitudes[0, 0, 1] = 1e-3
+    assert judged("C21", swept(sizes, relative_amplitude=amplitudes)) is Verdict.HOLDS
+    amplitudes[1, :, 1] = 1e-3
+    assert judged("C21", swept(sizes, relative_amplitude=amplitudes)) is Verdict.FAILS
+
+
+@pytest.mark.parametrize(
+    ("peaks", "falls", "last", "expected"),
+    [
+        (0.2, 0.2, 1e-3, Verdict.HOLDS),
+        (0.05, 0.2, 1e-3, Verdict.FAILS),
+        (0.2, 0.05, 1e-3, Verdict.FAILS),
+        (0.2, 0.2, 0.2, Verdict.FAILS),
+    ],
+)
+def test_claim_of_irregular_motion(peaks, falls, last, expected):
+    sizes = {
+        "slider.damping_ratio": [0.2],
+        "contacts.count": [250, 1000],
+        "drive.velocity": [1e-6, 2e-6, 1e-5],
+        "realization": [0, 1],
+    }
+
+    def at_velocities(*values):
+        return np.array(values)[:, None]
+
+    tree = swept(
+        sizes,
+        peak_variation=at_velocities(0.01, peaks, np.nan),
+        fall_irregularity=at_velocities(0.01, falls, 0.2),
+        relative_amplitude=at_velocities(0.4, 0.2, last),
+    )
+    assert judged("C22", tree) is expected
+
+
+def test_claim_of_a_film_needs_another_change_of_contacts():
+    sizes = {
+        "contacts.count": [1, 4080],
+        "contacts.drag_rate": 2e11 * 10.0 ** np.arange(9),
+        "realization": [0, 1],
+    }
+    grows = np.linspace(0.01, 0.03, 9)
+    both = np.stack([grows, grows])[:, :, None]
+    assert judged("C17", swept(sizes, mean_slip_duration=both)) is Verdict.FAILS
+    both[1] = 0.01
+    assert judged("C17", swept(sizes, mean_slip_duration=both)) is Verdict.HOLDS

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from outputs import chosen, opened
 
-from claims import coexistence, curves, film, layered, limit, motion, numbers, slips
+from claims import ageing, coexistence, curves, film, layered, limit, motion, numbers, slips
 from claims.base import Claim, Judgement, Verdict
 
 __all__ = ["CLAIMS", "Claim", "Judgement", "Verdict", "judge"]
@@ -25,6 +25,7 @@ _MODULES = (
     layered,
     coexistence,
     film,
+    ageing,
 )
 CLAIMS = {
     claim.name: claim

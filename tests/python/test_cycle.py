@@ -13,6 +13,8 @@ from mesoslip.cycles.coordinates import SLIDER, Coordinates
 from mesoslip.cycles.cycle import master_equation
 from mesoslip.cycles.section import Motion
 from mesoslip.simulation.archive import Archive
+from scipy.optimize import minimize_scalar
+from scipy.special import ndtr
 
 # Klein's case with broad thresholds, strong damping and a long delay: regular stick-slip.
 REGULAR = (
@@ -22,6 +24,17 @@ REGULAR = (
     "slider.damping_ratio=1",
     "drive.velocity=3um/s",
     "output.slip_interval=none",
+)
+
+# Narrow thresholds, slow drive, no back force, and a delay in which the slider comes to rest:
+# nearly all contacts break together and attach together, at one displacement.
+TOGETHER = (
+    "contacts.coupling=equal",
+    "contacts.back_force_ratio=0",
+    "contacts.delay=0.3 s",
+    "contacts.threshold.relative_width=0.05",
+    "slider.damping_ratio=0.5",
+    "drive.velocity=0.1um/s",
 )
 
 
@@ -48,6 +61,39 @@ def test_cycle_agrees_with_a_long_run(regular):
     duration = np.mean(slips["end_time"] - slips["start_time"])
     assert regular.slips == 1
     assert regular.slip_share == pytest.approx(duration / regular.period, rel=1e-3)
+
+
+def test_contacts_that_break_together():
+    """Contacts one by one, which share nothing with the map, and the force of a bundle in closed
+    form: F(X) = Nk X J(X) up to its maximum, from where the slip starts."""
+    found = mesoslip.cycle(configuration(*TOGETHER), find_multipliers=False)
+    assert found.motion == "periodic"
+    one_by_one = configuration(
+        *TOGETHER,
+        "run.engine=eq",
+        "contacts.count=100000",
+        "run.duration=8.5s",
+        "output.interval=2s",
+    )
+    with mesoslip.Realization(one_by_one) as run:
+        while not run.finished:
+            run.advance()
+        slips = run.table("slips")
+    peaks, times = slips["force_before"], slips["start_time"]
+    assert len(slips) == 4
+    assert found.peak_force == pytest.approx(peaks[-1], rel=1e-3)
+    assert found.period == pytest.approx(times[-1] - times[-2], rel=1e-3)
+    contacts, slider = one_by_one.contacts, one_by_one.slider
+    width = contacts.threshold.relative_width
+    top = minimize_scalar(lambda u: -u * ndtr((1 - u) / width), bounds=(0.5, 1), method="bounded")
+    force = -top.fun * contacts.static_force
+    displacement = top.x * contacts.static_force / contacts.stiffness
+    period = (displacement + force / slider.stiffness) / 1e-7 + contacts.delay
+    # The relaxed start has one origin. Later some 1 % of the contacts break before the slip, attach
+    # before the others, and load earlier.
+    assert peaks[0] == pytest.approx(force, rel=5e-3)
+    assert 0.98 < found.peak_force / force < 1
+    assert 0.98 < found.period / period < 1
 
 
 def test_the_start_does_not_matter(regular):

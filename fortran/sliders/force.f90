@@ -222,6 +222,7 @@ contains
       step = window%end_time - self%time
       ends = step * rate <= max_step
       if (.not. ends) step = max_step / rate
+      call forget_rounding(self)
       call expand(self)
       change = 0.0_wp
       do term = terms - 1, 1, -1
@@ -250,6 +251,21 @@ contains
       self%velocity = horner(self%series, terms, step)
       if (turns) self%velocity = 0.0_wp
    end subroutine move
+
+   !> Start from rest where a growing force turns the slider within the resolution of the time: it
+   !> would turn there without end.
+   subroutine forget_rounding(self)
+      type(slider_force_type), intent(inout) :: self
+
+      real(wp) :: jerk, resolution
+
+      jerk = abs(self%drive%rate - self%law%rate) * self%inverse_mass
+      resolution = spacing(self%time)
+      if (abs(self%start_acceleration) > jerk * resolution) return
+      if (abs(self%velocity) > jerk * resolution**2) return
+      self%velocity = 0.0_wp
+      self%start_acceleration = 0.0_wp
+   end subroutine forget_rounding
 
    !> Taylor coefficients of the velocity, from the equation of motion.
    subroutine expand(self)

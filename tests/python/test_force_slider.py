@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip import ConfigError
+from conftest import ROOT
+from mesoslip import Config, ConfigError
 
 MASS = 1.47e-3
 FORCE = {"kind": "force", "mass": MASS, "damping": 40.0}
@@ -179,3 +181,16 @@ def test_errors_name_the_key(klein, changes, expected):
         klein(**changes)
     for part in expected:
         assert part in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_slider_at_rest_up_to_rounding_follows_a_growing_force(seed):
+    """It turns within the resolution of the time, which used to end the run without progress."""
+    config = Config.load(ROOT / "runs" / "static-friction-rate.toml")
+    tables = tomllib.loads(config.to_toml())
+    tables["drive"]["stage"] = tables["drive"]["stage"][5:]
+    del tables["run"]["duration"]
+    tables["run"] |= {"realizations": 1, "seed": seed}
+    tree = mesoslip.run(Config.from_dict(tables))
+    assert tree["time"].values[-1] == pytest.approx(5.1)
+    assert tree["contact_force"].values[0, 5000:].max() > 0.6 * config.contacts.static_force

@@ -45,9 +45,10 @@ module mesoslip_drive
       procedure, non_overridable :: open
       procedure, non_overridable :: set_values
       procedure, non_overridable :: is_open
-      !> Take the rate of the first part, of the next, or turn round
+      !> Take the rate of the first part, of the next, go back to the first, or turn round
       procedure, non_overridable :: begin
       procedure, non_overridable :: take_next_part
+      procedure, non_overridable :: rewind
       procedure, non_overridable :: turn_round
       !> When the part ends, or the drive turns round before
       procedure, non_overridable :: end_of_part
@@ -145,6 +146,14 @@ contains
       self%part = self%part + 1
       call take_part(self, time)
    end subroutine take_next_part
+
+   !> Count the first part as the present one; its rate is not taken.
+   pure subroutine rewind(self)
+      !> The drive
+      class(drive_type), intent(inout) :: self
+
+      self%part = 1
+   end subroutine rewind
 
    !> Take the rate of the present part.
    subroutine take_part(self, time)

@@ -485,6 +485,25 @@ subroutine displace_drive(handle, distance, status, message)
    call report(error, status, message)
 end subroutine displace_drive
 
+!> Go on from the end of another run, whose state was restored: the first part of the drive is over.
+subroutine follow_simulation(handle, status, message)
+   !f2py threadsafe
+   use mesoslip_boundary_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_loop_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation
+   type(error_type), allocatable :: error
+
+   call find_simulation(handle, .true., simulation, error)
+   if (.not. allocated(error)) call simulation%follow(error)
+   call report(error, status, message)
+end subroutine follow_simulation
+
 !> Put the state of a simulation into an archive, which the simulation keeps until it is fetched.
 subroutine save_simulation(handle, length, status, message)
    !f2py threadsafe

@@ -1,14 +1,14 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_loop_simulation
    use mesoslip_interface_law, only: interface_law_type
-   use mesoslip_loop_endings, only: ending_none
+   use mesoslip_loop_endings, only: ending_drive, ending_none, ending_slips, ending_steady
    use mesoslip_loop_events, only: advance_to_event
    use mesoslip_loop_instant, only: advance_in_equilibrium
    use mesoslip_loop_scheduled, only: advance_through_schedule
    use mesoslip_loop_segment, only: new_segment, segment_type
    use mesoslip_loop_state, only: state_type
-   use mesoslip_loop_transitions, only: look_for_steady
-   use mesoslip_numerics_errors, only: error_type, raise, status_stalled
+   use mesoslip_loop_transitions, only: look_for_steady, shift_origin, take_next_part
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_sliders_instant, only: instant_slider_type
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
@@ -25,6 +25,8 @@ module mesoslip_loop_simulation
    contains
       !> Prepare the start
       procedure, non_overridable :: start
+      !> Go on from the end of another run
+      procedure, non_overridable :: follow
       !> Go on for a segment, or until the end
       procedure, non_overridable :: run
       procedure, non_overridable, private :: advance, check_progress, is_full
@@ -63,6 +65,33 @@ contains
       end select
       call self%avalanches%take_due_snapshots(self%slider, self%contacts)
    end subroutine start
+
+   !> Go on from the end of another run, whose state was restored: the first part of the drive is
+   !> over, and the second begins. Time, displacement and counts go on.
+   subroutine follow(self, error)
+      !> The simulation
+      class(simulation_type), intent(inout) :: self
+      !> Set if no run can follow
+      type(error_type), allocatable, intent(out) :: error
+
+      if (all(self%ending /= [ending_drive, ending_slips, ending_steady])) then
+         call raise(error, status_invalid, "a run follows one that came to the end of its drive, " &
+            & // "to a steady state or to a number of slips")
+         return
+      end if
+      call self%slider%drive%rewind()
+      if (self%slider%drive%is_last_part()) then
+         call raise(error, status_invalid, "the drive of a run that follows has a part before it")
+         return
+      end if
+      self%ending = ending_none
+      call take_next_part(self)
+      call shift_origin(self)
+      call self%recorder%trace%begin(self%slider%time)
+      call self%recorder%trace%take_samples(self%slider, self%contacts%detached_count)
+      call self%avalanches%begin_run()
+      call self%avalanches%take_due_snapshots(self%slider, self%contacts)
+   end subroutine follow
 
    !> Go on for some advances or some work, or until much waits to be taken away, or until the end.
    subroutine run(self, max_advances, max_work, error)

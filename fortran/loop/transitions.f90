@@ -8,7 +8,7 @@ module mesoslip_loop_transitions
    implicit none
    private
 
-   public :: finish, is_broken, look_for_steady, change_drive, shift_origin, &
+   public :: finish, is_broken, look_for_steady, change_drive, take_next_part, shift_origin, &
       & shift_stretches
    public :: end_at_avalanches, end_at_slips, end_at_displacement, end_if_steady
 
@@ -119,14 +119,17 @@ contains
             call finish(state, ending_drive)
             return
          else
+            if (state%slider%drive%is_stage_over()) call state%stages%finish(state%slider)
             call take_next_part(state)
          end if
       end if
       call shift_origin(state)
    end subroutine change_drive
 
-   !> Go over to the next part of the drive, which may be of another stage.
+   !> Go over to the next part of the drive, which may be of another stage, the last one being
+   !> recorded.
    subroutine take_next_part(state)
+      !> The state
       class(state_type), intent(inout) :: state
 
       real(wp) :: rate, direction
@@ -135,7 +138,6 @@ contains
       is_new = state%slider%drive%is_stage_over()
       rate = state%slider%drive%rate_at(state%slider%time)
       direction = state%slider%drive%direction
-      if (is_new) call state%stages%finish(state%slider)
       call state%slider%drive%take_next_part(state%slider%time)
       call state%slider%adapt_to_drive()
       if (is_new) then

@@ -78,6 +78,8 @@ module mesoslip_recording_avalanches
       procedure, non_overridable :: count_others
       !> Close the present avalanche, if there is one
       procedure, non_overridable :: close
+      !> Begin another run
+      procedure, non_overridable :: begin_run
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: begin, take_snapshot
@@ -183,6 +185,14 @@ contains
       self%avalanches = self%avalanches + number
       self%breaks = breaks
    end subroutine count_others
+
+   !> Begin another run, which has snapshots of its own.
+   pure subroutine begin_run(self)
+      !> The recorder
+      class(avalanche_recorder_type), intent(inout) :: self
+
+      self%taken = 0
+   end subroutine begin_run
 
    !> An avalanche begins.
    subroutine begin(self, slider, law)

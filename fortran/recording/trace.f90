@@ -34,6 +34,8 @@ module mesoslip_recording_trace
       real(wp) :: next_time = 0.0_wp
       !> Interval of the samples, and time at which the run ends [s]
       real(wp), private :: interval = 1.0_wp, duration = 0.0_wp
+      !> Time of the first sample, from which others are counted [s]
+      real(wp), private :: first_time = 0.0_wp
       !> Layers whose displacements are sampled
       integer, private :: layers = 0
       !> Samples so far
@@ -41,6 +43,8 @@ module mesoslip_recording_trace
    contains
       !> Make room for samples
       procedure, non_overridable :: open
+      !> Begin another run
+      procedure, non_overridable :: begin
       !> Whether so many samples wait that they should be taken away
       procedure, non_overridable :: is_full
       !> Take the samples within the last advance of a slider
@@ -66,6 +70,22 @@ contains
       call self%rows%open(trace_length, pausing_samples + max_samples_in_step)
       call self%layer_rows%open(layers, pausing_samples + max_samples_in_step)
    end subroutine open
+
+   !> Begin another run with a sample. The samples of the earlier run go on if this is one of them.
+   pure subroutine begin(self, time)
+      !> The trace
+      class(trace_type), intent(inout) :: self
+      !> Time of the sample [s]
+      real(wp), intent(in) :: time
+
+      self%first_time = 0.0_wp
+      self%samples = nint(time / self%interval, i8)
+      if (abs(real(self%samples, wp) * self%interval - time) > self%interval * time_tolerance) then
+         self%first_time = time
+         self%samples = 0
+      end if
+      self%next_time = time
+   end subroutine begin
 
    !> Whether so many samples wait that they should be taken away.
    pure function is_full(self)
@@ -96,7 +116,7 @@ contains
             end associate
          end if
          self%samples = self%samples + 1
-         self%next_time = real(self%samples, wp) * self%interval
+         self%next_time = self%first_time + real(self%samples, wp) * self%interval
          ! The end of the run is a sample if rounding alone keeps it from being one.
          if (abs(self%next_time - self%duration) <= self%interval * time_tolerance) then
             self%next_time = self%duration
@@ -128,6 +148,7 @@ contains
       call archive%section("trace")
       call archive%exchange("samples", self%samples)
       call archive%exchange("next_time", self%next_time)
+      call archive%exchange("first_time", self%first_time)
       call self%rows%exchange("rows", archive)
       call self%layer_rows%exchange("layer_rows", archive)
    end subroutine exchange

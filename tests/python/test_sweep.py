@@ -475,7 +475,7 @@ def test_damaged_points_count_as_missing(damage, tmp_path):
 )
 def test_a_point_that_is_none_counts_as_missing(content, tmp_path):
     plan = Plan.from_dict(tables())
-    name = runner.task_of(plan, runner.groups(plan)[0], 0).name
+    name = runner.task_of(plan, runner.groups(plan)[0], 0).names[0]
     with Store(tmp_path, "points") as store:
         (tmp_path / f"{name}.json").write_bytes(content)
         assert store.names() == {name}
@@ -488,7 +488,7 @@ def test_a_point_that_is_none_counts_as_missing(content, tmp_path):
 def test_measures_that_are_no_numbers_count_as_missing(measures, tmp_path):
     """Though the point is whole, with a checksum."""
     plan = Plan.from_dict(tables())
-    name = runner.task_of(plan, runner.groups(plan)[0], 0).name
+    name = runner.task_of(plan, runner.groups(plan)[0], 0).names[0]
     with Store(tmp_path, "points") as store:
         store.write(name, {"measures": measures})
         assert store.read(name) is not None
@@ -501,8 +501,8 @@ def test_numbers_come_back_from_the_store_to_the_bit(tmp_path):
     (group, *_) = runner.groups(plan)
     task = runner.task_of(plan, group, 0)
     with Store(tmp_path, "points") as store:
-        store.write(task.name, runner.stored_body(task, Outcome(values), group.combinations[0]))
-        back = runner.stored_measures(store, plan, task.name)
+        store.write(task.names[0], runner.stored_body(0, Outcome(values), group.chains[0][0]))
+        back = runner.stored_measures(store, plan, task.names[0])
     assert {name: np.float64(one).tobytes() for name, one in back.items()} == {
         name: np.float64(one).tobytes() for name, one in values.items()
     }
@@ -517,8 +517,8 @@ def test_outputs_of_points_on_request(tmp_path):
     assert done_by(plan, tmp_path).stored == 6
     assert done_by(Plan.from_dict(tables()), tmp_path).stored == 6
     group = runner.groups(plan)[0]
-    tree = mesoslip.open_output(tmp_path / f"{point_name(group.key, 0)}.nc")
-    expected = mesoslip.run(group.combinations[0].config)
+    tree = mesoslip.open_output(tmp_path / f"{point_name(group.keys[0], 0)}.nc")
+    expected = mesoslip.run(group.chains[0][0].config)
     np.testing.assert_array_equal(tree["spring_force"], expected["spring_force"])
 
 

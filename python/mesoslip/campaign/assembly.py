@@ -15,7 +15,8 @@ from mesoslip.output.provenance import program_attributes
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mesoslip.campaign.plan import Combination, Plan
+    from mesoslip.campaign.combination import Combination
+    from mesoslip.campaign.plan import Plan
 
 STATUS = ("ok", "failed", "missing")
 OK, FAILED, MISSING = range(3)
@@ -91,7 +92,8 @@ class Assembly:
         reported = [f"{point}: {reason}" for point, reason in list(failures.items())[:MAX_FAILURES]]
         return program_attributes(plan.combinations[0].config, "sweep") | {
             "configuration": tomli_w.dumps(plan.tables),
-            "sweep": tomli_w.dumps(plan.sweep.model_dump(exclude_none=True)),
+            **({"continued_key": plan.sweep.continue_} if plan.sweep.continue_ else {}),
+            "sweep": tomli_w.dumps(plan.sweep.model_dump(exclude_none=True, by_alias=True)),
             "complete": "false" if np.any(self._status == MISSING) else "true",
             **({"comment": ending} if ending else {}),
             "failures": "\n".join(reported),

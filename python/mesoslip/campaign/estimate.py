@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mesoslip.campaign.plan import Combination, Plan
+from mesoslip.campaign.combination import Combination
+from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.runner import groups, stored_measures
 from mesoslip.execution.store import Pieces
 from mesoslip.simulation.realization import Realization
@@ -61,22 +62,30 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     """
     there = store.names()
     missing: list[Combination] = []
-    stored_count = missing_count = 0
+    stored_count = missing_count = longest_chain = 0
     for group in groups(plan):
-        stored = sum(
-            name in there and stored_measures(store, plan, name) is not None
-            for name in group.names(plan)
-        )
-        stored_count += stored * len(group.combinations)
-        if stored < plan.realizations:
-            missing_count += plan.realizations - stored
-            missing.append(group.combinations[0])
+        copies = len(group.chains)
+        chain = group.chains[0]
+        for number in range(plan.realizations):
+            stored = sum(
+                name in there and stored_measures(store, plan, name) is not None
+                for name in group.names(number)
+            )
+            stored_count += stored * copies
+            if stored == len(chain):
+                continue
+            missing_count += len(chain)
+            longest_chain = max(longest_chain, len(chain))
+            if not missing or missing[-1] is not chain[-1]:
+                missing += chain
     step = max(1, len(missing) // MAX_TRIED)
     tried = missing[step // 2 :: step]
     seconds = [_seconds(one, TRIAL_SECONDS / len(tried)) for one in tried]
     mean = float(np.mean(seconds)) + OVERHEAD_SECONDS if seconds else 0.0
     longest = max(seconds, default=0.0)
-    wall = max(mean * missing_count / workers, longest) + START_SECONDS if missing else 0.0
+    # The runs of a chain follow one another.
+    alone = max(longest, mean * longest_chain)
+    wall = max(mean * missing_count / workers, alone) + START_SECONDS if missing else 0.0
     trace_bytes = max((_trace_bytes(one) for one in plan.combinations), default=0.0)
     # Three copies: in the tables of the kernel, in the tree, and in measures.
     memory = (workers + 1) * PROCESS_BYTES + 3 * workers * trace_bytes

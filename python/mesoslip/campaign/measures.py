@@ -103,6 +103,8 @@ class Measure:
         compile the function from it.
     path
         Name of the user's file.
+    runs_again
+        Whether it is measured in another run of the configuration.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Measure:
     flags: tuple[str, ...] = ()
     source: str = ""
     path: str = ""
+    runs_again: bool = False
 
     @property
     def identity(self) -> str:
@@ -272,7 +275,13 @@ MEASURES: dict[str, Measure] = {
             "mean logarithm of the slope of the return map of peaks",
         ),
         *(
-            Measure(name, _lyapunov(name), LYAPUNOV[name].units, LYAPUNOV[name].long_name)
+            Measure(
+                name,
+                _lyapunov(name),
+                LYAPUNOV[name].units,
+                LYAPUNOV[name].long_name,
+                runs_again=True,
+            )
             for name in ("lyapunov_exponent", "lyapunov_error")
         ),
         Measure("breaks", _breaks, "1", "breaks of contacts in the whole run"),
@@ -356,7 +365,7 @@ def find_measures(names: Sequence[str], source: str, folder: Path) -> tuple[Meas
             found.append(Problem(source, key, message, name))
         elif measure.name in measures:
             found.append(Problem(source, key, "is named twice", name))
-        elif measure.name in {"status", "realization", "sample"}:
+        elif measure.name in {"status", "realization", "sample", "direction"}:
             found.append(Problem(source, key, "is a name that the dataset uses itself", name))
         else:
             measures[measure.name] = measure

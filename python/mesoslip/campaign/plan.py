@@ -12,7 +12,6 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +20,14 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, StrictBool, StrictStr, ValidationError, model_validator
 
+from mesoslip.campaign.chain import (
+    DIRECTION,
+    chain_problems,
+    chained,
+    unchained,
+    with_directions,
+)
+from mesoslip.campaign.combination import Axis, Combination, Value, described
 from mesoslip.campaign.measures import Measure, find_measures
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.files import Change, Merged, on_base, override, read_toml
@@ -30,8 +37,6 @@ from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.table import Number, Table, Whole, problem
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
-
-Value = float | int | str | bool
 
 # Maximum number of wrong combinations that are listed.
 MAX_REPORTED = 5
@@ -74,6 +79,10 @@ class SweepTable(Table):
     """Fraction of each run, from its start, that measures leave out."""
     traces: StrictBool = False
     """Whether the output of each point is kept."""
+    continue_: Annotated[StrictStr | None, Field(alias="continue")] = None
+    """Key of the grid over whose values each run starts from the end of the last one."""
+    order: Literal["listed", "up", "down", "up and down"] | None = None
+    """Order of the values of `continue`; as listed by default."""
     grid: dict[str, Any] = Field(default_factory=dict)
     """Lists or ranges of values of keys, each an axis; axes multiply."""
     together: tuple[dict[str, Any], ...] = ()
@@ -91,6 +100,8 @@ class SweepTable(Table):
                 "nothing is varied; name keys in [sweep.grid], [[sweep.together]] or "
                 "[sweep.latin_hypercube]",
             )
+        if self.order is not None and self.continue_ is None:
+            raise problem("order", "is the order of sweep.continue, which is missing")
         return self
 
 
@@ -98,58 +109,6 @@ class SweepFile(Table):
     """The tables of a sweep's file besides the configuration."""
 
     sweep: SweepTable
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Keys that vary together.
-
-    Attributes
-    ----------
-    dimension
-        Name of the dimension in the dataset.
-    keys
-        Dotted names.
-    rows
-        The values of the keys at each index of the axis, in SI.
-    """
-
-    dimension: str
-    keys: tuple[str, ...]
-    rows: tuple[tuple[Value, ...], ...]
-
-
-@dataclass(frozen=True)
-class Combination:
-    """One combination of values.
-
-    Attributes
-    ----------
-    index
-        Its index along each axis.
-    values
-        The value of each swept key, in SI.
-    config
-        The configuration.
-    """
-
-    index: tuple[int, ...]
-    values: Mapping[str, Value]
-    config: Config
-
-    def __str__(self) -> str:
-        return described(self.values)
-
-
-def described(values: Mapping[str, Value]) -> str:
-    """Values of keys, for messages."""
-    parts = []
-    for key, value in values.items():
-        kind = key_kind(key)
-        unit = "" if kind is None or kind.unit in {None, "1"} else f" {kind.unit}"
-        text = f"{value:g}" if isinstance(value, float) else str(value)
-        parts.append(f"{key} = {text}{unit}")
-    return ", ".join(parts)
 
 
 class Plan:
@@ -186,6 +145,11 @@ class Plan:
         if found:
             raise ConfigError(found)
         self.measures: tuple[Measure, ...] = find_measures(self.sweep.measures, source, folder)
+        if self.sweep.continue_ is not None:
+            found += chain_problems(self.sweep, self.axes, self.measures, source)
+            if found:
+                raise ConfigError(found)
+            self.axes = with_directions(self.axes, self.sweep)
         run = tables.get("run")
         of_run = run.get("realizations", 1) if isinstance(run, Mapping) else 1
         self.realizations: int = self.sweep.realizations or of_run
@@ -235,6 +199,7 @@ class Plan:
                 for key, value in zip(axis.keys, axis.rows[number], strict=True)
             }
             changes = {**values, "run.realizations": 1}
+            changes.pop(DIRECTION, None)
             try:
                 config = Config.from_dict(
                     override(Merged(self.tables), [changes]).tables, self._source
@@ -251,9 +216,19 @@ class Plan:
         if wrong > MAX_REPORTED:
             message = f"{wrong} of {math.prod(self.shape)} combinations are wrong"
             found.append(Problem(self._source, "sweep", message))
+        if self.sweep.continue_ is not None and not found:
+            found += unchained(combinations, self.sweep.continue_, self._source)
         if found:
             raise ConfigError(found)
         return tuple(combinations)
+
+    @cached_property
+    def chains(self) -> tuple[tuple[Combination, ...], ...]:
+        """The combinations in chains: each but the first of a chain goes on from the end of the run
+        before it. Without `sweep.continue` each is a chain of its own."""
+        if self.sweep.continue_ is None:
+            return tuple((one,) for one in self.combinations)
+        return chained(self.combinations, self.axes, self.sweep)
 
     @property
     def count(self) -> int:

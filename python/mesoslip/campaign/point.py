@@ -1,4 +1,7 @@
-"""A point: one realization of one combination, identical wherever it is computed."""
+"""A point: one realization of one combination, identical wherever it is computed.
+
+Points of a chain are computed together, as each goes on from the end of the one before.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import json
 import tempfile
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mesoslip.campaign.measures import Measure
+    from mesoslip.simulation.start import End
 
 # Incremented when values of measures change, so that older points are not used.
 FORMAT = 2
@@ -35,14 +39,14 @@ _HDF5 = threading.Lock()
 
 @dataclass(frozen=True)
 class Task:
-    """A point for a worker, in plain values that can be sent to any process.
+    """The points of a chain for a worker, in plain values that can be sent to any process.
 
     Attributes
     ----------
-    name
-        Name under which the point is stored, see `point_name`.
-    config
-        The configuration as nested tables.
+    names
+        Names under which the points are stored, see `point_name`.
+    configs
+        The configurations as nested tables.
     realization
         Number of the realization.
     measures
@@ -53,8 +57,8 @@ class Task:
         Whether the output of the run is kept.
     """
 
-    name: str
-    config: dict[str, Any]
+    names: tuple[str, ...]
+    configs: tuple[dict[str, Any], ...]
     realization: int
     measures: tuple[tuple[str, str, str], ...]
     discard: float
@@ -75,15 +79,26 @@ class Outcome:
         The content of its output file, if it is kept.
     failure
         Why it failed; empty if it succeeded.
-    is_complete
-        Whether the point was finished, not stopped.
     """
 
     measures: dict[str, float]
     seconds: float = 0.0
     trace: bytes | None = None
     failure: str = ""
-    is_complete: bool = True
+
+
+def chain_keys(
+    configs: Sequence[Config], measures: Sequence[Measure], discard: float
+) -> tuple[str, ...]:
+    """Hashes of everything that determines the measures of the combinations of a chain, except the
+    realization: with each combination those before it."""
+    keys: list[str] = []
+    for config in configs:
+        key = combination_key(config, measures, discard)
+        if keys:
+            key = hashlib.sha256(f"{keys[-1]} then {key}".encode()).hexdigest()
+        keys.append(key)
+    return tuple(keys)
 
 
 def combination_key(config: Config, measures: Sequence[Measure], discard: float) -> str:
@@ -109,42 +124,55 @@ def point_name(key: str, realization: int) -> str:
     return hashlib.sha256(f"{key} {realization}".encode()).hexdigest()[:32]
 
 
-def compute(task: Task, stop: Stop) -> Outcome:
-    """Run a point and measure it. Errors are reported in the outcome."""
-    start = time.perf_counter()
-    try:
-        outcome = _compute(task, stop)
-    except MesoslipError as error:
-        outcome = Outcome({}, failure=str(error))
-    except MemoryError:
-        outcome = Outcome({}, failure=NO_MEMORY)
-    # An unexpected error ends this point, not the others.
-    except Exception as error:
-        outcome = Outcome({}, failure=f"{type(error).__name__}: {error}")
-    return Outcome(
-        outcome.measures,
-        time.perf_counter() - start,
-        outcome.trace,
-        outcome.failure,
-        outcome.is_complete,
-    )
+def compute(task: Task, stop: Stop) -> tuple[Outcome, ...]:
+    """Run the points of a chain and measure them. Errors are reported in the outcomes, of which
+    there are fewer than points if it was stopped."""
+    outcomes: list[Outcome] = []
+    end: End | None = None
+    for at in range(len(task.configs)):
+        start = time.perf_counter()
+        try:
+            outcome, end = _compute(task, at, end, stop)
+        except MesoslipError as error:
+            outcome, end = Outcome({}, failure=str(error)), None
+        except MemoryError:
+            outcome, end = Outcome({}, failure=NO_MEMORY), None
+        # An unexpected error ends this chain, not the others.
+        except Exception as error:
+            outcome, end = Outcome({}, failure=f"{type(error).__name__}: {error}"), None
+        if outcome is None:
+            break
+        outcomes.append(replace(outcome, seconds=time.perf_counter() - start))
+        if end is None:
+            left = len(task.configs) - len(outcomes)
+            outcomes += left * [Outcome({}, failure="the run from which it goes on failed")]
+            break
+    return tuple(outcomes)
 
 
-def _compute(task: Task, stop: Stop) -> Outcome:
-    config = Config.from_dict(task.config)
-    realization = Realization(config, task.realization)
+def _compute(
+    task: Task, at: int, after: End | None, stop: Stop
+) -> tuple[Outcome | None, End | None]:
+    """Run a point of a chain from the end of the one before: its outcome, none if it was stopped,
+    and its end if another one follows."""
+    config = Config.from_dict(task.configs[at])
+    realization = Realization(config, task.realization, after=after)
     try:
         while not realization.finished:
             if stop.is_set():
-                return Outcome({}, is_complete=False)
+                return None, None
             realization.advance()
+        end = realization.end if at + 1 < len(task.configs) else None
     finally:
         realization.close()
     results = Results(config, [realization], True, realization.kernel_seconds)
     tree = build_tree(results)
     run = RunView(tree, task.discard * realization.time)
-    measures = {one[0]: measured(run, measure_of(*one)) for one in task.measures}
-    return Outcome(measures, trace=_output(results) if task.trace else None)
+    try:
+        measures = {one[0]: measured(run, measure_of(*one)) for one in task.measures}
+    except MesoslipError as error:
+        return Outcome({}, failure=str(error)), end
+    return Outcome(measures, trace=_output(results) if task.trace else None), end
 
 
 def _output(results: Results) -> bytes:

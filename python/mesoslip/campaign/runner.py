@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mesoslip.campaign.assembly import Assembly
-from mesoslip.campaign.plan import Combination, Plan, described
+from mesoslip.campaign.combination import Combination, described
+from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.point import (
     FORMAT,
     Outcome,
     Task,
-    combination_key,
+    chain_keys,
     compute,
     point_name,
 )
@@ -71,36 +72,36 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Group:
-    """Combinations with the same points, such as those that differ only in their titles.
+    """Chains of combinations with the same points, such as those that differ only in their titles.
 
     Attributes
     ----------
-    key
-        Hash of everything that determines their measures.
-    combinations
-        At least one.
+    keys
+        Of each combination of a chain a hash of everything that determines its measures.
+    chains
+        At least one, each in the order of its runs.
     """
 
-    key: str
-    combinations: list[Combination]
+    keys: tuple[str, ...]
+    chains: list[tuple[Combination, ...]]
 
-    def names(self, plan: Plan) -> Iterator[str]:
-        """Names of the points of all realizations."""
-        return (point_name(self.key, number) for number in range(plan.realizations))
+    def names(self, realization: int) -> tuple[str, ...]:
+        """Names of the points of a realization, in the order of the runs."""
+        return tuple(point_name(key, realization) for key in self.keys)
 
 
 def groups(plan: Plan) -> list[Group]:
-    """All combinations of a sweep, in the order of the first of each group.
+    """All chains of a sweep, in the order of the first of each group.
 
     Raises
     ------
     ConfigError
         If a combination cannot be run.
     """
-    found: dict[str, Group] = {}
-    for one in plan.combinations:
-        key = combination_key(one.config, plan.measures, plan.sweep.discard)
-        found.setdefault(key, Group(key, [])).combinations.append(one)
+    found: dict[tuple[str, ...], Group] = {}
+    for chain in plan.chains:
+        keys = chain_keys([one.config for one in chain], plan.measures, plan.sweep.discard)
+        found.setdefault(keys, Group(keys, [])).chains.append(chain)
     return list(found.values())
 
 
@@ -120,13 +121,13 @@ def stored_measures(store: Pieces, plan: Plan, name: str) -> dict[str, float] | 
         return None
 
 
-def stored_body(task: Task, outcome: Outcome, combination: Combination) -> dict[str, Any]:
+def stored_body(realization: int, outcome: Outcome, combination: Combination) -> dict[str, Any]:
     """Content of a point in the store."""
     return {
         "format": FORMAT,
         "program": program(),
         "point": dict(combination.values),
-        "realization": task.realization,
+        "realization": realization,
         # Python reads its own representation of numbers exactly.
         "measures": {name: repr(value) for name, value in outcome.measures.items()},
         "seconds": outcome.seconds,
@@ -134,10 +135,10 @@ def stored_body(task: Task, outcome: Outcome, combination: Combination) -> dict[
 
 
 def task_of(plan: Plan, group: Group, realization: int) -> Task:
-    """A point for a worker."""
+    """The points of a chain for a worker."""
     return Task(
-        point_name(group.key, realization),
-        group.combinations[0].config.to_dict(),
+        group.names(realization),
+        tuple(one.config.to_dict() for one in group.chains[0]),
         realization,
         tuple((one.name, one.source, one.path) for one in plan.measures),
         plan.sweep.discard,
@@ -199,9 +200,10 @@ class _Run:
         self._store = store
         self._progress = progress
         self._groups = groups(plan)
-        self._missing: list[tuple[Group, Sequence[int]]] = []
-        # By the names of their tasks.
-        self._in_flight: dict[str, Group] = {}
+        # Chains with missing points: the number of the realization, and which points are missing.
+        self._missing: list[tuple[Group, int, Sequence[int]]] = []
+        # By the names of the last points of their tasks.
+        self._in_flight: dict[str, tuple[Group, Sequence[int]]] = {}
         self._assembly = Assembly(plan)
         self._failures: dict[str, str] = {}
         self._stored = self._computed = self._failed = 0
@@ -209,64 +211,73 @@ class _Run:
     def read_store(self, stop: Stop) -> None:
         """Take the points that are in the store, and find out which are missing."""
         store, plan = self._store, self._plan
-        if store is None:
-            self._missing = [(group, range(plan.realizations)) for group in self._groups]
-            return
-        there = store.names()
+        there = set() if store is None else store.names()
         names: list[str] = []
         for group in self._groups:
-            missing = []
-            for number, name in enumerate(group.names(plan)):
-                if stop.is_set():
-                    return
-                names.append(name)
-                measures = stored_measures(store, plan, name) if name in there else None
-                if measures is None:
-                    missing.append(number)
-                    continue
-                for one in group.combinations:
-                    self._assembly.put(one, number, measures)
-                self._stored += len(group.combinations)
-            self._missing.append((group, missing))
-        store.write_manifest(self._assembly.manifest(names))
+            for number in range(plan.realizations):
+                missing = []
+                for at, name in enumerate(group.names(number)):
+                    if stop.is_set():
+                        return
+                    names.append(name)
+                    measures = None
+                    if store is not None and name in there:
+                        measures = stored_measures(store, plan, name)
+                    if measures is None:
+                        missing.append(at)
+                    else:
+                        self._stored += self._put(group, at, number, measures)
+                if missing:
+                    self._missing.append((group, number, missing))
+        if store is not None:
+            store.write_manifest(self._assembly.manifest(names))
+
+    def _put(self, group: Group, at: int, realization: int, measures: dict[str, float]) -> int:
+        """Put the measures of a point of each chain into the dataset; the number of chains."""
+        for chain in group.chains:
+            self._assembly.put(chain[at], realization, measures)
+        return len(group.chains)
 
     def compute(self, executor: Executor, stop: Stop) -> None:
-        """Compute the points that are missing, and keep each as soon as it is there."""
+        """Compute the points that are missing, and keep those of a chain as soon as it is there."""
         self._look()
         work = completed(executor, compute, self._tasks(), stop, max_wait=MAX_WAIT)
         with closing(work):
             for task, future in work:
                 try:
-                    outcome = future.result()
+                    outcomes = future.result()
                 except MesoslipError as error:
-                    outcome = Outcome({}, failure=str(error))
+                    outcomes = (Outcome({}, failure=str(error)),) * len(task.names)
                 except Exception as error:
                     failure = f"its worker failed: {type(error).__name__}: {error}"
-                    outcome = Outcome({}, failure=failure)
-                self._take(task, self._in_flight.pop(task.name), outcome)
+                    outcomes = (Outcome({}, failure=failure),) * len(task.names)
+                group, missing = self._in_flight.pop(task.names[-1])
+                for at, outcome in enumerate(outcomes):
+                    if at in missing:
+                        self._take(task, group, at, outcome)
                 self._look()
 
     def _tasks(self) -> Iterator[Task]:
-        for group, missing in self._missing:
-            for number in missing:
-                task = task_of(self._plan, group, number)
-                self._in_flight[task.name] = group
-                yield task
+        for group, number, missing in self._missing:
+            task = task_of(self._plan, group, number)
+            self._in_flight[task.names[-1]] = group, missing
+            yield task
 
-    def _take(self, task: Task, group: Group, outcome: Outcome) -> None:
+    def _take(self, task: Task, group: Group, at: int, outcome: Outcome) -> None:
+        """Keep a point of a chain."""
+        first = group.chains[0][at]
         if outcome.failure:
-            values = {**group.combinations[0].values, "realization": task.realization}
-            self._failures[described(values)] = outcome.failure
-            self._failed += len(group.combinations)
-            for one in group.combinations:
-                self._assembly.fail(one, task.realization)
-        elif outcome.is_complete:
-            if self._store is not None:
-                body = stored_body(task, outcome, group.combinations[0])
-                self._store.write(task.name, body, outcome.trace)
-            self._computed += len(group.combinations)
-            for one in group.combinations:
-                self._assembly.put(one, task.realization, outcome.measures)
+            self._failures[described({**first.values, "realization": task.realization})] = (
+                outcome.failure
+            )
+            self._failed += len(group.chains)
+            for chain in group.chains:
+                self._assembly.fail(chain[at], task.realization)
+            return
+        if self._store is not None:
+            body = stored_body(task.realization, outcome, first)
+            self._store.write(task.names[at], body, outcome.trace)
+        self._computed += self._put(group, at, task.realization, outcome.measures)
 
     @property
     def _done(self) -> int:

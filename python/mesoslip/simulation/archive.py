@@ -63,6 +63,13 @@ class Archive:
         """Whether there is such an entry, or such a section."""
         return any(section == one and name in (None, other) for one, other in self._at)
 
+    def section_with(self, name: str) -> str:
+        """The first section that has an entry of a name."""
+        for section, one in self._at:
+            if one == name:
+                return section
+        raise RunError(f"the state has no '{name}'")
+
     def numbers(self, section: str, name: str) -> Array:
         """All numbers of a name, shape (numbers); two of a sum with its rounding."""
         found = [self._entries[one].values for one in self._find(section, name)]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mesoslip.configuration.drive import DrivePart
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.simulation.kernel import Kernel
 
@@ -21,8 +22,10 @@ def assemble(
     parameters: Parameters,
     number: int = 0,
     *,
+    start_time: float | None = None,
     end_time: float | None = None,
     interval: float | None = None,
+    earlier_slips: int = 0,
 ) -> Kernel:
     """A kernel that can be started or restored.
 
@@ -34,28 +37,37 @@ def assemble(
         Parameters of the contacts.
     number
         Number of the realization.
+    start_time
+        When the run starts [s], for one that follows another: until then the drive has one part
+        more.
     end_time
         When the last part of the drive ends [s]; by default, at the end of the run.
     interval
         Interval of the trace [s]; that of the configuration by default.
+    earlier_slips
+        Slips before the run, for one that follows another.
     """
     slider, contacts, output = config.slider, config.contact_kind, config.output
     kernel = Kernel()
     kernel.set_contacts(contacts.kernel_kind, parameters, config.run.seed, number)
     kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
+    parts = config.drive_parts
+    forces = config.drive.start_forces(parts)
+    if start_time is not None:
+        parts = (DrivePart(start_time, 0.0, 0.0, -1), *parts)
+        forces = None if forces is None else (0.0, *forces)
     durations, start_velocities, end_velocities, stages = (
-        np.array(numbers) for numbers in zip(*config.drive_parts, strict=True)
+        np.array(numbers) for numbers in zip(*parts, strict=True)
     )
     ends = np.minimum(np.cumsum(durations), NEVER)
     if end_time is not None:
         ends[-1] = min(end_time, NEVER)
     kernel.set_drive(ends, start_velocities, end_velocities, stages)
-    forces = config.drive.start_forces(config.drive_parts)
     if forces is not None:
         kernel.set_drive_values(np.array(forces))
     stop = config.run.stops
     kernel.set_stop(
-        slips=stop.slips or 0,
+        slips=stop.slips + earlier_slips if stop.slips else 0,
         displacement=stop.displacement or 0.0,
         block_distance=config.steady_block,
         blocks=stop.steady.blocks if stop.steady else 1,
@@ -73,6 +85,6 @@ def assemble(
         min_size=float(output.avalanche_size or 1) * config.has_avalanches,
         snapshot_size=float(output.snapshot_size or 0),
         max_avalanches=config.run.avalanches or 0,
-        snapshot_times=np.array(output.snapshots, dtype=float),
+        snapshot_times=(start_time or 0.0) + np.array(output.snapshots, dtype=float),
     )
     return kernel

@@ -219,6 +219,14 @@ class Kernel:
         """Displace the drive at once by a distance [m]; the motion goes on from there."""
         self._call(_core.displace_drive, distance)
 
+    def follow(self) -> None:
+        """Go on from the end of another run, whose state was restored.
+
+        The first part of the drive is over, and the second begins. Time, displacement and counts go
+        on from those of the state.
+        """
+        self._call(_core.follow_simulation)
+
     def restore(self, words: Words) -> None:
         """Go on from a state, instead of starting."""
         self._call(_core.restore_simulation, words)

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import RunError
-from mesoslip.simulation.assembly import assemble
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
+from mesoslip.simulation.start import START, End, follow
 from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
 from mesoslip.simulation.tables import (
     COLUMNS,
@@ -117,6 +117,10 @@ class Realization:
         tells the errors by its steps.
     coarsening
         Length of steps over the configured one, where there are steps.
+    after
+        The end of another run, from which this one goes on, see `end`; by default it starts as
+        `contacts.initial` says. Its errors are not estimated then. Its time and its displacement
+        count from its own start.
 
     Raises
     ------
@@ -167,6 +171,7 @@ class Realization:
         *,
         estimates_errors: bool = True,
         coarsening: float = 1.0,
+        after: End | None = None,
     ) -> None:
         check_memory(config)
         self.config = config
@@ -191,8 +196,10 @@ class Realization:
         self._has_steps = longer is not None
         if longer is not None:
             self._parameters = longer
-            self._lacks_errors = estimates_errors
+            self._lacks_errors = estimates_errors and after is None
             self.force_error = self.slip_time_error = math.nan
+        self._after = after
+        self._start = START
         self._energy: Array | None = None
         self._kernel: Kernel | None = None
         self._words: Words | None = None
@@ -204,12 +211,16 @@ class Realization:
         """The kernel with its parts, started or restored."""
         if self._kernel is not None:
             return self._kernel
-        kernel = assemble(self.config, self._parameters, self.number)
-        if self._words is not None:
-            kernel.restore(self._words)
-            self._words = None
+        if self._after is not None:
+            kernel, self._start = follow(self.config, self._parameters, self.number, self._after)
+            self._after = None
         else:
-            kernel.start(self.config.contacts.initial)
+            kernel = self._start.assemble(self.config, self._parameters, self.number)
+            if self._words is not None:
+                kernel.restore(self._words)
+                self._words = None
+            else:
+                kernel.start(self.config.contacts.initial)
         self._kernel = kernel
         return kernel
 
@@ -283,6 +294,19 @@ class Realization:
             wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
             advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
 
+    @property
+    def end(self) -> End:
+        """The end of the run, for another one to go on from; before `close`.
+
+        Raises
+        ------
+        RunError
+            If the run is not over, or the memory of the kernel was given back.
+        """
+        if self._kernel is None or not self.ending:
+            raise RunError(f"realization {self.number}: the run is not at its end")
+        return End(self.config, self._kernel.save())
+
     def twin(self, distance: float) -> Realization:
         """Another realization that goes on from here with the same random numbers.
 
@@ -296,6 +320,7 @@ class Realization:
         """
         saved = self.save()
         other = Realization(self.config, self.number, estimates_errors=False)
+        other._start = self._start
         other.restore(saved, {name: Rows(rows.columns) for name, rows in self.waiting})
         other._open().displace_drive(distance)
         return other
@@ -308,10 +333,10 @@ class Realization:
 
     def _take(self, kernel: Kernel) -> None:
         """Take what was recorded, and how far the kernel has come."""
-        progress = kernel.ask()
+        progress = self._start.progress_since(kernel.ask())
         with self._lock:
             for table in TABLES:
-                values = kernel.drain(table)
+                values = self._start.rows_since(table, kernel.drain(table))
                 if table not in self._tables:
                     self._tables[table] = Rows(values.shape[1])
                 self._tables[table].add(values)
@@ -328,7 +353,7 @@ class Realization:
                 self.force_error = progress.force_error
             self.integrator_counts = progress.integrator_counts.copy()
             self.ending = ENDINGS[progress.ending]
-            self._energy = kernel.energy() if self.ending else None
+            self._energy = self._start.energy_since(kernel.energy()) if self.ending else None
 
     def close(self) -> None:
         """Give back the memory of the kernel, when it will not go on."""
@@ -374,7 +399,7 @@ class Realization:
             return self._energy
         if self._kernel is None:
             return np.full(len(ENERGY_COLUMNS), np.nan)
-        return self._kernel.energy()
+        return self._start.energy_since(self._kernel.energy())
 
     @property
     def energy_residual(self) -> float:

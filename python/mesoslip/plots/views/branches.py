@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from mesoslip.plots.style import (
-    BLUE,
-    RED,
-    Canvas,
-    canvas,
-    legend_above,
-    styled,
-    titles,
-)
+from mesoslip.plots.directions import STYLES
+from mesoslip.plots.style import Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.sweep_axis import SweptKey
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
 Array = NDArray[np.float64]
 
-# Directions: colours, markers and sizes, so that both are seen where they agree.
-STYLES: dict[str, dict[str, Any]] = {
-    "up": {"color": RED, "marker": "^", "markersize": 6},
-    "down": {"color": BLUE, "marker": "v", "markersize": 4},
-}
 # Ratio of the amplitudes of the two directions from which on they are different motions.
 DIFFERENT = 2.0
 IRREGULAR = 2

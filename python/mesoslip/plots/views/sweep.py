@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
+from mesoslip.plots.directions import DIRECTION, STYLES
 from mesoslip.plots.names import name_of, symbol_or_name
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, styled, wrapped
@@ -96,15 +97,20 @@ def _known(data: xr.Dataset, name: str) -> str:
 def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
     """Draw a measure; lines of boundaries for a legend."""
     lines: list[Line2D] = []
-    data, names, fixed = _first_two_keys(data)
+    data, names, fixed = _shown_keys(data)
     keys = [SweptKey.of(data[one]) for one in names]
     scale = scale_of(data[name])
     measure = (data[name] / scale.size).assign_attrs(data[name].attrs)
     choices = tuple(measure.attrs.get("flag_meanings", "").replace("_", "-").split())
     if len(keys) == 1:
-        _draw_dots(axes, measure, keys[0], choices)
+        if DIRECTION in data.dims:
+            lines = _draw_directions(axes, measure, keys[0])
+            data = data.isel({DIRECTION: 0})
+        else:
+            _draw_dots(axes, measure, keys[0], choices)
+        _scale_values(axes, measure, choices)
         if name == REGIME:
-            lines = draw_crossings(axes, data, keys[0])
+            lines += draw_crossings(axes, data, keys[0])
     else:
         _draw_map(axes, measure, keys, choices)
         if name == REGIME:
@@ -119,15 +125,18 @@ def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
     return lines
 
 
-def _first_two_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
+def _shown_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
     """A sweep at the first values of its third and further dimensions, the keys along the first
-    two, and the values of the others in words."""
-    dimensions = [str(name) for name in data["status"].dims if name != "realization"]
-    further = dimensions[2:]
+    two, and the values of the others in words. Of one that goes up and down: only the key along
+    which it does."""
+    dimensions = _dimensions(data)
+    if DIRECTION in data.dims:
+        dimensions.sort(key=lambda name: name != data.attrs["continued_key"])
+    further = dimensions[1 if DIRECTION in data.dims else 2 :]
     fixed = [f"{symbol_or_name(name)} = {_value(data[name])}" for name in further]
     data = data.isel(dict.fromkeys(further, 0))
     keys = []
-    for name in dimensions[:2]:
+    for name in dimensions[: len(dimensions) - len(further)]:
         # The samples of a hypercube are drawn over the first of its keys.
         along = [key for key in data.coords if data[key].dims == (name,) and key != name]
         keys.append(str(along[0]) if name == "sample" and along else name)
@@ -143,16 +152,36 @@ def _value(coordinate: xr.DataArray) -> str:
     return f"{number(value / scale.size)} {scale.name}".rstrip()
 
 
-def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[str, ...]) -> None:
-    values = measure.transpose(..., "realization").values
-    axes.plot(key.values, values, ".", color=BLUE, markersize=3)
+def _dimensions(data: xr.Dataset) -> list[str]:
+    """Dimensions along which keys vary."""
+    without = {"realization", DIRECTION}
+    return [str(name) for name in data["status"].dims if name not in without]
+
+
+def _draw_directions(axes: Axes, measure: xr.DataArray, key: SweptKey) -> list[Line2D]:
+    """Draw a measure up and down one key: dots, and a line through the means; the lines."""
+    lines = []
+    for direction, style in STYLES.items():
+        branch = measure.sel({DIRECTION: direction}).transpose(..., "realization")
+        axes.plot(key.values, branch.values, linestyle="", **style)
+        mean = branch.mean("realization").values[key.order]
+        lines += axes.plot(key.values[key.order], mean, linewidth=0.7, label=direction, **style)
+    return lines
+
+
+def _scale_values(axes: Axes, measure: xr.DataArray, choices: tuple[str, ...]) -> None:
+    """Label the choices, or choose the scale, of the axis of a measure."""
     if choices:
         axes.set_yticks(range(len(choices)), choices)
         axes.set_ylim(-0.5, len(choices) - 0.5)
-        return
-    if spans_decades(values):
+    elif spans_decades(measure.values):
         axes.set_yscale("log")
-    if values.shape[1] > 1 and measure.dims[0] != "sample":
+
+
+def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[str, ...]) -> None:
+    values = measure.transpose(..., "realization").values
+    axes.plot(key.values, values, ".", color=BLUE, markersize=3)
+    if not choices and values.shape[1] > 1 and measure.dims[0] != "sample":
         mean = measure.mean("realization").values
         axes.plot(key.values[key.order], mean[key.order], color="black")
 
@@ -193,12 +222,14 @@ def _most_frequent(values: Array, count: int) -> Array:
 
 
 def _parts(data: xr.Dataset) -> Iterator[xr.Dataset]:
-    """The sweep at each value of its first dimension, if it has three."""
-    dimensions = [str(name) for name in data["status"].dims if name != "realization"]
-    if len(dimensions) != 3:
+    """The sweep at each value of its first dimension, if it has three; if it goes up and down one,
+    at each value of the other."""
+    dimensions = _dimensions(data)
+    if len(dimensions) != (2 if DIRECTION in data.dims else 3):
         yield data
         return
-    first = dimensions[0]
+    first = next(one for one in dimensions if one != data.attrs.get("continued_key"))
+    dimensions.sort(key=lambda name: name != first)
     for index in range(data.sizes[first]):
         # The dimension comes last, where its single value becomes part of the title.
         yield data.isel({first: [index]}).transpose(*dimensions[1:], first, ...)

@@ -1,0 +1,102 @@
+"""Chains of runs: along one axis of a sweep each run goes on from the end of the last one."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from mesoslip.campaign.combination import Axis, Combination
+from mesoslip.errors import Problem
+from mesoslip.simulation.start import CONTINUED
+
+if TYPE_CHECKING:
+    from mesoslip.campaign.measures import Measure
+    from mesoslip.campaign.plan import SweepTable
+
+# Dimension of the order of a chain that goes up and down again, and its values.
+DIRECTION = "direction"
+DIRECTIONS = ("up", "down")
+BOTH = "up and down"
+
+
+def chain_problems(
+    sweep: SweepTable, axes: Sequence[Axis], measures: Sequence[Measure], source: str
+) -> Iterator[Problem]:
+    """What is wrong with `sweep.continue` before any run is looked at."""
+    key = sweep.continue_
+    if key not in CONTINUED:
+        message = (
+            f"must be one of {', '.join(CONTINUED)}: with any other key the contacts of the last "
+            "run are not contacts of the next one"
+        )
+        yield Problem(source, "sweep.continue", message, key)
+    elif all(axis.keys != (key,) for axis in axes):
+        yield Problem(source, "sweep.continue", "needs values in [sweep.grid]", key)
+    for one in measures:
+        if one.runs_again:
+            message = (
+                f"{one.name} is measured in another run, which starts as contacts.initial says; "
+                "leave it out with sweep.continue"
+            )
+            yield Problem(source, "sweep.measures", message)
+
+
+def with_directions(axes: Sequence[Axis], sweep: SweepTable) -> tuple[Axis, ...]:
+    """The axes of a sweep, with that of the direction last where it goes up and down."""
+    if sweep.order != BOTH:
+        return tuple(axes)
+    rows = tuple((one,) for one in DIRECTIONS)
+    return (*axes, Axis(DIRECTION, (DIRECTION,), rows))
+
+
+def unchained(combinations: Sequence[Combination], key: str, source: str) -> Iterator[Problem]:
+    """What keeps runs from going on from the end of another."""
+    configs = [one.config for one in combinations]
+    if key == "slider.stiffness":
+        kind = next((one.slider.kind for one in configs if one.slider.oscillator is None), None)
+        if kind is not None:
+            message = f"slider.stiffness needs a slider of kind 'rigid', not {kind!r}"
+            yield Problem(source, "sweep.continue", message)
+    stops: dict[str, list[float | None]] = {
+        "run.avalanches": [one.run.avalanches for one in configs],
+        "run.stop.displacement": [one.run.stops.displacement for one in configs],
+    }
+    for name, values in stops.items():
+        value = next((one for one in values if one is not None), None)
+        if value is not None:
+            message = (
+                "ends a run where no other can go on; with sweep.continue a run ends with its "
+                "duration, run.stop.slips or run.stop.steady"
+            )
+            yield Problem(source, name, message, value)
+
+
+def chained(
+    combinations: Sequence[Combination], axes: Sequence[Axis], sweep: SweepTable
+) -> tuple[tuple[Combination, ...], ...]:
+    """Combinations in chains, each in the order of its runs."""
+    along = next(at for at, axis in enumerate(axes) if axis.keys == (sweep.continue_,))
+    values = [row[0] for row in axes[along].rows]
+    ascending = sorted(range(len(values)), key=lambda number: values[number])
+    place = {number: at for at, number in enumerate(ascending)}
+    within = {along, *(at for at, axis in enumerate(axes) if axis.dimension == DIRECTION)}
+
+    def others(one: Combination) -> tuple[int, ...]:
+        return tuple(number for at, number in enumerate(one.index) if at not in within)
+
+    def order(one: Combination) -> tuple[int, int]:
+        at = one.index[along]
+        match sweep.order:
+            case "up":
+                return 0, place[at]
+            case "down":
+                return 0, -place[at]
+            case "up and down":
+                goes_down = one.index[-1]
+                return goes_down, -place[at] if goes_down else place[at]
+            case _:
+                return 0, at
+
+    ordered = sorted(combinations, key=lambda one: (others(one), order(one)))
+    return tuple(tuple(chain) for _, chain in itertools.groupby(ordered, key=others))

@@ -1,0 +1,63 @@
+"""The axes of a sweep, and a combination of values along them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.keys import key_kind
+
+Value = float | int | str | bool
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Keys that vary together.
+
+    Attributes
+    ----------
+    dimension
+        Name of the dimension in the dataset.
+    keys
+        Dotted names.
+    rows
+        The values of the keys at each index of the axis, in SI.
+    """
+
+    dimension: str
+    keys: tuple[str, ...]
+    rows: tuple[tuple[Value, ...], ...]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """One combination of values.
+
+    Attributes
+    ----------
+    index
+        Its index along each axis.
+    values
+        The value of each swept key, in SI.
+    config
+        The configuration.
+    """
+
+    index: tuple[int, ...]
+    values: Mapping[str, Value]
+    config: Config
+
+    def __str__(self) -> str:
+        return described(self.values)
+
+
+def described(values: Mapping[str, Value]) -> str:
+    """Values of keys, for messages."""
+    parts = []
+    for key, value in values.items():
+        kind = key_kind(key)
+        unit = "" if kind is None or kind.unit in {None, "1"} else f" {kind.unit}"
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        parts.append(f"{key} = {text}{unit}")
+    return ", ".join(parts)

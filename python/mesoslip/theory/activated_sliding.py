@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ from scipy import optimize
 
 from mesoslip.quantities import with_unit
 from mesoslip.theory.activated_lives import POINTS, ActivatedLives
+from mesoslip.theory.linear_stability import LinearStability, Parts
 from mesoslip.theory.sliders import dynamic_stiffness
-from mesoslip.theory.steady_sliding import Parts, SteadySliding
 from mesoslip.theory.thermal import steady_force, steady_slope
 
 Array = NDArray[np.float64]
@@ -71,13 +71,11 @@ class RateAndState(NamedTuple):
         return (self.b - self.a) / self.slip_distance * (1 + inertia)
 
 
-class ActivatedSliding(SteadySliding):
+class ActivatedSliding(LinearStability):
     """Steady sliding of contacts that break by thermal activation.
 
-    Parameters and errors are those of `SteadySliding`; contacts may age.
+    Parameters and errors are those of `LinearStability`; contacts may age.
     """
-
-    is_activated: ClassVar[bool] = True
 
     @cached_property
     def _lives(self) -> dict[int, ActivatedLives]:
@@ -125,12 +123,7 @@ class ActivatedSliding(SteadySliding):
         lost, held, laplace, load = (
             self._fast_motion(lives, rate) if is_fast else self._motion(lives, rate)
         )
-        if contacts.delay_law == "exponential":
-            late = 1 / (1 + rate * self.delay)
-            detached = rate * self.delay * late
-        else:
-            late = np.exp(-rate * self.delay)
-            detached = -np.expm1(-rate * self.delay)
+        late, detached = (one[()] for one in self._late(np.asarray(rate)))
         births = rate * laplace * late + detached
         # Drag of a velocity [N s/m], and 1/s to N/m.
         drag = self._drag

@@ -10,9 +10,10 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing, Thermal
 from mesoslip.errors import ConfigError
 from mesoslip.output.inputs import ConfigLike, as_config
+from mesoslip.theory.linear_stability import SHOWN_BY, LinearStability
 from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import quantities
-from mesoslip.theory.steady_sliding import SHOWN_BY, SteadySliding, steady_sliding
+from mesoslip.theory.steady_sliding import steady_sliding
 
 # Maximum work for the stability of steady sliding, about a tenth of a second.
 MAX_WORK = 10_000
@@ -77,7 +78,7 @@ def verdict(config: Config) -> str | None:
     return "\n".join(sentences) or None
 
 
-def _stability(sliding: SteadySliding | None) -> Iterator[tuple[str, float, str, str]]:
+def _stability(sliding: LinearStability | None) -> Iterator[tuple[str, float, str, str]]:
     """Growth or decay of small perturbations of steady sliding, if it is found quickly."""
     if sliding is None:
         return

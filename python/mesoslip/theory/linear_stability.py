@@ -1,0 +1,354 @@
+"""Linear stability of steady sliding: roots of Z(λ) + Λ(λ), of any contacts.
+
+A slider of dynamic stiffness Z(λ) on contacts of the response Λ(λ) has the characteristic equation
+Z(λ) + Λ(λ) = 0, whose roots in the right half-plane are counted by the argument principle. The
+derivation is in ``docs/steady-sliding.md``.
+"""
+
+from __future__ import annotations
+
+import abc
+import math
+from collections.abc import Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.quantities import with_unit
+from mesoslip.theory.sliders import dynamic_stiffness
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+# Maximum change of the argument between two points of the path along which roots are counted, and
+# maximum number of halvings of an interval.
+MAX_TURN = 0.8
+MAX_HALVINGS = 40
+# Maximum number of points of the path.
+MAX_POINTS = 400_000
+# Growth rate over the frequency of the slider below which a perturbation does not grow, and its
+# maximum.
+NO_GROWTH = 1e-7
+MAX_GROWTH = 1e6
+# Steps of Newton's method, and relative change at which a root is found.
+STEPS, ROOT_TOLERANCE = 25, 1e-10
+# Imaginary part over the absolute value below which a root is real.
+REAL = 1e-9
+# Maximum number of starts of Newton's method on the path.
+MAX_CANDIDATES = 40
+# Maximum number of layers whose frequencies the points of the path resolve.
+MAX_LAYERS = 16
+
+# What linear theory leaves open, of a stable and of an unstable motion.
+SHOWN_BY = "only a run or mesoslip cycle shows it"
+OTHER_MOTION = f"A large oscillation may be possible too: {SHOWN_BY}"
+NO_AMPLITUDE = f"Linear theory gives no amplitude: {SHOWN_BY}"
+
+WITHOUT_NEWBORN_WIDTH = (
+    "has no linear stability theory here: contacts must attach with one force; `mesoslip curve` "
+    "gives the steady force of contacts of one stiffness"
+)
+
+
+class Parts(NamedTuple):
+    """Λ = fed/births + free, for each rate; ``life`` is |ψ e^(-λ τ_d)|."""
+
+    fed: Complex
+    births: Complex
+    free: Complex
+    life: Array
+
+
+class LinearStability(abc.ABC):
+    """Steady sliding of a configuration, and the growth of small perturbations of it.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    velocity
+        Velocity [m/s]; that of the drive by default.
+
+    Raises
+    ------
+    ConfigError
+        If there is no theory for the contacts or the slider, or there is no velocity.
+    """
+
+    def __init__(self, config: Config, velocity: float | None = None) -> None:
+        contacts = config.contacts
+        problems = list(self._problems(config))
+        if contacts.newborn_width > 0:
+            problems.append(Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH))
+        if not contacts.reattach:
+            problems.append(
+                Problem("", "contacts.reattach", "without it there is no steady sliding", False)
+            )
+        if config.slider.layer_count > MAX_LAYERS:
+            message = f"linear stability is found for at most {MAX_LAYERS}"
+            problems.append(Problem("", "slider.layers", message, config.slider.layer_count))
+        self.velocity = abs(config.drive_speed if velocity is None else velocity)
+        if not 0 < self.velocity < math.inf:
+            problems.append(
+                Problem("", "drive.velocity", "steady sliding needs a velocity", self.velocity)
+            )
+        if problems:
+            raise ConfigError(problems)
+        self.config = config
+        self.delay = 0.0 if config.slider.ignores_delay else contacts.delay
+        # Displacement in units of the breaking stretch, for a second.
+        self._rate = self.velocity / contacts.break_stretch
+        self._drag = contacts.count * contacts.contact_drag if self.delay > 0 else 0.0
+
+    @classmethod
+    def _problems(cls, config: Config) -> Iterator[Problem]:  # noqa: ARG003
+        """What else of a configuration the theory does not have."""
+        yield from ()
+
+    @property
+    @abc.abstractmethod
+    def force(self) -> float:
+        """Steady force F(v) [N]."""
+
+    @property
+    @abc.abstractmethod
+    def slope(self) -> float:
+        """dF/dv [N s/m]: below zero sliding is weaker the faster it is."""
+
+    @property
+    @abc.abstractmethod
+    def is_stable_out_of_step(self) -> bool:
+        """Whether no perturbation grows for contacts whose lives differ widely."""
+
+    @property
+    @abc.abstractmethod
+    def summary(self) -> str | None:
+        """What linear theory states, and what it leaves open; None for a slider without inertia."""
+
+    @abc.abstractmethod
+    def _parts(self, rate: Complex) -> Parts:
+        """Λ at rates [1/s], in parts."""
+
+    @property
+    @abc.abstractmethod
+    def _path(self) -> Array:
+        """Frequencies along which the argument of the characteristic function is computed."""
+
+    @property
+    @abc.abstractmethod
+    def _is_passive(self) -> bool:
+        """Whether the force of steady contacts does not depend on the motion of the slider."""
+
+    def response(self, frequency: ArrayLike) -> Complex:
+        """Λ(iω): contact force over displacement, of a slider moved at frequencies ω [N/m].
+
+        Its real part is the stiffness of the contacts, its imaginary part over ω their damping;
+        where that is negative, contacts feed an oscillation.
+        """
+        return self.response_at(1j * np.asarray(frequency, dtype=float))
+
+    def response_at(self, rate: ArrayLike) -> Complex:
+        """Λ(λ) for complex rates λ other than 0 [N/m]."""
+        values = np.asarray(rate, dtype=np.complex128)
+        parts = self._parts(values.ravel())
+        return ((parts.fed + parts.free * parts.births) / parts.births).reshape(values.shape)
+
+    def _late(self, rate: Complex) -> tuple[Complex, Complex]:
+        """Average of e^(-λ t) over the delays t, and 1 less that to all digits."""
+        if self.config.contacts.delay_law == "exponential":
+            late: Complex = 1 / (1 + rate * self.delay)
+            return late, rate * self.delay * late
+        return np.exp(-rate * self.delay), -np.expm1(-rate * self.delay)
+
+    def _characteristic(self, rate: Complex) -> tuple[Complex, Complex]:
+        """An entire function with the roots of Z + Λ, over λ; and one with its extra roots, over λ.
+
+        The second one is 1 - ψ e^(-λ τ_d), whose roots are those of the contacts alone, all of them
+        with a negative real part but for that at 0.
+        """
+        slider = dynamic_stiffness(self.config.slider, rate)
+        assert slider is not None
+        parts = self._parts(rate)
+        whole = slider.numerator + slider.denominator * parts.free
+        scale = self._scale
+        return (
+            (whole * parts.births + slider.denominator * parts.fed) / (rate / scale),
+            parts.births / (rate / scale),
+        )
+
+    @property
+    def _scale(self) -> float:
+        """A frequency of the slider [1/s]."""
+        return 1 / self.config.slider.quiet_time
+
+    @cached_property
+    def _has_motion(self) -> bool:
+        """Whether the slider has a motion of its own that the contacts may feed."""
+        rate = np.array([1j * self._scale])
+        return dynamic_stiffness(self.config.slider, rate) is not None
+
+    def _right_of(self, real: float) -> int:
+        """Number of roots with a real part above a positive one, by the argument principle.
+
+        Z + Λ has no poles there. It grows as a power of λ, whose degree gives the change of its
+        argument around the half-plane; the change along the line itself is computed.
+
+        Raises
+        ------
+        RunError
+            If that leaves the range of floating-point numbers.
+        """
+        slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))
+        assert slider is not None
+        path = self._path
+        values = self._values(real + 1j * path)
+        for _ in range(MAX_HALVINGS):
+            turns = np.abs(np.angle(values[:, 1:] / values[:, :-1])).max(axis=0)
+            large = np.flatnonzero(turns > MAX_TURN)
+            if large.size == 0 or path.size > MAX_POINTS:
+                break
+            between = (path[large] + path[large + 1]) / 2
+            added = self._values(real + 1j * between)
+            path = np.insert(path, large + 1, between)
+            values = np.insert(values, large + 1, added, axis=1)
+        turned = np.sum(np.angle(values[:, 1:] / values[:, :-1]), axis=1)
+        turned += np.angle(values[:, 0])
+        # The rest of the path turns with the power of λ.
+        angle = math.atan2(path[-1], real)
+        last = complex(values[0, -1] / values[1, -1] * np.exp(-1j * slider.degree * angle))
+        argument = float(turned[0] - turned[1]) - math.atan2(last.imag, last.real)
+        argument += slider.degree * (math.pi / 2 - angle)
+        return round(slider.degree / 2 - argument / math.pi)
+
+    def _values(self, rate: Complex) -> Complex:
+        """Both parts of the characteristic function, shape (2, rates), none of them zero."""
+        with np.errstate(all="ignore"):
+            values: Complex = np.stack(self._characteristic(rate))
+        if not np.all(np.isfinite(values) & (np.abs(values) > 0)):
+            raise RunError(
+                "the stability of steady sliding leaves the range of floating-point numbers"
+            )
+        return values
+
+    @cached_property
+    def unstable_count(self) -> int:
+        """Number of roots that grow, each of a pair counted.
+
+        Raises
+        ------
+        RunError
+            If that leaves the range of floating-point numbers.
+        """
+        if not self._has_motion or self._is_passive:
+            return 0
+        return self._right_of(NO_GROWTH * self._scale)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no small perturbation of steady sliding grows.
+
+        Without delay none does: the force of steady contacts, whose distribution of stretches is
+        stationary, does not change, however the slider moves. Nor does one grow under a slider
+        without inertia.
+        """
+        return self.unstable_count == 0
+
+    @cached_property
+    def leading_root(self) -> complex | None:
+        """The root λ with the maximum real part [1/s], of those with an imaginary part ≥ 0.
+
+        None for a slider without inertia.
+        """
+        if not self._has_motion:
+            return None
+        found = self._roots(NO_GROWTH * self._scale)
+        if self.is_stable:
+            found = found[found.real <= NO_GROWTH * self._scale]
+            return complex(found[np.argmax(found.real)]) if found.size else None
+        leading = found[np.argmax(found.real)] if found.size else 0j
+        margin = 1e-3 * max(abs(leading.real), NO_GROWTH * self._scale)
+        if leading.real <= 0 or self._right_of(leading.real + margin) > 0:
+            leading = self._rightmost(max(leading.real + margin, NO_GROWTH * self._scale))
+        return complex(leading)
+
+    def _rightmost(self, low: float) -> complex:
+        """The root with the maximum real part, if that is above a given one, by bisection."""
+        high = 2 * low
+        while high < MAX_GROWTH * self._scale and self._right_of(high) > 0:
+            low, high = high, 2 * high
+        while high - low > 1e-3 * high:
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._right_of(middle) > 0 else (low, middle)
+        found = self._roots((low + high) / 2)
+        near = found[np.abs(found.real - (low + high) / 2) < (high - low) + 1e-3 * high]
+        return complex(near[0]) if near.size else complex((low + high) / 2, math.nan)
+
+    def _roots(self, real: float) -> Complex:
+        """Roots that Newton's method finds from where the function is small on a line."""
+        path = self._path
+        starts = real + 1j * path[1:]
+        size = np.log(np.abs(self._characteristic(starts)[0]))
+        low = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
+        # The deepest minima first.
+        around = np.convolve(size, np.ones(15) / 15, "same")
+        low = low[np.argsort(size[low] - around[low])][:MAX_CANDIDATES]
+        own = math.sqrt(self.config.contacts.stiffness / self._mass)
+        root = np.concatenate([starts[low], 1j * np.geomspace(0.1 * self._scale, own, 8)])
+        change = np.full(root.shape, np.inf)
+        step = 1e-6 * (np.abs(root) + self._scale)
+        with np.errstate(all="ignore"):
+            for _ in range(STEPS):
+                here = self._characteristic(root)[0]
+                move = here * step / (self._characteristic(root + step)[0] - here)
+                # Steps are bounded.
+                max_step = 0.3 * (np.abs(root) + self._scale)
+                move *= np.minimum(1, max_step / np.maximum(np.abs(move), 1e-300))
+                root = root - move
+                change = np.abs(move) / np.abs(root)
+                if not np.any(change > ROOT_TOLERANCE):
+                    break
+        root = root[change < 1e-6]
+        root = np.where(np.abs(root.imag) < REAL * np.abs(root), root.real + 0j, root)
+        return np.where(root.imag < 0, root.conj(), root)
+
+    @property
+    def _mass(self) -> float:
+        """Inertia of the slider at high frequencies [kg]."""
+        high = 1e3 * self._scale
+        slider = dynamic_stiffness(self.config.slider, np.array([high + 0j]))
+        assert slider is not None
+        return float((slider.numerator / slider.denominator).real[0]) / high**2
+
+    @property
+    def growth_rate(self) -> float:
+        """Real part of the leading root [1/s]; negative if perturbations decay."""
+        return math.nan if self.leading_root is None else self.leading_root.real
+
+    @property
+    def frequency(self) -> float:
+        """Imaginary part of the leading root, the angular frequency of its perturbation [1/s]."""
+        return math.nan if self.leading_root is None else self.leading_root.imag
+
+    @property
+    def work(self) -> int:
+        """Work of finding the roots, points of the path times the degree of the slider.
+
+        Ten thousand take about a tenth of a second.
+        """
+        if not self._has_motion or self._is_passive:
+            return 0
+        slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))
+        assert slider is not None
+        return len(self._path) * slider.degree
+
+    @property
+    def _perturbation(self) -> str:
+        if not self.frequency > 0:
+            return "a perturbation"
+        return f"an oscillation of {with_unit(self.frequency / (2 * math.pi), 'Hz', 3)}"

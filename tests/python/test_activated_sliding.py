@@ -149,7 +149,7 @@ def test_a_slow_change_has_the_steady_slope():
 
 def test_fast_motion_joins_slower_motion():
     sliding = ActivatedSliding(klein_activated(1e4, 0.2))
-    lives = sliding._lives_for(0.0)
+    lives = sliding.lives
     limit = 20 * lives.speed / lives.scale
     below, above = sliding.response(np.array([0.999, 1.001]) * limit)
     assert abs(above / below - 1) < 0.01

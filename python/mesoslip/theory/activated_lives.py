@@ -12,7 +12,7 @@ threshold at the latest, at the age T.
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +58,8 @@ class ActivatedLives:
         Length of the panels over ages; 1 for about ten digits.
     threshold_panel
         Length of the panels over thresholds, over f_T; as `coarseness` by default.
+    max_threshold_panels
+        Their maximum number.
 
     Raises
     ------
@@ -84,6 +86,7 @@ class ActivatedLives:
         max_panel: float = math.inf,
         coarseness: float = 1.0,
         threshold_panel: float | None = None,
+        max_threshold_panels: int = MAX_PANELS,
     ) -> None:
         contacts, thermal = config.contacts, config.contacts.thermal
         assert thermal is not None
@@ -99,7 +102,9 @@ class ActivatedLives:
         self.scale = thermal.ratio(contacts.contact_static_force)
         """f_T/f_s."""
         self._log_rate = math.log(thermal.rate)
-        weight, threshold = _thresholds(config, (threshold_panel or coarseness) * self.scale)
+        weight, threshold = _thresholds(
+            config, (threshold_panel or coarseness) * self.scale, max_threshold_panels
+        )
         self.weight, self.threshold = weight[:, None], threshold[:, None]
         self.end = self._end()
         """Ages at which contacts come to their thresholds, shape (thresholds, 1)."""
@@ -167,7 +172,7 @@ class ActivatedLives:
         The values have the shape (thresholds, panels, points), the half lengths of the panels
         (thresholds, panels, 1).
         """
-        return values @ _cumulative().T * half
+        return values @ cumulative().T * half
 
     def accumulated(self, values: Array) -> tuple[Array, Array]:
         """∫ values dt from birth to each point, (thresholds, points), and to the end."""
@@ -224,7 +229,8 @@ class ActivatedLives:
         return np.concatenate([np.zeros_like(end), edges], axis=1)
 
 
-def _cumulative() -> Array:
+@cache
+def cumulative() -> Array:
     """Integrals from -1 to each Gauss point, of values at these points; shape (points, points)."""
     point, _ = np.polynomial.legendre.leggauss(POINTS)
     vander = np.polynomial.legendre.legvander(point, POINTS - 1)
@@ -240,10 +246,10 @@ def _cumulative() -> Array:
     return np.asarray(integrals @ np.linalg.inv(vander))
 
 
-def _thresholds(config: Config, panel: float) -> tuple[Array, Array]:
+def _thresholds(config: Config, panel: float, max_panels: int) -> tuple[Array, Array]:
     """Weights and points of a quadrature over the thresholds, in panels of about a length."""
     law = config.contacts.threshold.above(config.contacts.min_threshold)
     weakest, strongest = law.quantile([1 - LEFT_OUT, LEFT_OUT])
     wanted = math.ceil(float(strongest - weakest) / panel)
-    panels = min(MAX_PANELS, max(MIN_PANELS, wanted))
+    panels = min(max_panels, max(MIN_PANELS, wanted))
     return threshold_quadrature(config, panels, POINTS)

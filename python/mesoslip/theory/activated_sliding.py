@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 
 from mesoslip.quantities import with_unit
-from mesoslip.theory.activated_lives import POINTS, ActivatedLives
+from mesoslip.theory.activated_lives import ActivatedLives
+from mesoslip.theory.activated_response import MAX_TURN, ActivatedResponse, Motion
 from mesoslip.theory.linear_stability import LinearStability, Parts
 from mesoslip.theory.sliders import dynamic_stiffness
 from mesoslip.theory.thermal import steady_force, steady_slope
@@ -27,19 +27,22 @@ from mesoslip.theory.thermal import steady_force, steady_slope
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-# Product of a rate and the length of a panel up to which its quadrature has rounding errors only,
-# and maximum number of panels over the ages.
-MAX_TURN, MAX_PANELS = 6.0, 400
-# Length of the panels, for about six digits, and doublings of those over thresholds at low rates.
-COARSENESS, MAX_DOUBLINGS = 4.0, 3
+# Length of the panels over thresholds and ages, over f_T and f_T/(k v), for about six digits.
+COARSENESS = 4.0
 # Rate over k v/f_T from which contacts do not break while the slider oscillates.
 FAST = 20.0
+# The same over v and the width of thresholds that are reached, by more than this share.
+OUT_OF_PHASE, HARDLY = 6.0, 1e-6
+# Maximum number of panels over thresholds that are reached.
+MAX_THRESHOLD_PANELS = 400
 # Rate over that of breaking at which the response is nearly linear.
 SLOW = 1e-3
 # Points of the path for a decade of frequencies. From a frequency over k v/f_T on, the critical
 # stiffness is sought with fewer points.
 POINTS_A_DECADE = 15
 SMOOTH_FROM, THINNING = 1.5, 3
+# Rounds of the search for a critical frequency, and points of each.
+ROUNDS, POINTS_A_ROUND = 3, 12
 
 
 class RateAndState(NamedTuple):
@@ -78,29 +81,58 @@ class ActivatedSliding(LinearStability):
     """
 
     @cached_property
-    def _lives(self) -> dict[int, ActivatedLives]:
+    def lives(self) -> ActivatedLives:
+        """Lives of the contacts, to six digits."""
+        return ActivatedLives(self.config, self.velocity, coarseness=COARSENESS)
+
+    @cached_property
+    def _responses(self) -> dict[int, ActivatedResponse]:
         return {}
 
-    def _lives_for(self, rate: float) -> ActivatedLives:
-        """Quadratures that resolve a rate [1/s]; panels are halved as it doubles."""
-        if not self._lives:
-            self._lives[0] = ActivatedLives(self.config, self.velocity, coarseness=COARSENESS)
-        # Contacts break between the ends of the first panel and of the last one.
-        edges = self._lives[0].edges[:, 1:]
-        longest = float(np.max(np.diff(edges, axis=1)))
-        whole = float(np.max(edges[:, -1] - edges[:, 0]))
-        halvings = math.ceil(math.log2(max(rate * longest / MAX_TURN, 1e-300)))
-        most = max(0, math.ceil(math.log2(MAX_PANELS * longest / whole)))
-        level = max(-MAX_DOUBLINGS, min(halvings, most))
-        if level not in self._lives:
-            self._lives[level] = ActivatedLives(
-                self.config,
-                self.velocity,
-                max_panel=longest / 2 ** max(0, level),
-                threshold_panel=COARSENESS * 2 ** max(0, -level),
-                coarseness=COARSENESS,
-            )
-        return self._lives[level]
+    def _motion(self, rate: Complex) -> Motion:
+        """Response of the pinned contacts; panels are halved as a rate doubles."""
+        size = np.abs(rate)
+        length = COARSENESS / self._breaking_rate
+        level = np.ceil(np.log2(np.maximum(size * length / MAX_TURN, 1.0)))
+        level[size > self._fast] = -1
+        result = np.empty((len(Motion._fields), len(rate)), dtype=np.complex128)
+        for one in np.unique(level).astype(int):
+            some = level == one
+            response = self._response(int(one))
+            here = response.fast_motion if one < 0 else response.motion
+            result[:, some] = here(rate[some])
+        return Motion(*result)
+
+    def _response(self, level: int) -> ActivatedResponse:
+        if level not in self._responses:
+            fineness = 2 ** max(0, level)
+            lives = self._finer_lives(fineness) if self._are_reached else self.lives
+            length = COARSENESS / self._breaking_rate / fineness
+            self._responses[level] = ActivatedResponse(lives, length)
+        return self._responses[level]
+
+    def _finer_lives(self, fineness: int) -> ActivatedLives:
+        """Lives with as many thresholds as their ends need, at which the response has no spread."""
+        return ActivatedLives(
+            self.config,
+            self.velocity,
+            coarseness=COARSENESS,
+            threshold_panel=COARSENESS / fineness,
+            max_threshold_panels=MAX_THRESHOLD_PANELS,
+        )
+
+    @cached_property
+    def _are_reached(self) -> bool:
+        """Whether contacts come to their thresholds."""
+        return float(np.sum(self.lives.weight * self.lives.reached)) > HARDLY
+
+    @cached_property
+    def _fast(self) -> float:
+        """Rate from which contacts do not break in step with the slider [1/s]."""
+        if not self._are_reached:
+            return FAST * self._breaking_rate
+        width = self.config.contacts.threshold.relative_width
+        return max(FAST * self._breaking_rate, OUT_OF_PHASE * self._rate / width)
 
     @property
     def force(self) -> float:
@@ -111,111 +143,21 @@ class ActivatedSliding(LinearStability):
         return steady_slope(self.config, self.velocity) / self.velocity
 
     def _parts(self, rate: Complex) -> Parts:
-        columns = [self._parts_at(complex(one)) for one in rate]
-        fed, births, free, life = (np.array(one) for one in zip(*columns, strict=True))
-        return Parts(fed, births, free, np.abs(life))
-
-    def _parts_at(self, rate: complex) -> tuple[complex, complex, complex, complex]:
-        contacts = self.config.contacts
-        is_fast = abs(rate) > FAST * self._breaking_rate
-        lives = self._lives_for(0.0) if is_fast else self._lives_for(abs(rate))
-        density = 1 / (lives.life + self.delay)
-        lost, held, laplace, load = (
-            self._fast_motion(lives, rate) if is_fast else self._motion(lives, rate)
-        )
-        late, detached = (one[()] for one in self._late(np.asarray(rate)))
-        births = rate * laplace * late + detached
+        stiffness = self.config.contacts.stiffness
+        density = 1 / (self.lives.life + self.delay)
+        lost, held, number, load = self._motion(rate)
+        late, detached = self._late(rate)
+        births = rate * number * late + detached
         # Drag of a velocity [N s/m], and 1/s to N/m.
-        drag = self._drag
-        fed = rate * lost * density * (contacts.stiffness * load * late)
-        fed += drag * self._rate * density * lost * detached
-        free = contacts.stiffness * density * held + drag * rate * density * self.delay
-        return complex(fed), complex(births), complex(free), complex((1 - rate * laplace) * late)
-
-    def _motion(
-        self, lives: ActivatedLives, rate: complex
-    ) -> tuple[complex, complex, complex, complex]:
-        """Breaks and force of the pinned contacts, for ε of f_s/k, and the transforms of the number
-        and the force of a contact over its life [s]."""
-        ages, stretch = lives.age[:, POINTS:], lives.stretch[:, POINTS:]
-        decay = np.exp(-rate * ages)
-        missing = -np.expm1(-rate * ages)
-        alive = (lives.weight * lives.step * lives.survival)[:, POINTS:]
-        broken = self._late_breaks(lives, rate, decay)
-        end_missing = -np.expm1(-rate * lives.edges[:, -1:])
-        ended = lives.weight * lives.reached * end_missing / lives.approach
-        end_stretch = lives.back + lives.speed * lives.edges[:, -1:]
-        lost = np.sum(alive * broken) + np.sum(ended)
-        held = np.sum(alive * (missing - stretch * broken)) - np.sum(ended * end_stretch)
-        young_held, young, young_load = self._unbroken(lives, rate)
-        return (
-            complex(lost),
-            complex(held) + young_held,
-            complex(np.sum(alive * decay)) + young,
-            complex(np.sum(alive * stretch * decay)) + young_load,
-        )
-
-    @staticmethod
-    def _unbroken(lives: ActivatedLives, rate: complex) -> tuple[complex, complex, complex]:
-        """Integrals of 1 - e^(-λa), e^(-λa) and x e^(-λa) while none breaks [s]."""
-        weight, start = lives.weight, lives.edges[:, 1:2]
-        if abs(rate) * float(np.max(start)) < MAX_TURN:
-            share = weight * lives.step[:, :POINTS]
-            decay = np.exp(-rate * lives.age[:, :POINTS])
-            missing = -np.expm1(-rate * lives.age[:, :POINTS])
-            loaded = share * lives.stretch[:, :POINTS]
-            return (
-                complex(np.sum(share * missing)),
-                complex(np.sum(share * decay)),
-                complex(np.sum(loaded * decay)),
-            )
-        decay = np.exp(-rate * start)
-        young = complex(np.sum(weight * -np.expm1(-rate * start))) / rate
-        moved = (young - complex(np.sum(weight * start * decay))) / rate
-        return (
-            float(np.sum(weight * start)) - young,
-            young,
-            lives.back * young + lives.speed * moved,
-        )
-
-    @staticmethod
-    def _fast_motion(
-        lives: ActivatedLives, rate: complex
-    ) -> tuple[complex, complex, complex, complex]:
-        """The same where the motion is much faster than the rates at which contacts break, to first
-        order in 1/λ."""
-        breaking = lives.survival * lives.rate / lives.scale
-        ended = lives.weight * lives.reached / lives.approach
-        end_stretch = lives.back + lives.speed * lives.edges[:, -1:]
-        lost = lives.mean(breaking) / rate + np.sum(ended)
-        held = lives.life - (1 + lives.mean(lives.stretch * breaking)) / rate
-        held -= np.sum(ended * end_stretch)
-        return lost, held, 1 / rate, lives.back / rate
-
-    @staticmethod
-    def _late_breaks(lives: ActivatedLives, rate: complex, decay: Complex) -> Complex:
-        """e^(-λa) D(a) = ∫_0^a (k h/f_T) (e^(-λ(a - a')) - e^(-λa)) da', while contacts break;
-        shape (thresholds, points)."""
-        shape = (len(lives.weight), -1, POINTS)
-        half = lives.half[:, 1:]
-        # Ages since the start of the panel.
-        since = half * (1 + lives.point)
-        growing = lives.rate[:, POINTS:].reshape(shape) * np.exp(rate * since)
-        inner = lives.within(growing, half)
-        whole = (growing * lives.step[:, POINTS:].reshape(shape)).sum(axis=2)
-        panel_decay = np.exp(-rate * 2 * half[:, :, 0])
-        carried = np.zeros(whole.shape, dtype=np.complex128)
-        for panel in range(1, whole.shape[1]):
-            carried[:, panel] = panel_decay[:, panel - 1] * (
-                carried[:, panel - 1] + whole[:, panel - 1]
-            )
-        lagged = np.exp(-rate * since) * (carried[:, :, None] + inner)
-        broken: Complex = lagged.reshape(decay.shape) - decay * lives.hazard[:, POINTS:]
-        return broken / lives.scale
+        drag = self._drag * density
+        fed = rate * lost * density * stiffness * load * late
+        fed += drag * self._rate * lost * detached
+        free = stiffness * density * held + drag * rate * self.delay
+        return Parts(fed, births, free, np.abs((1 - rate * number) * late))
 
     @cached_property
     def _path(self) -> Array:
-        lives = self._lives_for(0.0)
+        lives = self.lives
         turn = lives.life + self.delay
         stiffness = self.config.contacts.stiffness
         own = math.sqrt((stiffness + max(self._spring, 0.0)) / self._mass)
@@ -236,13 +178,13 @@ class ActivatedSliding(LinearStability):
     @property
     def _breaking_rate(self) -> float:
         """k v/f_T [1/s]."""
-        lives = self._lives_for(0.0)
+        lives = self.lives
         return lives.speed / lives.scale
 
     @cached_property
     def rate_and_state(self) -> RateAndState:
         """a, b and D_c near this velocity; a one-state law need not describe the contacts."""
-        lives = self._lives_for(0.0)
+        lives = self.lives
         life = lives.life + self.delay
         hazards, _ = lives.accumulated(lives.hazard)
         # Contacts that break later bear on, and attach later with the back force.
@@ -278,16 +220,21 @@ class ActivatedSliding(LinearStability):
         for at in crossings:
             if max(-values.real[at], -values.real[at + 1]) <= 0:
                 continue
-            frequency = optimize.brentq(
-                lambda one: float(self._without_spring(np.array([one])).imag[0]),
-                path[at],
-                path[at + 1],
-                rtol=1e-5,
-            )
+            frequency = self._crossing(path[at], path[at + 1])
             stiffness = -float(self._without_spring(np.array([frequency])).real[0])
             if stiffness > 0 and (found is None or stiffness > found[0]):
                 found = (stiffness, frequency)
         return found
+
+    def _crossing(self, low: float, high: float) -> float:
+        """Frequency between two others at which the response without the spring is real."""
+        for _ in range(ROUNDS):
+            points = np.geomspace(low, high, POINTS_A_ROUND)
+            values = self._without_spring(points).imag
+            first = int(np.flatnonzero(np.diff(np.sign(values)) != 0)[0])
+            low, high = points[first : first + 2]
+        before, after = values[first : first + 2]
+        return float(low + (high - low) * before / (before - after))
 
     def _without_spring(self, frequency: Array) -> Complex:
         """Z(iω) + Λ(iω) - K [N/m]."""

@@ -302,16 +302,21 @@ class LinearStability(abc.ABC):
         root = np.concatenate([starts[low], 1j * np.geomspace(0.1 * self._scale, own, 8)])
         change = np.full(root.shape, np.inf)
         step = 1e-6 * (np.abs(root) + self._scale)
+        searched = np.arange(len(root))
         with np.errstate(all="ignore"):
             for _ in range(STEPS):
-                here = self._characteristic(root)[0]
-                move = here * step / (self._characteristic(root + step)[0] - here)
+                near = root[searched]
+                here, beside = np.split(
+                    self._characteristic(np.concatenate([near, near + step[searched]]))[0], 2
+                )
+                move = here * step[searched] / (beside - here)
                 # Steps are bounded.
-                max_step = 0.3 * (np.abs(root) + self._scale)
+                max_step = 0.3 * (np.abs(near) + self._scale)
                 move *= np.minimum(1, max_step / np.maximum(np.abs(move), 1e-300))
-                root = root - move
-                change = np.abs(move) / np.abs(root)
-                if not np.any(change > ROOT_TOLERANCE):
+                root[searched] = near - move
+                change[searched] = np.abs(move) / np.abs(root[searched])
+                searched = searched[change[searched] > ROOT_TOLERANCE]
+                if searched.size == 0:
                     break
         root = root[change < 1e-6]
         root = np.where(np.abs(root.imag) < REAL * np.abs(root), root.real + 0j, root)

@@ -60,6 +60,11 @@ module mesoslip_schedule
          & attach_drag(max_events) = 0.0_wp
       !> Where it came [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
+      !> Whether contacts that break may attach here, and of each break the delay until then [s],
+      !> the stiffness [N/m], and the stretches at first and at breaking [m] of the next life
+      logical :: has_births = .false.
+      real(wp) :: birth_delay(max_events) = 0.0_wp, birth_stiffness(max_events) = 0.0_wp, &
+         & birth_stretch(max_events) = 0.0_wp, birth_limit(max_events) = 0.0_wp
 
       !> Whether there are clocks, which they are, and the one by which contacts break here
       logical :: has_clocks = .false.
@@ -90,7 +95,8 @@ module mesoslip_schedule
       procedure, non_overridable :: break_count
       !> Let what is due at a time and a displacement happen
       procedure, non_overridable :: pass
-      procedure, non_overridable, private :: break_due, attach_due
+      procedure, non_overridable, private :: break_due, attach_due, &
+         & insert_attachments, insert_attachment
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
          & skip_gone
    end type schedule_type
@@ -176,7 +182,9 @@ contains
          if (self%break_drag(event) > 0.0_wp) call self%drag%add(self%break_drag(event))
       end do
       ! Those that break now come after all that wait to attach.
-      if (self%broken == 0) then
+      if (self%has_births) then
+         call self%insert_attachments(event - 1, time)
+      else if (self%broken == 0) then
          self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
             & time + self%delay)
       end if
@@ -190,6 +198,58 @@ contains
          self%offset = accumulator_type()
       end if
    end subroutine break_due
+
+   !> Insert the attachments of the contacts that break now.
+   subroutine insert_attachments(self, last, time)
+      class(schedule_type), intent(inout) :: self
+      !> Number of the last break
+      integer, intent(in) :: last
+      !> Time [s]
+      real(wp), intent(in) :: time
+
+      integer :: event
+
+      do event = self%broken + 1, last
+         call self%insert_attachment(event, time)
+      end do
+   end subroutine insert_attachments
+
+   !> Insert the attachment of a contact that breaks now, unless it comes after those listed.
+   subroutine insert_attachment(self, event, time)
+      class(schedule_type), intent(inout) :: self
+      !> Number of its break
+      integer, intent(in) :: event
+      !> Time [s]
+      real(wp), intent(in) :: time
+
+      real(wp) :: due
+      integer :: place
+
+      due = time + self%birth_delay(event)
+      if (due < self%attach_time(self%attachments + 1) .and. self%attachments == max_events) then
+         ! The last one leaves a full list, whose next time is its own then.
+         if (self%attached == max_events) self%attach_time(max_events + 1) = due
+         self%attachments = max(self%attached, max_events - 1)
+      end if
+      if (due >= self%attach_time(self%attachments + 1)) return
+      place = self%attachments + 1
+      self%attach_time(place + 1) = self%attach_time(place)
+      do while (place > self%attached + 1)
+         if (self%attach_time(place - 1) <= due) exit
+         self%attach_time(place) = self%attach_time(place - 1)
+         self%attach_stiffness(place) = self%attach_stiffness(place - 1)
+         self%attach_stretch(place) = self%attach_stretch(place - 1)
+         self%attach_limit(place) = self%attach_limit(place - 1)
+         self%attach_drag(place) = self%attach_drag(place - 1)
+         place = place - 1
+      end do
+      self%attach_time(place) = due
+      self%attach_stiffness(place) = self%birth_stiffness(event)
+      self%attach_stretch(place) = self%birth_stretch(event)
+      self%attach_limit(place) = self%birth_limit(event)
+      self%attach_drag(place) = self%break_drag(event)
+      self%attachments = self%attachments + 1
+   end subroutine insert_attachment
 
    !> Contacts attach. One that would break before another of the schedule cuts it short.
    subroutine attach_due(self, time, displacement)

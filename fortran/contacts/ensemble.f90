@@ -12,7 +12,6 @@ module mesoslip_contacts_ensemble
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &
       & total_law
    use mesoslip_contacts_individual_births, only: drag_of
-   use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_contacts_individual_queue, only: contact_queue_type, new_contact_queue
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate
@@ -145,9 +144,6 @@ contains
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
-      ! A schedule attaches contacts in the order in which they broke, with one force.
-      if (self%parameters%delay_law /= delay_fixed &
-         & .or. self%parameters%newborn_width > 0.0_wp) return
       call self%queue%preview(self%record, min(limit, max_events), self%listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return
@@ -163,6 +159,7 @@ contains
       schedule%behind = self%behind
       call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule, &
          & contact)
+      call self%list_births(self%listed(:number), pose%direction, schedule)
       schedule%is_over = .false.
    end subroutine plan
 

@@ -52,6 +52,8 @@ program test_simulation
    call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("ensemble", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("ensemble", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call runs_ahead("activated", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("activated", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("activated", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
@@ -383,11 +385,13 @@ contains
       type(error_type), allocatable :: error
       type(recorder_parameters_type) :: recorder
       real(wp) :: values(9), delay
+      character(len=:), allocatable :: kind, law_of_delay
 
       delay = 5.0e-4_wp
       if (slider == "quasistatic") delay = 0.0_wp
+      ! Scattered delays, and forces with which contacts attach.
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
-         & 0.1_wp, 1.0_wp, width, 0.0_wp]
+         & 0.1_wp, 1.0_wp, width, merge(0.05_wp, 0.0_wp, contacts == "scattered")]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &
@@ -413,11 +417,17 @@ contains
             & "rows"], [values, 0.0_wp, 0.0_wp])
       end select
       call parameters%add_word("threshold_law", law)
-      call parameters%add_word("delay_law", "fixed")
+      kind = contacts
+      law_of_delay = "fixed"
+      if (contacts == "scattered") then
+         kind = "ensemble"
+         law_of_delay = "exponential"
+      end if
+      call parameters%add_word("delay_law", law_of_delay)
       call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
          & contacts(:1) == "a"))))
       if (index(contacts, "ageing") > 0) call parameters%add_word("ageing", "relax")
-      call make_contacts(simulation%contacts, contacts, parameters, 1_i8, 0_i8, error)
+      call make_contacts(simulation%contacts, kind, parameters, 1_i8, 0_i8, error)
       call check(.not. allocated(error), "contacts: " // contacts)
 
       recorder = recorder_parameters_type(interval=1.0e-4_wp, duration=0.15_wp)

@@ -9,8 +9,7 @@ module mesoslip_contacts_individual_base
    use mesoslip_contacts_base, only: contacts_type, exchange_contacts, extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
       & new_avalanche_track, row_generation
-   use mesoslip_contacts_individual_births, only: bear, births_type, delay_of, drag_of, &
-      & draw_newborn
+   use mesoslip_contacts_individual_births, only: bear, births_type, drag_of
    use mesoslip_contacts_individual_detached, only: detached_contacts_type, new_detached_contacts
    use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
@@ -76,10 +75,11 @@ module mesoslip_contacts_individual_base
       procedure, non_overridable :: window_between
       !> The next attachments, for a schedule
       procedure, non_overridable :: list_attachments
+      procedure, non_overridable :: list_births
       !> Update records and sums after a schedule, without the order of breaking
       procedure, non_overridable :: detach_listed
       procedure, non_overridable :: attach_listed
-      procedure, non_overridable, private :: attach_next, sum_totals
+      procedure, non_overridable, private :: attach_next, draw_births, give_birth, sum_totals
    end type individual_contacts_type
 
    abstract interface
@@ -121,6 +121,7 @@ contains
       end if
       call new_detached_contacts(self%detached, self%parameters%count, self%parameters%reattach, &
          & self%parameters%delay_law == delay_fixed, error)
+      if (.not. allocated(error)) call self%births%allocate_draws(self%parameters, error)
       if (.not. allocated(error)) call new_avalanche_track(self%track, columns, rows, error)
    end subroutine allocate_records
 
@@ -175,7 +176,7 @@ contains
       !> Displacement [m] and time [s]
       real(wp), intent(in) :: displacement, time
 
-      real(wp) :: stiffness, origin, drag
+      real(wp) :: stiffness, origin, drag, delay
 
       associate (record => self%record(:, contact))
          origin = record(row_origin)
@@ -191,8 +192,12 @@ contains
       if (drag > 0.0_wp) call self%drag%add(drag)
       self%breaks = self%breaks + 1.0_wp
       call self%track%add(contact)
-      call self%detached%push(contact, time + delay_of(self%parameters, contact, &
-         & self%record(row_renewal, contact)), drag)
+      delay = self%parameters%delay
+      if (allocated(self%births%delay)) then
+         call self%draw_births([contact])
+         delay = self%births%delay(contact)
+      end if
+      call self%detached%push(contact, time + delay, drag)
       if (self%detached%count == self%parameters%count) then
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
@@ -213,8 +218,8 @@ contains
       do while (self%detached%next_due <= pose%time)
          force = back_force
          if (self%bonds > 0.0_wp) then
-            force = back_force &
-               & + self%neighbour_force(self%detached%next_contact(), pose%displacement)
+            call self%detached%find_next(contact)
+            force = back_force + self%neighbour_force(contact, pose%displacement)
          end if
          call self%attach_next(pose, force, contact)
          call self%join(contact, pose)
@@ -246,21 +251,11 @@ contains
       !> Number of the contact
       integer, intent(out) :: contact
 
-      real(wp) :: stiffness, limit, origin, drag, force, threshold, drawn
+      real(wp) :: stiffness, limit, origin, drag, force
 
       call self%detached%pop(contact, drag)
-      if (.not. self%record(row_next, contact) > 0.0_wp) then
-         call self%births%draw(self%parameters, self%record)
-      end if
-      force = mean_force
-      threshold = self%record(row_next, contact)
-      if (self%parameters%newborn_width > 0.0_wp) then
-         call draw_newborn(self%parameters, contact, self%record(row_renewal, contact), threshold, &
-            & drawn)
-         force = mean_force + pose%direction * self%parameters%static_force &
-            & * (drawn - self%parameters%back_force_ratio)
-      end if
-      call bear(self%parameters, threshold, stiffness, limit)
+      call self%draw_births([contact])
+      call self%give_birth(contact, mean_force, pose%direction, stiffness, limit, force)
       origin = pose%displacement - force / (stiffness + self%bonds)
       call self%drag%add(-drag)
       if (self%detached%count == 0) self%drag = accumulator_type()
@@ -287,24 +282,16 @@ contains
       integer, intent(out) :: contact(max_events)
 
       integer :: number, event
-      real(wp) :: threshold(max_events), back_force
+      real(wp) :: back_force, force
 
       call self%detached%preview(limit, number, contact, schedule%attach_time, &
          & schedule%attach_drag)
-      do event = 1, number
-         threshold(event) = self%record(row_next, contact(event))
-      end do
-      if (.not. all(threshold(:number) > 0.0_wp)) then
-         call self%births%draw(self%parameters, self%record)
-         do event = 1, number
-            threshold(event) = self%record(row_next, contact(event))
-         end do
-      end if
+      call self%draw_births(contact(:number))
       back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
       do event = 1, number
-         call bear(self%parameters, threshold(event), schedule%attach_stiffness(event), &
-            & schedule%attach_limit(event))
-         schedule%attach_stretch(event) = back_force / schedule%attach_stiffness(event)
+         call self%give_birth(contact(event), back_force, direction, &
+            & schedule%attach_stiffness(event), schedule%attach_limit(event), force)
+         schedule%attach_stretch(event) = force / schedule%attach_stiffness(event)
       end do
       schedule%attachments = number
       schedule%attached = 0
@@ -317,6 +304,69 @@ contains
       schedule%pinned = self%parameters%count - self%detached%count
    end subroutine list_attachments
 
+   !> List the next births of the contacts that break in a schedule, if they may attach in it.
+   subroutine list_births(self, contact, direction, schedule)
+      !> The contacts
+      class(individual_contacts_type), intent(inout) :: self
+      !> Numbers of those that are listed to break
+      integer, intent(in) :: contact(:)
+      !> Sign of the velocity at which they attach
+      real(wp), intent(in) :: direction
+      !> The schedule
+      type(schedule_type), intent(inout) :: schedule
+
+      real(wp) :: back_force, force
+      integer :: event
+
+      schedule%has_births = self%parameters%reattach .and. (allocated(self%births%delay) &
+         & .or. .not. self%parameters%delay > 0.0_wp)
+      if (.not. schedule%has_births) return
+      call self%draw_births(contact)
+      back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
+      do event = 1, size(contact)
+         call self%give_birth(contact(event), back_force, direction, &
+            & schedule%birth_stiffness(event), schedule%birth_limit(event), force)
+         schedule%birth_stretch(event) = force / schedule%birth_stiffness(event)
+         schedule%birth_delay(event) = self%parameters%delay
+      end do
+      if (.not. allocated(self%births%delay)) return
+      do event = 1, size(contact)
+         schedule%birth_delay(event) = self%births%delay(contact(event))
+      end do
+   end subroutine list_births
+
+   !> Have the next births of some contacts drawn.
+   subroutine draw_births(self, contact)
+      class(individual_contacts_type), intent(inout) :: self
+      !> Numbers of the contacts
+      integer, intent(in) :: contact(:)
+
+      integer :: event
+
+      do event = 1, size(contact)
+         if (self%record(row_next, contact(event)) > 0.0_wp) cycle
+         call self%births%draw(self%parameters, self%record)
+         return
+      end do
+   end subroutine draw_births
+
+   !> Stiffness, limit and force of the next birth of a contact, which has been drawn.
+   pure subroutine give_birth(self, contact, mean_force, direction, stiffness, limit, force)
+      class(individual_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      !> Mean force of a contact when it attaches, including that of its neighbours [N], and the
+      !> sign of the velocity then
+      real(wp), intent(in) :: mean_force, direction
+      !> Stiffness [N/m], breaking stretch [m], force when it attaches [N]
+      real(wp), intent(out) :: stiffness, limit, force
+
+      call bear(self%parameters, self%record(row_next, contact), stiffness, limit)
+      force = mean_force
+      if (allocated(self%births%force)) force = mean_force + direction &
+         & * self%parameters%static_force &
+         & * (self%births%force(contact) - self%parameters%back_force_ratio)
+   end subroutine give_birth
+
    !> Update records and sums for the contacts that broke in a schedule.
    subroutine detach_listed(self, contact, schedule)
       !> The contacts
@@ -327,15 +377,18 @@ contains
       type(schedule_type), intent(in) :: schedule
 
       integer :: event
+      real(wp) :: delay
 
+      delay = self%parameters%delay
       do event = 1, schedule%broken
+         if (allocated(self%births%delay)) delay = self%births%delay(contact(event))
          self%record(row_stiffness, contact(event)) = 0.0_wp
          self%record(row_renewal, contact(event)) = self%record(row_renewal, contact(event)) &
             & + 1.0_wp
          call self%break_loss%add(0.5_wp * schedule%break_stiffness(event) &
             * (schedule%break_displacement(event) - schedule%break_origin(event))**2)
          call self%detached%push(contact(event), &
-            & schedule%break_time(event) + self%parameters%delay, schedule%break_drag(event))
+            & schedule%break_time(event) + delay, schedule%break_drag(event))
       end do
       self%breaks = self%breaks + schedule%broken
       self%stiffness = schedule%stiffness
@@ -537,6 +590,7 @@ contains
       call self%births%draw(self%parameters, self%record)
       call exchange_contacts(self, archive)
       call archive%exchange("record", self%record)
+      call self%births%exchange(archive)
       call self%detached%exchange(archive)
       call archive%exchange("stiffness", self%stiffness)
       call archive%exchange("offset", self%offset)

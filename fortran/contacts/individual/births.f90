@@ -1,7 +1,8 @@
 !> Births of contacts: thresholds are drawn, stiffness, breaking stretch and drag follow from them.
 !>
 !> Thresholds of the next births are drawn some at a time, which takes less time and gives the same
-!> numbers: each draw has a key of its own.
+!> numbers: each draw has a key of its own. So are delays and forces at attaching, if they differ
+!> between contacts.
 module mesoslip_contacts_individual_births
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
@@ -10,12 +11,14 @@ module mesoslip_contacts_individual_births
    use mesoslip_contacts_mechanics, only: coupling_scaled, delay_exponential, initial_steady, &
       & initial_uniform
    use mesoslip_contacts_threshold_laws_gaussian, only: inverse_normal
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_random, only: uniform_pair, uniform_pairs
    implicit none
    private
 
-   public :: births_type, bear, delay_of, drag_of, draw_newborn
+   public :: births_type, bear, drag_of
 
    !> Draws that are made together
    integer, parameter :: draws_together = 32
@@ -28,16 +31,44 @@ module mesoslip_contacts_individual_births
       !> contacts from 0, and their renewals then
       integer, private :: count = 0
       integer(i8), private :: key(draws_together) = 0_i8, renewal(draws_together) = 0_i8
+      !> Delay of each contact before its next birth [s], if they differ, and its force then, over
+      !> the mean threshold, positive in the direction of motion, if that has a width; shape (count)
+      real(wp), allocatable :: delay(:), force(:)
    contains
+      !> Allocate what is drawn for each contact
+      procedure, non_overridable :: allocate_draws
       !> Draw all contacts for the start of a run
       procedure, non_overridable :: draw_all
       !> Have the threshold of a contact at its next birth drawn, with those of others
       procedure, non_overridable :: request
       !> Draw the thresholds that are still to be drawn
       procedure, non_overridable :: draw
+      !> Write what has been drawn to an archive, or read it
+      procedure, non_overridable :: exchange
    end type births_type
 
 contains
+
+   !> Allocate what is drawn for each contact apart from thresholds.
+   subroutine allocate_draws(self, parameters, error)
+      !> The births
+      class(births_type), intent(inout) :: self
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
+
+      stat = 0
+      if (parameters%delay_law == delay_exponential) then
+         allocate (self%delay(parameters%count), source=0.0_wp, stat=stat)
+      end if
+      if (stat == 0 .and. parameters%newborn_width > 0.0_wp) then
+         allocate (self%force(parameters%count), source=0.0_wp, stat=stat)
+      end if
+      if (stat /= 0) call raise(error, status_memory, "not enough memory for births of contacts")
+   end subroutine allocate_draws
 
    !> Draw all contacts for the start of a run.
    subroutine draw_all(self, parameters, state, record)
@@ -128,7 +159,9 @@ contains
       if (self%count == draws_together) call self%draw(parameters, record)
    end subroutine request
 
-   !> Draw the thresholds that are still to be drawn.
+   !> Draw what is still to be drawn.
+   !>
+   !> The second deviate of a birth is that of the delay before it: the first is its threshold's.
    subroutine draw(self, parameters, record)
       !> The births
       class(births_type), intent(inout) :: self
@@ -145,6 +178,18 @@ contains
          call uniform_pairs(parameters%seed, parameters%realization, self%key(:count), &
             & self%renewal(:count), 0_i8, first(:count), second(:count))
          call parameters%law%quantiles(first(:count), threshold(:count))
+         if (allocated(self%delay)) then
+            do event = 1, count
+               self%delay(self%key(event) + 1_i8) = -parameters%delay * log(second(event))
+            end do
+         end if
+         if (allocated(self%force)) then
+            call draw_forces(parameters, self%key(:count), self%renewal(:count), &
+               & threshold(:count), first(:count))
+            do event = 1, count
+               self%force(self%key(event) + 1_i8) = first(event)
+            end do
+         end if
          do event = 1, count
             record(row_next, self%key(event) + 1_i8) = threshold(event)
          end do
@@ -166,52 +211,47 @@ contains
       limit = threshold * parameters%static_force / stiffness
    end subroutine bear
 
-   !> Draw the force with which a contact attaches, from a normal law.
+   !> Draw the forces with which contacts attach, from a normal law.
    !>
    !> A contact whose force is not below its threshold could not attach: both are drawn again.
-   pure subroutine draw_newborn(parameters, contact, renewal, threshold, force)
+   subroutine draw_forces(parameters, key, renewal, threshold, force)
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters
-      !> Number of the contact, and how often it has been born before
-      integer, intent(in) :: contact
-      real(wp), intent(in) :: renewal
-      !> Relative threshold that was drawn, and that with which it attaches
-      real(wp), intent(inout) :: threshold
-      !> Relative force, positive in the direction of motion
-      real(wp), intent(out) :: force
+      !> Keys of the contacts, which count from 0, and numbers of their births; shape (contacts)
+      integer(i8), intent(in), contiguous :: key(:), renewal(:)
+      !> Relative thresholds that were drawn, and those with which the contacts attach
+      real(wp), intent(inout), contiguous :: threshold(:)
+      !> Relative forces, positive in the direction of motion
+      real(wp), intent(out), contiguous :: force(:)
 
-      real(wp) :: uniform(2)
+      real(wp) :: uniform(2), first(size(key)), second(size(key))
       integer(i8) :: attempt
+      integer :: birth
 
-      do attempt = force_attempt, 1_i8, -1_i8
-         call uniform_pair(parameters%seed, parameters%realization, int(contact - 1, i8), &
-            & int(renewal, i8), attempt, uniform)
-         if (attempt < force_attempt) threshold = parameters%law%quantile(uniform(1))
-         force = parameters%back_force_ratio + parameters%newborn_width * inverse_normal(uniform(2))
-         if (abs(force) < threshold) return
+      call uniform_pairs(parameters%seed, parameters%realization, key, renewal, force_attempt, &
+         & first, second)
+      do birth = 1, size(key)
+         force(birth) = force_of(second(birth))
+         do attempt = force_attempt - 1_i8, 1_i8, -1_i8
+            if (abs(force(birth)) < threshold(birth)) exit
+            call uniform_pair(parameters%seed, parameters%realization, key(birth), &
+               & renewal(birth), attempt, uniform)
+            threshold(birth) = parameters%law%quantile(uniform(1))
+            force(birth) = force_of(uniform(2))
+         end do
       end do
-   end subroutine draw_newborn
 
-   !> Time between detaching and attaching of a contact that has broken.
-   !>
-   !> The second deviate of the birth that comes is that of the delay: the first is its threshold's.
-   pure function delay_of(parameters, contact, renewal) result(delay)
-      !> What the contacts are made of
-      type(contact_parameters_type), intent(in) :: parameters
-      !> Number of the contact, and how often it has been born before the birth that comes
-      integer, intent(in) :: contact
-      real(wp), intent(in) :: renewal
-      !> Delay [s]
-      real(wp) :: delay
+   contains
 
-      real(wp) :: uniform(2)
+      !> Relative force of a uniform deviate.
+      pure real(wp) function force_of(deviate)
+         real(wp), intent(in) :: deviate
 
-      delay = parameters%delay
-      if (parameters%delay_law /= delay_exponential) return
-      call uniform_pair(parameters%seed, parameters%realization, int(contact - 1, i8), &
-         & int(renewal, i8), 0_i8, uniform)
-      delay = -delay * log(uniform(2))
-   end function delay_of
+         force_of = parameters%back_force_ratio &
+            & + parameters%newborn_width * inverse_normal(deviate)
+      end function force_of
+
+   end subroutine draw_forces
 
    !> Drag of a contact while it is detached.
    pure function drag_of(parameters, stiffness) result(drag)
@@ -227,5 +267,16 @@ contains
          drag = drag * (stiffness / parameters%stiffness)**2
       end if
    end function drag_of
+
+   !> Write what has been drawn to an archive, or read it.
+   subroutine exchange(self, archive)
+      !> The births, none of which is still to be drawn
+      class(births_type), intent(inout) :: self
+      !> The archive
+      type(archive_type), intent(inout) :: archive
+
+      if (allocated(self%delay)) call archive%exchange("next_delay", self%delay)
+      if (allocated(self%force)) call archive%exchange("next_force", self%force)
+   end subroutine exchange
 
 end module mesoslip_contacts_individual_births

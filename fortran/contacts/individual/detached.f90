@@ -1,7 +1,8 @@
 !> Detached contacts in the order in which they attach again.
 !>
 !> Where all wait for the same delay the order is that of breaking: a ring. Where each has a delay
-!> of its own they are a binary heap, which uses the same arrays from their start.
+!> of its own, the next ones are a sorted list, and those after them a binary heap, which uses the
+!> arrays of the ring from their start.
 module mesoslip_contacts_individual_detached
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -13,6 +14,8 @@ module mesoslip_contacts_individual_detached
 
    !> Numbers kept for a contact: when it attaches again [s], its drag until then [N s/m]
    integer, parameter :: length = 2, row_due = 1, row_drag = 2
+   !> Contacts that are moved from the heap to the sorted list at once, and maximum length of that
+   integer, parameter :: moved_together = 96, max_sorted = 256
 
    !> The detached contacts.
    type :: detached_contacts_type
@@ -28,18 +31,23 @@ module mesoslip_contacts_individual_detached
       !> (length, capacity)
       integer, allocatable, private :: contact(:)
       real(wp), allocatable, private :: value(:, :)
+      !> The sorted list from its first position to its last one: the same of each
+      integer, private :: sorted_first = 1, sorted_last = 0
+      integer, private :: sorted_contact(max_sorted) = 0
+      real(wp), private :: sorted_value(length, max_sorted) = 0.0_wp
    contains
       !> Put a contact in
       procedure, non_overridable :: push
       !> The contact that attaches next
-      procedure, non_overridable :: next_contact
+      procedure, non_overridable :: find_next
       !> Take the contact out that attaches next
       procedure, non_overridable :: pop
       !> The next contacts and their times
       procedure, non_overridable :: preview
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
-      procedure, non_overridable, private :: sift_up, sift_down
+      procedure, non_overridable, private :: sift_up, sift_down, heap_count, push_heap, &
+         & push_sorted, sort_next, heap_all
    end type detached_contacts_type
 
 contains
@@ -76,25 +84,150 @@ contains
 
       integer :: position
 
-      position = self%first + self%count
-      if (position >= self%capacity) position = position - self%capacity
-      self%contact(position + 1) = contact
-      self%value(row_due, position + 1) = due
-      self%value(row_drag, position + 1) = drag
-      self%count = self%count + 1
-      if (.not. self%in_order) call self%sift_up()
-      if (self%attach) self%next_due = self%value(row_due, self%first + 1)
+      if (self%in_order) then
+         position = self%first + self%count
+         if (position >= self%capacity) position = position - self%capacity
+         self%contact(position + 1) = contact
+         self%value(row_due, position + 1) = due
+         self%value(row_drag, position + 1) = drag
+         self%count = self%count + 1
+         if (self%attach) self%next_due = self%value(row_due, self%first + 1)
+      else
+         if (self%heap_count() == self%count) then
+            call self%push_heap(contact, [due, drag])
+         else if (due >= self%sorted_value(row_due, self%sorted_last)) then
+            call self%push_heap(contact, [due, drag])
+         else
+            call self%push_sorted(contact, [due, drag])
+         end if
+         self%count = self%count + 1
+         if (self%attach) self%next_due = min(self%next_due, due)
+      end if
    end subroutine push
 
-   !> The contact that attaches next.
-   pure function next_contact(self) result(contact)
-      !> The detached contacts, at least one
+   !> Number of contacts in the heap.
+   elemental function heap_count(self) result(number)
       class(detached_contacts_type), intent(in) :: self
-      !> Its number
-      integer :: contact
+      integer :: number
 
-      contact = self%contact(self%first + 1)
-   end function next_contact
+      number = self%count - (self%sorted_last - self%sorted_first + 1)
+   end function heap_count
+
+   !> Put a contact into the heap, before it is counted.
+   pure subroutine push_heap(self, contact, value)
+      class(detached_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> What is kept for it
+      real(wp), intent(in) :: value(length)
+
+      integer :: place
+
+      place = self%heap_count() + 1
+      self%contact(place) = contact
+      self%value(:, place) = value
+      call self%sift_up(place)
+   end subroutine push_heap
+
+   !> Put a contact into the sorted list, before it is counted, if it is not after all of that.
+   pure subroutine push_sorted(self, contact, value)
+      class(detached_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> What is kept for it
+      real(wp), intent(in) :: value(length)
+
+      integer :: place, number, moved
+      real(wp) :: last(length)
+
+      if (self%sorted_first > 1) then
+         ! The contacts before it move down.
+         place = self%sorted_first - 1
+         do while (self%sorted_value(row_due, place + 1) <= value(row_due))
+            self%sorted_contact(place) = self%sorted_contact(place + 1)
+            self%sorted_value(:, place) = self%sorted_value(:, place + 1)
+            place = place + 1
+         end do
+         self%sorted_first = self%sorted_first - 1
+      else
+         if (self%sorted_last == max_sorted) then
+            ! The last one goes to the heap.
+            moved = self%sorted_contact(max_sorted)
+            last = self%sorted_value(:, max_sorted)
+            self%sorted_last = max_sorted - 1
+            number = self%count
+            self%count = number - 1
+            call self%push_heap(moved, last)
+            self%count = number
+         end if
+         place = self%sorted_last + 1
+         do while (place > self%sorted_first)
+            if (self%sorted_value(row_due, place - 1) <= value(row_due)) exit
+            self%sorted_contact(place) = self%sorted_contact(place - 1)
+            self%sorted_value(:, place) = self%sorted_value(:, place - 1)
+            place = place - 1
+         end do
+         self%sorted_last = self%sorted_last + 1
+      end if
+      self%sorted_contact(place) = contact
+      self%sorted_value(:, place) = value
+   end subroutine push_sorted
+
+   !> Move the next contacts from the heap to the end of the sorted list.
+   pure subroutine sort_next(self)
+      class(detached_contacts_type), intent(inout) :: self
+
+      integer :: number, left, moved
+
+      number = self%sorted_last - self%sorted_first + 1
+      if (self%sorted_first > 1) then
+         self%sorted_contact(:number) = self%sorted_contact(self%sorted_first:self%sorted_last)
+         self%sorted_value(:, :number) = self%sorted_value(:, self%sorted_first:self%sorted_last)
+         self%sorted_first = 1
+         self%sorted_last = number
+      end if
+      left = self%heap_count()
+      do moved = 1, min(moved_together, left, max_sorted - number)
+         self%sorted_last = self%sorted_last + 1
+         self%sorted_contact(self%sorted_last) = self%contact(1)
+         self%sorted_value(:, self%sorted_last) = self%value(:, 1)
+         self%contact(1) = self%contact(left)
+         self%value(:, 1) = self%value(:, left)
+         left = left - 1
+         if (left > 0) call self%sift_down(left)
+      end do
+   end subroutine sort_next
+
+   !> Put all contacts into the heap.
+   pure subroutine heap_all(self)
+      class(detached_contacts_type), intent(inout) :: self
+
+      integer :: position, number
+
+      if (self%in_order) return
+      number = self%count
+      do position = self%sorted_last, self%sorted_first, -1
+         self%sorted_last = position - 1
+         self%count = self%count - 1
+         call self%push_heap(self%sorted_contact(position), self%sorted_value(:, position))
+         self%count = number
+      end do
+      self%sorted_first = 1
+      self%sorted_last = 0
+   end subroutine heap_all
+
+   !> The contact that attaches next.
+   pure subroutine find_next(self, contact)
+      !> The detached contacts, at least one
+      class(detached_contacts_type), intent(inout) :: self
+      !> Its number
+      integer, intent(out) :: contact
+
+      if (self%in_order) then
+         contact = self%contact(self%first + 1)
+      else
+         if (self%sorted_last < self%sorted_first) call self%sort_next()
+         contact = self%sorted_contact(self%sorted_first)
+      end if
+   end subroutine find_next
 
    !> Take the contact out that attaches next.
    pure subroutine pop(self, contact, drag)
@@ -104,29 +237,35 @@ contains
       integer, intent(out) :: contact
       real(wp), intent(out) :: drag
 
-      contact = self%contact(self%first + 1)
-      drag = self%value(row_drag, self%first + 1)
-      self%count = self%count - 1
+      call self%find_next(contact)
       if (self%in_order) then
+         drag = self%value(row_drag, self%first + 1)
+         self%count = self%count - 1
          self%first = self%first + 1
          if (self%first == self%capacity) self%first = 0
+         self%next_due = huge(1.0_wp)
+         if (self%count > 0) self%next_due = self%value(row_due, self%first + 1)
       else
-         self%contact(1) = self%contact(self%count + 1)
-         self%value(:, 1) = self%value(:, self%count + 1)
-         call self%sift_down()
+         drag = self%sorted_value(row_drag, self%sorted_first)
+         self%count = self%count - 1
+         self%sorted_first = self%sorted_first + 1
+         self%next_due = huge(1.0_wp)
+         if (self%count == 0) return
+         if (self%sorted_last < self%sorted_first) call self%sort_next()
+         self%next_due = self%sorted_value(row_due, self%sorted_first)
       end if
-      self%next_due = huge(1.0_wp)
-      if (self%count > 0) self%next_due = self%value(row_due, self%first + 1)
    end subroutine pop
 
    !> Move the last contact of the heap up to its place.
-   pure subroutine sift_up(self)
+   pure subroutine sift_up(self, last)
       class(detached_contacts_type), intent(inout) :: self
+      !> Its place now
+      integer, intent(in) :: last
 
       integer :: place, above, contact
       real(wp) :: kept(length)
 
-      place = self%count
+      place = last
       contact = self%contact(place)
       kept = self%value(:, place)
       do while (place > 1)
@@ -141,8 +280,10 @@ contains
    end subroutine sift_up
 
    !> Move the first contact of the heap down to its place.
-   pure subroutine sift_down(self)
+   pure subroutine sift_down(self, number)
       class(detached_contacts_type), intent(inout) :: self
+      !> Contacts in the heap
+      integer, intent(in) :: number
 
       integer :: place, below, contact
       real(wp) :: kept(length)
@@ -152,8 +293,8 @@ contains
       kept = self%value(:, place)
       do
          below = 2 * place
-         if (below > self%count) exit
-         if (below < self%count) then
+         if (below > number) exit
+         if (below < number) then
             if (self%value(row_due, below + 1) < self%value(row_due, below)) below = below + 1
          end if
          if (kept(row_due) <= self%value(row_due, below)) exit
@@ -167,8 +308,8 @@ contains
 
    !> The next contacts to attach, and their times.
    pure subroutine preview(self, limit, number, contact, due, drag)
-      !> The detached contacts, which all wait for the same delay
-      class(detached_contacts_type), intent(in) :: self
+      !> The detached contacts
+      class(detached_contacts_type), intent(inout) :: self
       !> Maximum number
       integer, intent(in) :: limit
       !> How many they are
@@ -183,6 +324,21 @@ contains
 
       number = 0
       if (self%attach) number = min(limit, self%count)
+      due(number + 1) = huge(1.0_wp)
+      if (.not. self%in_order) then
+         if (number == 0) return
+         position = self%sorted_last - self%sorted_first + 1
+         if (position <= number .and. self%heap_count() > 0) call self%sort_next()
+         do event = 1, number
+            position = self%sorted_first + event - 1
+            contact(event) = self%sorted_contact(position)
+            due(event) = self%sorted_value(row_due, position)
+            drag(event) = self%sorted_value(row_drag, position)
+         end do
+         if (self%count > number) due(number + 1) = &
+            & self%sorted_value(row_due, self%sorted_first + number)
+         return
+      end if
       position = self%first
       do event = 1, number
          contact(event) = self%contact(position + 1)
@@ -191,7 +347,6 @@ contains
          position = position + 1
          if (position == self%capacity) position = 0
       end do
-      due(number + 1) = huge(1.0_wp)
       if (self%attach .and. self%count > number) due(number + 1) = self%value(row_due, position + 1)
    end subroutine preview
 
@@ -202,6 +357,7 @@ contains
       !> The archive
       type(archive_type), intent(inout) :: archive
 
+      call self%heap_all()
       call archive%exchange("detached", self%value)
       call archive%exchange("detached_contact", self%contact)
       call archive%exchange("detached_contacts", self%count)

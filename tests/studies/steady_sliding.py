@@ -4,6 +4,9 @@ Three comparisons, whose numbers stand in ``docs/steady-sliding.md``::
 
     .venv/bin/python tests/studies/steady_sliding.py response      # of a shaken slider
     .venv/bin/python tests/studies/steady_sliding.py growth        # of a rigid slider's motion
+    .venv/bin/python tests/studies/steady_sliding.py random        # with exponential delays
+    .venv/bin/python tests/studies/steady_sliding.py thermal       # with temperature
+    .venv/bin/python tests/studies/steady_sliding.py ageing        # of contacts that age
     .venv/bin/python tests/studies/steady_sliding.py map [figure]  # the boundary, and runs
 """
 
@@ -16,7 +19,8 @@ from typing import Any
 import mesoslip
 import numpy as np
 from mesoslip import Config, SteadySliding
-from mesoslip.theory.steady_sliding import OUT_OF_STEP
+from mesoslip.theory.linear_stability import OUT_OF_STEP
+from mesoslip.theory.steady_sliding import sliding_of
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -153,6 +157,49 @@ def compare_growth_with_random_delays() -> None:
         print_growth(97.0, delay, 100e-6, velocity, delay_law="exponential")
 
 
+def compare_growth_with_temperature() -> None:
+    """The same with thermally activated breaking, and delays of both laws."""
+    for delay_law, ratio, stiffness, delay, begin, velocity in [
+        ("fixed", 0.01, 97.0, 1e-4, 60e-6, 20e-6),
+        ("fixed", 0.03, 97.0, 1e-4, 60e-6, 10e-6),
+        ("fixed", 0.03, 97.0, 1e-4, 60e-6, 30e-6),
+        ("fixed", 0.03, 97.0, 3e-4, 60e-6, 20e-6),
+        ("fixed", 0.1, 97.0, 1e-4, 60e-6, 10e-6),
+        ("fixed", 0.1, 97.0, 3e-4, 60e-6, 20e-6),
+        ("fixed", 0.1, 97.0, 1e-3, 60e-6, 30e-6),
+        ("fixed", 0.1, 400.0, 3e-4, 60e-6, 10e-6),
+        ("exponential", 0.03, 97.0, 1e-4, 60e-6, 10e-6),
+        ("exponential", 0.1, 97.0, 3e-4, 60e-6, 20e-6),
+        ("exponential", 0.1, 97.0, 3e-4, 60e-6, 40e-6),
+    ]:
+        print(f"{delay_law}, f_T = {ratio:g} f_s: ", end="")
+        thermal = {"rate": 1e4, "force_ratio": ratio}
+        contacts = {"coupling": "equal", "delay_law": delay_law, "thermal": thermal}
+        print_growth(stiffness, delay, begin, velocity, **contacts)
+
+
+def compare_growth_with_ageing() -> None:
+    """The same for contacts that age, without temperature."""
+    log = {"law": "log", "time": 1e-4, "growth": 0.02}
+    relax = {
+        "law": "relax",
+        "time": 1e-3,
+        "young_force_ratio": 0.9,
+        "young_relative_width": 0.25,
+    }
+    for ageing, delay, velocity in [
+        (log, 0.0, 40e-6),
+        (log, 0.0, 20e-6),
+        (log, 1e-4, 40e-6),
+        (relax, 0.0, 40e-6),
+        (relax, 0.0, 20e-6),
+        (relax, 1e-4, 40e-6),
+    ]:
+        print(f"{ageing['law']}: ", end="")
+        contacts = {"coupling": "equal", "ageing": ageing}
+        print_growth(97.0, delay, 100e-6, velocity, **contacts)
+
+
 def print_growth(
     stiffness: float, delay: float, begin: float, velocity: float, **contacts: Any
 ) -> None:
@@ -161,8 +208,7 @@ def print_growth(
     alone = Config.from_dict(
         {**tables(**changes, run={"duration": 1.0}), "drive": {"velocity": velocity}}
     )
-    sliding = SteadySliding(alone)
-    root = sliding.leading_root
+    root = sliding_of(alone).leading_root
     assert root is not None
     ramp = np.linspace(begin, velocity, RAMP_STEPS)
     stages = [{"duration": 0.5, "velocity": begin}]
@@ -293,4 +339,6 @@ if __name__ == "__main__":
             "response": compare_responses,
             "growth": compare_growth,
             "random": compare_growth_with_random_delays,
+            "thermal": compare_growth_with_temperature,
+            "ageing": compare_growth_with_ageing,
         }[sys.argv[1]]()

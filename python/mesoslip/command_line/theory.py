@@ -142,8 +142,8 @@ def _digits(name: str, curve: ForceCurve) -> int:
 def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     """Print the stiffnesses of the spring above which sliding is stable, in each sense."""
     from mesoslip.quantities import percent, with_unit
-    from mesoslip.theory.linear_stability import SHOWN_BY
-    from mesoslip.theory.steady_sliding import OUT_OF_STEP, stiffness_limits
+    from mesoslip.theory.linear_stability import OUT_OF_STEP, SHOWN_BY
+    from mesoslip.theory.steady_sliding import stiffness_limits
 
     limits = stiffness_limits(config, MAX_WORK)
     if limits is None:

@@ -16,7 +16,7 @@ from mesoslip.output.variables import BRANCHES
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.cycles.cycle import Cycle
-    from mesoslip.theory.steady_sliding import SteadySliding
+    from mesoslip.theory.linear_stability import LinearStability
 
 MOTIONS = ("smooth", "periodic", "irregular")
 DIRECTIONS = ("up", "down")
@@ -27,7 +27,7 @@ def dataset_of(
     key: str,
     values: Sequence[float],
     found: Sequence[Sequence[Cycle]],
-    sliding: Sequence[SteadySliding | None],
+    sliding: Sequence[LinearStability | None],
 ) -> xr.Dataset:
     """The branches as a dataset.
 

@@ -33,6 +33,9 @@ COARSENESS = 4.0
 FAST = 20.0
 # The same over v and the width of thresholds that are reached, by more than this share.
 OUT_OF_PHASE, HARDLY = 6.0, 1e-6
+# Thresholds times panels for a point of the path that count as a unit of work: ten thousand units
+# take about a second here, a tenth of that without temperature.
+PANELS_A_UNIT = 50.0
 # Maximum number of panels over thresholds that are reached.
 MAX_THRESHOLD_PANELS = 400
 # Rate over that of breaking at which the response is nearly linear.
@@ -167,7 +170,7 @@ class ActivatedSliding(LinearStability):
         return np.concatenate([[0.0], np.geomspace(low, last, count)])
 
     @property
-    def _is_passive(self) -> bool:
+    def is_passive(self) -> bool:
         return False
 
     @property
@@ -246,27 +249,31 @@ class ActivatedSliding(LinearStability):
         return whole
 
     @property
-    def is_stable_out_of_step(self) -> bool:
-        """As `is_stable`: activation spreads the lives of contacts."""
-        return self.is_stable
+    def work(self) -> int:
+        if not self._has_motion:
+            return 0
+        # Panels in which contacts of each threshold break.
+        edges = self.lives.edges[:, 1:]
+        panels = float(np.sum(edges[:, -1] - edges[:, 0])) * self._breaking_rate / COARSENESS
+        return round(len(self._path) * panels / PANELS_A_UNIT)
+
+    @property
+    def _ingredients(self) -> str:
+        contacts = self.config.contacts
+        return "temperature" + (" and ageing" if contacts.ageing is not None else "")
 
     @property
     def summary(self) -> str | None:
-        if not self._has_motion:
+        known = super().summary
+        if known is None:
             return None
-        where = f"steady sliding at {with_unit(self.velocity, 'm/s', 3)}"
         change = "strengthens" if self.slope > 0 else "weakens"
         limit = self.critical_stiffness
         if limit is None:
-            return (
-                f"{where} {change} with velocity and is linearly stable with any spring. Large "
-                "oscillations, as after the first slip, may persist: only a run shows"
-            )
+            return f"{known}. It {change} with velocity, and is linearly stable with any spring"
         stiffness, frequency = limit
-        is_stiffer = self._spring > stiffness
         return (
-            f"{where} {change} with velocity and is linearly stable with springs stiffer than "
-            f"{with_unit(stiffness, 'N/m', 3)} (there it oscillates at "
-            f"{with_unit(frequency / (2 * math.pi), '1/s', 3)}): "
-            + ("small perturbations decay" if is_stiffer else "with this one it is unstable")
+            f"{known}. It {change} with velocity, and is linearly stable with springs stiffer than "
+            f"{with_unit(stiffness, 'N/m', 3)}, with which it oscillates at "
+            f"{with_unit(frequency / (2 * math.pi), 'Hz', 3)}"
         )

@@ -135,7 +135,9 @@ def lives(config: Config, configured: Array, speed: float, older: float = 0.0) -
     upper = np.ones_like(configured) / speed
     while np.any(gap(upper, configured) > 0):
         upper = np.where(gap(upper, configured) > 0, 2 * upper, upper)
-    lives: Array = find_root(
-        gap, (np.zeros_like(upper), upper), args=(configured,), tolerances={"xrtol": 1e-14}
-    ).x
+    # Interpolation that leaves the bracket is not a number, and is not used.
+    with np.errstate(invalid="ignore"):
+        lives: Array = find_root(
+            gap, (np.zeros_like(upper), upper), args=(configured,), tolerances={"xrtol": 1e-14}
+        ).x
     return lives

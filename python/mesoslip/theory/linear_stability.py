@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.errors import ConfigError, Problem, RunError
-from mesoslip.quantities import with_unit
+from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
+# Points of the path along which roots are counted, for each turn of its fastest factor.
+POINTS_A_TURN = 10
+# Maximum angle between the slider's function and its leading power where the path ends.
+UNLIKE_POWER = 0.3
 # Maximum change of the argument between two points of the path along which roots are counted, and
 # maximum number of halvings of an interval.
 MAX_TURN = 0.8
@@ -45,6 +49,8 @@ MAX_CANDIDATES = 40
 # Maximum number of layers whose frequencies the points of the path resolve.
 MAX_LAYERS = 16
 
+# Relative width of thresholds with which contacts do not break in step.
+OUT_OF_STEP = 0.5
 # What linear theory leaves open, of a stable and of an unstable motion.
 SHOWN_BY = "only a run or mesoslip cycle shows it"
 OTHER_MOTION = f"A large oscillation may be possible too: {SHOWN_BY}"
@@ -121,15 +127,34 @@ class LinearStability(abc.ABC):
     def slope(self) -> float:
         """dF/dv [N s/m]: below zero sliding is weaker the faster it is."""
 
-    @property
-    @abc.abstractmethod
+    @cached_property
     def is_stable_out_of_step(self) -> bool:
-        """Whether no perturbation grows for contacts whose lives differ widely."""
+        """Whether no perturbation grows for contacts whose lives differ by half a breaking stretch.
+
+        A large oscillation itself spreads lives by as much. That an instability which needs
+        contacts in step stays small is a heuristic, with exceptions (``docs/steady-sliding.md``).
+        """
+        wide = self._with_wide_thresholds()
+        return self.is_stable if wide is None else type(self)(wide, self.velocity).is_stable
+
+    def _with_wide_thresholds(self) -> Config | None:
+        """The configuration with thresholds out of step; None if they are as wide already."""
+        threshold, law = self.config.contacts.threshold, self.config.contacts.ageing
+        if threshold.relative_width >= OUT_OF_STEP or threshold.kind.is_sampled:
+            return None
+        changes: dict[str, object] = {"contacts.threshold.relative_width": OUT_OF_STEP}
+        if law is not None and law.young_relative_width is not None:
+            width = max(law.young_relative_width, OUT_OF_STEP)
+            changes["contacts.ageing.young_relative_width"] = width
+        try:
+            return self.config.replace(changes)
+        except ConfigError:
+            return None
 
     @property
     @abc.abstractmethod
-    def summary(self) -> str | None:
-        """What linear theory states, and what it leaves open; None for a slider without inertia."""
+    def _ingredients(self) -> str:
+        """What the theory has that the force curve does not, in words."""
 
     @abc.abstractmethod
     def _parts(self, rate: Complex) -> Parts:
@@ -142,7 +167,7 @@ class LinearStability(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def _is_passive(self) -> bool:
+    def is_passive(self) -> bool:
         """Whether the force of steady contacts does not depend on the motion of the slider."""
 
     def response(self, frequency: ArrayLike) -> Complex:
@@ -192,6 +217,34 @@ class LinearStability(abc.ABC):
         """Whether the slider has a motion of its own that the contacts may feed."""
         rate = np.array([1j * self._scale])
         return dynamic_stiffness(self.config.slider, rate) is not None
+
+    def _resolved_path(self, turn: float, spread: float) -> Array:
+        """A path that resolves lives of a mean with delay, and of a standard deviation [s]."""
+        # Beyond the last frequency the slider outweighs any response of the contacts.
+        coarse = self._scale * np.geomspace(1e-2, 1e6, 1500)
+        rate = 1j * coarse
+        slider = dynamic_stiffness(self.config.slider, rate)
+        assert slider is not None
+        parts = self._parts(rate)
+        whole = np.abs(slider.numerator + slider.denominator * parts.free)
+        upper = np.abs(slider.denominator * parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
+        weak = np.flatnonzero(whole < 3 * upper)
+        last = coarse[weak[-1]] if weak.size else coarse[0]
+        # There it grows as the power of λ, off the axis as well, where no part is real.
+        slanting = np.exp(0.25j * math.pi)
+        free = dynamic_stiffness(self.config.slider, slanting * coarse)
+        assert free is not None
+        turn_left = np.angle(free.numerator * slanting**-free.degree)
+        unlike = np.flatnonzero(np.abs(turn_left) > UNLIKE_POWER)
+        last = 1.5 * max(last, coarse[unlike[-1]] if unlike.size else coarse[0])
+        # Fast factors: e^(-s l) while lives are alike enough for it not to average out.
+        alike = min(last, 12 / spread)
+        fine = _spaced(0.0, alike, 2 * math.pi / (POINTS_A_TURN * turn))
+        late = 2 * math.pi / (POINTS_A_TURN * max(self.delay, 1e-300))
+        rest = _spaced(alike, last, late)
+        own = np.geomspace(1e-3 * self._scale, last, max(400, 100 * slider.degree))
+        frequencies: Array = np.unique(np.concatenate([[0.0], fine, rest, own[own <= last]]))
+        return frequencies
 
     def _right_of(self, real: float) -> int:
         """Number of roots with a real part above a positive one, by the argument principle.
@@ -245,7 +298,7 @@ class LinearStability(abc.ABC):
         RunError
             If that leaves the range of floating-point numbers.
         """
-        if not self._has_motion or self._is_passive:
+        if not self._has_motion or self.is_passive:
             return 0
         return self._right_of(NO_GROWTH * self._scale)
 
@@ -346,14 +399,46 @@ class LinearStability(abc.ABC):
 
         Ten thousand take about a tenth of a second.
         """
-        if not self._has_motion or self._is_passive:
+        if not self._has_motion or self.is_passive:
             return 0
         slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))
         assert slider is not None
         return len(self._path) * slider.degree
 
     @property
+    def summary(self) -> str | None:
+        """What linear theory states, and what it leaves open; None for a slider without inertia."""
+        if not self._has_motion:
+            return None
+        where = f"steady sliding at {with_unit(self.velocity, 'm/s', 3)}"
+        if self.is_passive:
+            return (
+                f"{where} is linearly stable, as there is no delay: the force of steady contacts "
+                f"does not depend on the motion of the slider. {OTHER_MOTION}"
+            )
+        if self.is_stable:
+            decay = with_unit(-self.growth_rate, "1/s", 3)
+            return (
+                f"{where} is linearly stable, with {self._ingredients}: small perturbations decay "
+                f"at {decay}. {OTHER_MOTION}"
+            )
+        other = "but not" if self.is_stable_out_of_step else "also"
+        growth = with_unit(self.growth_rate, "1/s", 3)
+        return (
+            f"{where} is linearly unstable, with {self._ingredients}: {self._perturbation} grows "
+            f"at {growth}, {other} for contacts out of step (thresholds of "
+            f"{percent(OUT_OF_STEP)}). {NO_AMPLITUDE}"
+        )
+
+    @property
     def _perturbation(self) -> str:
         if not self.frequency > 0:
             return "a perturbation"
         return f"an oscillation of {with_unit(self.frequency / (2 * math.pi), 'Hz', 3)}"
+
+
+def _spaced(low: float, high: float, step: float) -> Array:
+    """Points between two limits, at most a step apart unless there would be too many."""
+    if high <= low:
+        return np.empty(0)
+    return np.linspace(low, high, min(math.ceil((high - low) / step) + 1, MAX_POINTS // 4))

@@ -20,16 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import ConfigError, Problem, RunError
-from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
 from mesoslip.theory.linear_stability import (
-    MAX_POINTS,
-    NO_AMPLITUDE,
-    OTHER_MOTION,
+    OUT_OF_STEP,
     LinearStability,
     Parts,
 )
-from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -37,19 +33,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-# Points of the path along which roots are counted, for each turn of its fastest factor.
-POINTS_A_TURN = 10
-# Maximum angle between the slider's function and its leading power where the path ends.
-UNLIKE_POWER = 0.3
-# Relative width of thresholds with which contacts do not break in step.
-OUT_OF_STEP = 0.5
 # Range of spring stiffnesses over that of all contacts in which the stable ones are sought.
 MAX_STIFFNESS, MIN_STIFFNESS = 16.0, 1e-4
 
-WITHOUT_AGEING = (
-    "has no linear stability theory here: contacts that age break at times that depend on the "
-    "history of the motion, so that the response has no closed form; only runs show the motion"
-)
+WITHOUT_AGEING = "has a response of its own: use mesoslip.theory.ageing_sliding.AgeingSliding"
 
 WITHOUT_ACTIVATION = (
     "has a response of its own: use mesoslip.theory.activated_sliding.ActivatedSliding"
@@ -135,80 +122,46 @@ class SteadySliding(LinearStability):
 
     @cached_property
     def _path(self) -> Array:
-        """Frequencies along which the argument of the characteristic function is computed."""
         lives = self.lives
         turn = lives.mean_life / self._rate + self.delay
-        # Beyond the last frequency the slider outweighs any response of the contacts.
-        coarse = self._scale * np.geomspace(1e-2, 1e6, 1500)
-        rate = 1j * coarse
-        slider = dynamic_stiffness(self.config.slider, rate)
-        assert slider is not None
-        parts = self._parts(rate)
-        whole = np.abs(slider.numerator + slider.denominator * parts.free)
-        upper = np.abs(slider.denominator * parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
-        weak = np.flatnonzero(whole < 3 * upper)
-        last = coarse[weak[-1]] if weak.size else coarse[0]
-        # There it grows as the power of λ, off the axis as well, where no part is real.
-        slanting = np.exp(0.25j * math.pi)
-        free = dynamic_stiffness(self.config.slider, slanting * coarse)
-        assert free is not None
-        turn_left = np.angle(free.numerator * slanting**-free.degree)
-        unlike = np.flatnonzero(np.abs(turn_left) > UNLIKE_POWER)
-        last = 1.5 * max(last, coarse[unlike[-1]] if unlike.size else coarse[0])
-        # Fast factors: e^(-s l) while lives are alike enough for it not to average out.
-        alike = min(last, 12 * self._rate / lives.spread)
-        fine = _spaced(0.0, alike, 2 * math.pi / (POINTS_A_TURN * turn))
-        late = 2 * math.pi / (POINTS_A_TURN * max(self.delay, 1e-300))
-        rest = _spaced(alike, last, late)
-        own = np.geomspace(1e-3 * self._scale, last, max(400, 100 * slider.degree))
-        frequencies: Array = np.unique(np.concatenate([[0.0], fine, rest, own[own <= last]]))
-        return frequencies
+        return self._resolved_path(turn, lives.spread / self._rate)
 
     @property
-    def _is_passive(self) -> bool:
+    def is_passive(self) -> bool:
         """Whether the force of steady contacts does not depend on the motion of the slider."""
         return self.delay == 0
 
     @cached_property
     def is_stable_out_of_step(self) -> bool:
-        """Whether no perturbation grows for contacts whose lives differ by half a breaking stretch.
-
-        A large oscillation itself spreads lives by as much. That an instability which needs
-        contacts in step stays small is a heuristic, with exceptions (``docs/steady-sliding.md``).
-        """
         if self.relative_width >= OUT_OF_STEP:
             return self.is_stable
         other = SteadySliding(self.config, self.velocity, relative_width=OUT_OF_STEP)
         return other.is_stable
 
     @property
-    def summary(self) -> str | None:
-        """What linear theory states, and what it leaves open; None for a slider without inertia."""
-        if not self._has_motion:
-            return None
-        where = f"steady sliding at {with_unit(self.velocity, 'm/s', 3)}"
-        if self.delay == 0:
-            return (
-                f"{where} is linearly stable, as there is no delay: the force of steady contacts "
-                f"does not depend on the motion of the slider. {OTHER_MOTION}"
-            )
-        if self.is_stable:
-            decay = with_unit(-self.growth_rate, "1/s", 3)
-            return (
-                f"{where} is linearly stable, with delay: small perturbations decay at {decay}. "
-                f"{OTHER_MOTION}"
-            )
-        other = "but not" if self.is_stable_out_of_step else "also"
-        growth = with_unit(self.growth_rate, "1/s", 3)
-        return (
-            f"{where} is linearly unstable, with delay: {self._perturbation} grows at {growth}, "
-            f"{other} for contacts out of step (thresholds of {percent(OUT_OF_STEP)}). "
-            f"{NO_AMPLITUDE}"
-        )
+    def _ingredients(self) -> str:
+        return "delay"
+
+
+def sliding_of(config: Config, velocity: float | None = None) -> LinearStability:
+    """Steady sliding of a configuration, by the theory that its contacts have.
+
+    Parameters and errors are those of `LinearStability`.
+    """
+    # scipy takes long to import.
+    if config.contacts.thermal is not None:
+        from mesoslip.theory.activated_sliding import ActivatedSliding
+
+        return ActivatedSliding(config, velocity)
+    if config.contacts.ageing is not None:
+        from mesoslip.theory.ageing_sliding import AgeingSliding
+
+        return AgeingSliding(config, velocity)
+    return SteadySliding(config, velocity)
 
 
 @lru_cache(maxsize=16)
-def steady_sliding(config: Config, max_work: int) -> SteadySliding | None:
+def steady_sliding(config: Config, max_work: int) -> LinearStability | None:
     """Steady sliding of a configuration; None without a theory, or if it takes more work.
 
     The latest results are cached, as several functions ask for the same configuration.
@@ -216,7 +169,7 @@ def steady_sliding(config: Config, max_work: int) -> SteadySliding | None:
     if config.interaction is not None and config.interaction.strength > 0:
         return None
     try:
-        sliding = SteadySliding(config)
+        sliding = sliding_of(config)
     except ConfigError:
         return None
     if sliding.work > max_work:
@@ -229,13 +182,6 @@ def steady_sliding(config: Config, max_work: int) -> SteadySliding | None:
     except RunError:
         return None
     return sliding
-
-
-def _spaced(low: float, high: float, step: float) -> Array:
-    """Points between two limits, at most a step apart unless there would be too many."""
-    if high <= low:
-        return np.empty(0)
-    return np.linspace(low, high, min(math.ceil((high - low) / step) + 1, MAX_POINTS // 4))
 
 
 def stability_boundary(
@@ -288,7 +234,7 @@ def stability_boundary(
 
 
 def _is_stable(config: Config, key: str, value: float, *, out_of_step: bool) -> bool:
-    sliding = SteadySliding(config.replace({key: value}))
+    sliding = sliding_of(config.replace({key: value}))
     return sliding.is_stable_out_of_step if out_of_step else sliding.is_stable
 
 
@@ -346,7 +292,7 @@ def stiffness_limits(config: Config, max_work: int) -> StiffnessLimits | None:
     """Stiffnesses above which steady sliding is stable; None if they take more than some ten times
     the work for one stiffness, or there are none."""
     sliding = steady_sliding(config, max_work // 10)
-    if sliding is None or sliding.delay == 0 or not 0 < config.spring_stiffness < math.inf:
+    if sliding is None or sliding.is_passive or not 0 < config.spring_stiffness < math.inf:
         return None
     try:
         stable = stable_stiffness(config)

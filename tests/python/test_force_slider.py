@@ -188,7 +188,12 @@ def test_a_slider_at_rest_up_to_rounding_follows_a_growing_force(seed):
     """It turns within the resolution of the time, which used to end the run without progress."""
     config = Config.load(ROOT / "runs" / "static-friction-rate.toml")
     tables = tomllib.loads(config.to_toml())
-    tables["drive"]["stage"] = tables["drive"]["stage"][5:]
+    tables["drive"]["stage"] = [
+        {"duration": 2.0, "force": 0.0},
+        {"duration": 1.0, "start_force": 0.0, "end_force": 10.8e-6},
+        {"duration": 2.0, "force": 0.0},
+        {"duration": 0.1, "start_force": 0.0, "end_force": 13e-6},
+    ]
     del tables["run"]["duration"]
     tables["run"] |= {"realizations": 1, "seed": seed}
     tree = mesoslip.run(Config.from_dict(tables))

@@ -6,11 +6,12 @@ import json
 import math
 
 import mesoslip
+import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config
 from mesoslip.analysis.response import rows_of, scalars_of
-from mesoslip.theory.thermal import creep_velocity, steady_slope
+from mesoslip.theory.thermal import creep_force, creep_velocity, steady_slope
 
 SLIDER = {"kind": "force", "mass": 1.47e-3, "damping": 500.0}
 
@@ -44,11 +45,53 @@ def test_creep_velocities_are_those_of_the_theory(creep, creeping):
     assert [row["force"] for row in rows] == pytest.approx([7.6e-6, 8.2e-6])
     for row in rows:
         expected = creep_velocity(creep, row["force"])
+        assert creep_force(creep, expected) == pytest.approx(row["force"])
         assert abs(row["velocity"] - expected) < 4 * row["velocity_error"] < 0.4 * expected
     slope = scalars_of(found, "creep")["creep_rate_dependence"]
     assert slope == pytest.approx(steady_slope(creep, rows[0]["velocity"]), rel=0.2)
     for name in ("steady", "steps", "holds", "ramps", "rate_and_state"):
         assert not rows_of(found, name)
+
+
+def test_one_force_has_no_slope_of_the_velocity(creep):
+    """Of two stages under one force, whose velocities differ by their noise."""
+    stages = [{"duration": 2.0, "force": 7.6e-6} for _ in range(2)]
+    changes = {"drive.stage": stages, "run.duration": 4.0, "contacts.count": 500}
+    found = mesoslip.response(mesoslip.run(creep.replace(changes)))
+    assert all(row["velocity"] > 2 * row["velocity_error"] for row in rows_of(found, "creep"))
+    assert math.isnan(scalars_of(found, "creep")["creep_rate_dependence"])
+    assert not rows_of(found, "restarts")
+
+
+def test_a_restart_takes_longer_after_a_longer_hold(creep):
+    """Thresholds have grown by g ln t, and rates are less by t^(-g/f_T)."""
+    force, stages = 7.5e-6, [{"duration": 3.0, "force": 7.5e-6}]
+    for hold in (0.1, 1.0, 10.0):
+        stages += [{"duration": hold, "force": 1e-6}, {"duration": 3.0, "force": force}]
+    changes = {
+        "drive.stage": stages,
+        "run.duration": sum(one["duration"] for one in stages),
+        "run.realizations": 2,
+        "contacts.count": 500,
+        "contacts.threshold.relative_width": 0.2,
+        "contacts.thermal": {"rate": 1e4, "force_ratio": 0.06},
+        "contacts.ageing": {"law": "log", "time": 1e-2, "growth": 0.03},
+    }
+    config = creep.replace(changes)
+    tree = mesoslip.run(config)
+    found = mesoslip.response(tree)
+    rows = rows_of(found, "restarts")
+    assert [row["hold_time"] for row in rows] == pytest.approx([0.1, 1.0, 10.0])
+    assert [row["force"] for row in rows_of(found, "creep")] == [force, *3 * [1e-6, force]]
+    assert {row["hold_force"] for row in rows} == {1e-6}
+    times = [row["restart_time"] for row in rows]
+    assert np.polyfit(np.log([0.1, 1.0, 10.0]), np.log(times), 1)[0] == pytest.approx(0.5, abs=0.1)
+    moved = [
+        np.interp(rows[0]["stage_start_time"] + times[0], tree["time"], one)
+        - np.interp(rows[0]["stage_start_time"], tree["time"], one)
+        for one in tree["displacement"].values
+    ]
+    assert np.mean(moved) == pytest.approx(config.contacts.break_stretch, rel=0.1)
 
 
 def test_the_regime_of_creep_is_smooth_and_said_in_words(creeping, tmp_path, command):

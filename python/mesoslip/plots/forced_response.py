@@ -12,14 +12,14 @@ from mesoslip.configuration.config import Config
 from mesoslip.plots.record import MAX_MARKS
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles
 from mesoslip.quantities import scale_for, with_error
-from mesoslip.theory.thermal import steady_force
+from mesoslip.theory.thermal import creep_force
 
 # Samples of the displacement that are drawn, and velocities of the theory.
 MAX_DOTS, THEORY_POINTS = 20_000, 30
 
 
 def draw_forced(tree: xr.DataTree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
-    """Displacement over time; creep velocities with F(v) of the theory; static friction.
+    """Displacement over time; creep velocities with those of the theory; static friction.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def _draw_displacement(axes: Axes, tree: xr.DataTree, experiment: Experiment) ->
 
 
 def _draw_creep(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
-    """Draw the force over the velocity of creep, and the steady force of the theory."""
+    """Draw the force over the velocity of creep, and the theory with the slider's damping."""
     velocity, force = data["velocity"].values, data["force"].values / experiment.static_force
     unit = scale_for(float(np.max(velocity)), "m/s")
     is_steady = data["is_steady"].values == 1
@@ -81,8 +81,8 @@ def _draw_creep(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
     config = experiment.config
     if config is not None and _is_known(config):
         grid = np.geomspace(0.5 * velocity.min(), 2 * velocity.max(), THEORY_POINTS)
-        theory = np.array([steady_force(config, one) for one in grid]) / experiment.static_force
-        axes.plot(grid / unit.size, theory, color=RED, label="steady force $F(v)$, theory")
+        theory = np.array([creep_force(config, one) for one in grid]) / experiment.static_force
+        axes.plot(grid / unit.size, theory, color=RED, label="$F(v)$ and damping, theory")
         axes.legend(loc="upper left")
     axes.set_xscale("log")
     line = creep_line(data)

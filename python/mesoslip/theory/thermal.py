@@ -99,6 +99,24 @@ def steady_slope(config: Config, velocity: float) -> float:
     return work_slope / life - work * life_slope / life**2
 
 
+def creep_force(config: Config, velocity: float) -> float:
+    """Force under which a slider creeps steadily: F(v) and its damping relative to the ground [N].
+
+    Parameters
+    ----------
+    config
+        A configuration with ``contacts.thermal``.
+    velocity
+        Positive [m/s].
+
+    Returns
+    -------
+    float
+        The force [N].
+    """
+    return steady_force(config, velocity) + _ground_damping(config) * velocity
+
+
 def creep_velocity(config: Config, force: float) -> float:
     """Velocity of steady creep under a constant force, the inverse of F(v) [m/s].
 

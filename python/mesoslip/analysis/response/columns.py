@@ -120,6 +120,20 @@ RAMPS = Group(
     note=_NOTE,
 )
 
+RESTARTS = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    stage_start_time=Meaning("s", "start of the stage"),
+    hold_time=Meaning("s", "duration of the smaller force before the stage"),
+    hold_force=Meaning("N", "smaller constant force before the stage"),
+    force=Meaning("N", "constant force on the slider"),
+    restart_time=Meaning(
+        "s", "time from the start of the stage until the slider has moved by the breaking stretch"
+    ),
+    restart_time_error=Meaning("s", "standard error of the restart time"),
+    note=_NOTE,
+)
+
 # Scalars of a group: those of the line through its rows.
 STEADY_LINE = Group(
     rate_dependence=Meaning("N", "slope of the steady force over ln V, a - b"),

@@ -21,6 +21,7 @@ from mesoslip.analysis.response.columns import (
     HEALING_LINE,
     HOLDS,
     RAMPS,
+    RESTARTS,
     STEADY,
     STEADY_LINE,
     STEPS,
@@ -28,6 +29,7 @@ from mesoslip.analysis.response.columns import (
 from mesoslip.analysis.response.forces import creep_line, creep_rows, friction_line, ramp_rows
 from mesoslip.analysis.response.holds import healing_line, hold_rows
 from mesoslip.analysis.response.line import Line
+from mesoslip.analysis.response.restarts import restart_rows
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
 from mesoslip.errors import FileError
@@ -64,9 +66,10 @@ def response(
         Groups ``steady``: the mean force of each stage at constant velocity, with its error;
         ``steps``: direct change, evolution change and relaxation displacement of each velocity
         step; ``holds``: relaxation, restart peak and healing of each hold; ``rate_and_state``:
-        a, b, D_c of each law, and whether the law describes the output; ``creep`` and ``ramps``: of
-        a slider under a force, its velocity in each stage of constant force, and the static
-        friction in each stage in which the force grows. Variables have units and long names.
+        a, b, D_c of each law, and whether the law describes the output; ``creep``, ``restarts`` and
+        ``ramps``: of a slider under a force, its velocity in each stage of constant force, the time
+        to each restart after a smaller force, and the static friction in each stage in which the
+        force grows. Variables have units and long names.
 
     Raises
     ------
@@ -112,7 +115,7 @@ def response_of(
     xarray.DataTree
         Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
         (``hold``), ``rate_and_state`` (``fit``, one for each output and law), ``creep``
-        (``force_stage``) and ``ramps`` (``ramp``).
+        (``force_stage``), ``restarts`` (``restart``) and ``ramps`` (``ramp``).
     """
     fits: list[dict[str, Any]] = []
     analysed = []
@@ -127,6 +130,7 @@ def response_of(
         "steps": [row for number, one in numbered for row in step_rows(one, number)],
         "holds": [row for number, one in numbered for row in hold_rows(one, number)],
         "creep": [row for number, one in numbered for row in creep_rows(one, number)],
+        "restarts": [row for number, one in numbered for row in restart_rows(one, number)],
         "ramps": [row for number, one in numbered for row in ramp_rows(one, number)],
     }
     steady = _dataset(STEADY, "velocity_stage", rows["steady"])
@@ -155,6 +159,7 @@ def response_of(
             creep.assign(_line_variables(CREEP_LINE, creep_line(creep))),
             Group(CREEP, **CREEP_LINE),
         ),
+        "restarts": (_dataset(RESTARTS, "restart", rows["restarts"]), RESTARTS),
         "ramps": (
             ramps.assign(_line_variables(FRICTION_LINE, friction_line(ramps))),
             Group(RAMPS, **FRICTION_LINE),
@@ -266,22 +271,24 @@ def write_csv(tree: xr.DataTree, path: Path) -> None:
     """Write a response as one table with a row for each stage.
 
     A stage at constant velocity has the columns of ``steady``, and those of ``steps`` if it starts
-    with a step; a hold has those of ``holds``, a constant force those of ``creep``, a growing one
-    those of ``ramps``. The notes on steps have a column of their own.
+    with a step; a hold has those of ``holds``, a constant force those of ``creep`` and, after a
+    smaller one, of ``restarts``, a growing one those of ``ramps``. The notes on steps and
+    restarts have columns of their own.
 
     Raises
     ------
     FileError
         If it cannot be written.
     """
+    own_notes = {"restarts": "restart_note", "steps": "step_note"}
     units: dict[str, str] = {}
     table: dict[tuple[int, int], dict[str, Any]] = {}
-    for name in ("steady", "holds", "creep", "ramps", "steps"):
+    for name in ("steady", "holds", "creep", "restarts", "ramps", "steps"):
         data = tree.children[name].to_dataset()
         for row in rows_of(tree, name):
             here = table.setdefault((row["output_index"], row["stage_number"]), {})
             for column, value in row.items():
-                key = f"step_{column}" if name == "steps" and column == "note" else column
+                key = own_notes.get(name, column) if column == "note" else column
                 here[key] = None if value != value else value
                 units[key] = data[column].attrs["units"]
     write_table([table[key] for key in sorted(table)], units, path)

@@ -17,6 +17,8 @@ from mesoslip.quantities import with_unit
 
 # Minimum share of the static force by which contacts bear less than the force on a sliding slider.
 MIN_DEFICIT = 0.02
+# Relative difference of forces that are equal up to the rounding of means.
+SAME_FORCE = 1e-9
 
 
 def creep_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
@@ -39,7 +41,7 @@ def creep_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
         row |= {
             "stage_start_time": stage.start,
             "duration": stage.duration,
-            "force": float(experiment.force[:, inside].mean()) if time.size else math.nan,
+            "force": float(experiment.force_at(stage, "start").mean()),
         }
         mean = steady_mean(np.diff(displacement, axis=1) / np.diff(time)) if time.size > 1 else None
         if mean is None:
@@ -64,11 +66,13 @@ def creep_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
 
 def creep_line(data: xr.Dataset) -> Line | None:
     """The line of the force over ln V, of steady creep above the noise, without errors; None for
-    fewer than two velocities."""
+    fewer than two forces: velocities under one force differ by their noise."""
     velocity = np.abs(data["velocity"].values)
     with np.errstate(invalid="ignore"):
         good = (data["is_steady"].values == 1) & (velocity > 2 * data["velocity_error"].values)
     force = np.abs(data["force"].values[good])
+    if force.size == 0 or np.ptp(force) <= SAME_FORCE * np.max(force):
+        return None
     return line(np.log(velocity[good]), force, np.full(force.shape, math.nan))
 
 
@@ -103,7 +107,7 @@ def ramp_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
         before = stages[index - 1] if index else None
         if before is not None and before.is_constant_force:
             row["hold_time"] = before.duration
-            row["hold_force"] = float(experiment.force[:, experiment.samples(before)].mean())
+            row["hold_force"] = float(experiment.force_at(before, "start").mean())
         row["note"] = _fill_ramp(experiment, stage, load, sign, row)
         rows.append(row)
     return rows

@@ -204,6 +204,16 @@ def _columns(
                 _Column("transient", "transient_time", "s"),
             ),
         ),
+        "restarts": (
+            "Restarts under a constant force",
+            (
+                *stages,
+                force("force", "force"),
+                _Column("hold time", "hold_time", "s"),
+                force("hold force", "hold_force"),
+                _Column("time to restart", "restart_time", "s", "restart_time_error"),
+            ),
+        ),
         "ramps": (
             "Static friction under a growing force",
             (

@@ -24,6 +24,9 @@ module mesoslip_contacts_populations_activated
    !> Displacement in which contacts join a population, over that of a step
    real(wp), parameter :: joining_part = 0.5_wp
 
+   !> Exponent beyond which an exponential is 0
+   real(wp), parameter :: max_exponent = 700.0_wp
+
    !> Pinned populations of which contacts may break by thermal activation.
    type, extends(breaking_populations_type) :: activated_populations_type
       !> Whether they do, and how
@@ -209,7 +212,7 @@ contains
       !> Elastic energy that is lost by giving all of them one origin [J]
       real(wp), intent(inout) :: energy
 
-      real(wp) :: moments(moments_length), part, high, all
+      real(wp) :: moments(moments_length), below(2), part, high, all
 
       associate (population => self%population, width => self%activation%width)
          all = self%left(number, row) + contacts
@@ -219,9 +222,13 @@ contains
          population(row, column_origin) = population(row, column_origin) &
             & + part * (origin - population(row, column_origin))
          high = max(level, population(row, column_level))
-         if (high > no_level) population(row, column_level) = high + width &
-            & * log(part * exp((level - high) / width) &
-            & + (1.0_wp - part) * exp((population(row, column_level) - high) / width))
+         if (high > no_level) then
+            ! Without a hazard a level is far below, and its quotient would overflow.
+            below = max([level, population(row, column_level)] - high, -max_exponent * width) &
+               & / width
+            population(row, column_level) = high + width &
+               & * log(part * exp(below(1)) + (1.0_wp - part) * exp(below(2)))
+         end if
          call self%moments(1)%interpolate(population(row, column_broken), moments)
          population(row, column_weight) = all / self%survivors%left( &
             & population(row, column_broken), population(row, column_level), moments(number))

@@ -52,6 +52,45 @@ def test_the_steady_force_is_the_closed_form(klein, coupling):
         assert "F_steady" not in mesoslip.derived(config)
 
 
+@pytest.mark.parametrize("coupling", ["equal", "scaled"])
+def test_the_steady_start_is_stationary(klein, coupling):
+    """The force is that of steady sliding, at the start and after some displacement."""
+    count = 30_000
+    config = klein(
+        **SLIDING | {"run": {"drive_displacement": 2e-8}},
+        contacts__coupling=coupling,
+        contacts__initial="steady",
+    )
+    expected = steady(coupling) * config.contacts.static_force
+    for resolution in (0.5, 0.25):
+        me = force_of(config.replace({"run.engine": "me", "run.resolution": resolution}))[1]
+        assert np.max(np.abs(me / expected - 1)) < 2e-2 * resolution**2
+    force = force_of(config.replace({"contacts.count": count}))[1]
+    assert np.max(np.abs(force / expected - 1)) < 4 * 0.3 / np.sqrt(count) / steady(coupling)
+
+
+@pytest.mark.parametrize("coupling", ["equal", "scaled"])
+def test_a_steady_start_has_the_law_of_sliding_contacts(klein, coupling):
+    """Contacts of the threshold u that attach with b, in the number u - b, bear from b to u."""
+    width, spread = 0.25, 0.3
+    config = klein(
+        contacts__count=30_000,
+        contacts__coupling=coupling,
+        contacts__initial="steady",
+        contacts__newborn_width=width,
+        contacts__threshold__relative_width=spread,
+    )
+    contacts = Realization(config, 0).contacts
+    force = -contacts["origin"] * contacts["stiffness"] / config.contacts.contact_static_force
+    u, b = np.meshgrid(np.linspace(0.1, 2.5, 601)[1:], np.linspace(-1.2, 1.4, 651))
+    weight = stats.norm.pdf(u, 1, spread) * stats.norm.pdf(b, 0.1, width) * (np.abs(b) < u)
+    weight *= (u - b) / (np.sqrt(u) if coupling == "scaled" else 1)
+    grid = np.linspace(-1.2, 2.5, 149)
+    share = [np.sum(weight * np.clip((one - b) / (u - b), 0, 1)) for one in grid]
+    law = stats.kstest(force, lambda f: np.interp(f, grid, share / np.sum(weight)))
+    assert law.pvalue > 1e-3
+
+
 def test_engines_and_the_curve_agree_from_a_relaxed_start(klein):
     config = klein(**SLIDING | {"run": {"drive_displacement": 3e-8}}, contacts__coupling="equal")
     static = config.contacts.static_force
@@ -92,7 +131,6 @@ def test_without_width_nothing_changes(klein):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"contacts__initial": "steady"}, "attached with one force"),
         (
             {
                 "contacts__coupling": "equal",
@@ -119,3 +157,5 @@ def test_theory_that_is_refused(klein):
     for theory in (ForceCurve, SteadySliding):
         with pytest.raises(ConfigError, match=r"contacts\.newborn_width"):
             theory(config)
+    with pytest.raises(ConfigError, match=r"contacts\.initial .*stays at F_steady"):
+        ForceCurve(config.replace({"contacts.initial": "steady", "contacts.coupling": "equal"}))

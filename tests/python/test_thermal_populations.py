@@ -172,7 +172,12 @@ def test_without_temperature_it_is_the_model_without():
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"contacts__delay_law": "exponential"}, {"contacts__newborn_width": 0.05}],
+    [
+        {},
+        {"contacts__delay_law": "exponential"},
+        {"contacts__newborn_width": 0.05},
+        {"contacts__newborn_width": 0.05, "contacts__initial": "steady"},
+    ],
 )
 def test_energy_is_balanced(changes):
     config = configuration("rigid, thermal", run__engine="me", run__resolution=1.0, **changes)

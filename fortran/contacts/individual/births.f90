@@ -84,11 +84,13 @@ contains
       integer :: drawn, number, draw, contact
       integer(i8) :: key(draws_together), renewal(draws_together)
       real(wp) :: first(draws_together), second(draws_together), threshold(draws_together)
-      real(wp) :: stiffness, limit
+      real(wp) :: stiffness, limit, force(draws_together)
       type(carried_law_type) :: carried
+      logical :: is_spread
 
+      is_spread = state == initial_steady .and. parameters%newborn_width > 0.0_wp
       if (state == initial_steady) call new_carried_law(carried, parameters%law, &
-         & parameters%coupling, parameters%back_force_ratio)
+         & parameters%coupling, merge(0.0_wp, parameters%back_force_ratio, is_spread))
       renewal = 0_i8
       do drawn = 0, parameters%count - 1, draws_together
          number = min(draws_together, parameters%count - drawn)
@@ -97,7 +99,11 @@ contains
          end do
          call uniform_pairs(parameters%seed, parameters%realization, key(:number), &
             & renewal(:number), 0_i8, first(:number), second(:number))
-         if (state == initial_steady) then
+         if (is_spread) then
+            do draw = 1, number
+               call draw_sliding(parameters, carried, drawn + draw, threshold(draw), force(draw))
+            end do
+         else if (state == initial_steady) then
             do draw = 1, number
                threshold(draw) = carried%quantile(first(draw))
             end do
@@ -108,8 +114,12 @@ contains
          do draw = 1, number
             contact = drawn + draw
             call bear(parameters, threshold(draw), stiffness, limit)
-            record(row_origin, contact) = &
-               & -initial_stretch(parameters, state, second(draw), stiffness, limit)
+            if (is_spread) then
+               record(row_origin, contact) = -force(draw) * parameters%static_force / stiffness
+            else
+               record(row_origin, contact) = &
+                  & -initial_stretch(parameters, state, second(draw), stiffness, limit)
+            end if
             record(row_stiffness, contact) = stiffness
             record(row_limit, contact) = limit
             record(row_renewal, contact) = 0.0_wp
@@ -252,6 +262,40 @@ contains
       end function force_of
 
    end subroutine draw_forces
+
+   !> Draw a contact of slow sliding if forces at attaching have a width.
+   !>
+   !> Contacts that attach with the threshold u and the force b, abs(b) < u, slide from b to u: their
+   !> number is proportional to u - b, and their forces are uniform in between. A threshold is drawn
+   !> with the weight 2 u, and b; they are accepted with the probability (u - b)/(2 u).
+   pure subroutine draw_sliding(parameters, carried, contact, threshold, force)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Law of thresholds with the weight of the distance from no force to breaking
+      type(carried_law_type), intent(in) :: carried
+      !> Number of the contact
+      integer, intent(in) :: contact
+      !> Relative threshold and force
+      real(wp), intent(out) :: threshold, force
+
+      real(wp) :: uniform(2), other(2), newborn
+      integer(i8) :: attempt, key
+
+      threshold = 1.0_wp
+      force = 0.0_wp
+      key = int(contact - 1, i8)
+      do attempt = force_attempt, 3_i8, -2_i8
+         call uniform_pair(parameters%seed, parameters%realization, key, 0_i8, attempt, uniform)
+         call uniform_pair(parameters%seed, parameters%realization, key, 0_i8, attempt - 1_i8, &
+            & other)
+         threshold = carried%quantile(uniform(1))
+         newborn = parameters%back_force_ratio &
+            & + parameters%newborn_width * inverse_normal(uniform(2))
+         force = newborn + other(2) * (threshold - newborn)
+         if (abs(newborn) < threshold &
+            & .and. 2.0_wp * threshold * other(1) < threshold - newborn) return
+      end do
+   end subroutine draw_sliding
 
    !> Drag of a contact while it is detached.
    pure function drag_of(parameters, stiffness) result(drag)

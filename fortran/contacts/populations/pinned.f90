@@ -48,7 +48,7 @@ module mesoslip_contacts_populations_pinned
       procedure, non_overridable :: initialize
       !> Attach contacts as a population, or as one for each force
       procedure, non_overridable :: attach
-      procedure, non_overridable, private :: spread_newborns, may_join_last
+      procedure, non_overridable, private :: spread_newborns, may_join_last, add_sliding
    end type pinned_populations_type
 
 contains
@@ -154,41 +154,62 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
-      real(wp) :: max_distance, total, back, cell, middle, edge, even
+      integer :: class
+      real(wp) :: total
 
-      associate (parameters => self%parameters, moments => self%moments(1))
-         if (state /= initial_steady .and. state /= initial_uniform) then
-            call self%add(0.0_wp, 0.0_wp, real(parameters%count, wp), 1, 0.0_wp, &
-               & 0.0_wp, -self%ageing%initial_age, 0.0_wp)
-         else
-            back = 0.0_wp
-            if (state == initial_steady) back = parameters%back_force_ratio
-            max_distance = breaking_distance(parameters%coupling, back, moments%max_threshold)
-            edge = 0.0_wp
-            even = 1.0_wp
-            if (parameters%law%width > max_spread) even = min_even
-            do while (edge < max_distance)
-               ! The tails of wide laws are spread over many stretches, and smooth; many of their
-               ! thresholds are small.
-               cell = min(self%step / self%stretch * max(even, edge), max_distance - edge)
-               middle = edge + 0.5_wp * cell
-               edge = edge + cell
-               call self%add(-middle * self%stretch, back, cell, &
-                  & merge(1, 2, state == initial_steady), &
-                  & broken_threshold(parameters%coupling, back, middle), 0.0_wp, &
-                  & -self%ageing%initial_age, 0.0_wp)
-            end do
-            total = self%number_of_contacts()
-            associate (weight => self%population(:self%count, column_weight), &
-               & left => self%left(:, :self%count))
-               weight = weight * (parameters%count / total)
-               left = left * (parameters%count / total)
-            end associate
-         end if
-      end associate
+      if (state == initial_steady) then
+         do class = 1, self%classes
+            call self%add_sliding(self%class_force(class), self%share(class), 1, &
+               & self%class_broken(class))
+         end do
+      else if (state == initial_uniform) then
+         call self%add_sliding(0.0_wp, 1.0_wp, 2, 0.0_wp)
+      else
+         call self%add(0.0_wp, 0.0_wp, real(self%parameters%count, wp), 1, 0.0_wp, 0.0_wp, &
+            & -self%ageing%initial_age, 0.0_wp)
+      end if
+      if (state == initial_steady .or. state == initial_uniform) then
+         total = self%number_of_contacts()
+         associate (weight => self%population(:self%count, column_weight), &
+            & left => self%left(:, :self%count))
+            weight = weight * (self%parameters%count / total)
+            left = left * (self%parameters%count / total)
+         end associate
+      end if
       self%last_birth = -self%ageing%initial_age
       call self%sum_forces()
    end subroutine initialize
+
+   !> Add contacts that attached with one force, as many in each displacement.
+   subroutine add_sliding(self, force, share, moments, broken)
+      !> The populations
+      class(pinned_populations_type), intent(inout) :: self
+      !> Relative force at attaching, and relative number of contacts
+      real(wp), intent(in) :: force, share
+      !> Which moments are theirs
+      integer, intent(in) :: moments
+      !> Relative threshold at or below which none attached
+      real(wp), intent(in) :: broken
+
+      real(wp) :: max_distance, cell, middle, edge, even
+
+      associate (coupling => self%parameters%coupling)
+         max_distance = breaking_distance(coupling, force, self%moments(1)%max_threshold)
+         edge = 0.0_wp
+         even = 1.0_wp
+         if (self%parameters%law%width > max_spread) even = min_even
+         do while (edge < max_distance)
+            ! The tails of wide laws are spread over many stretches, and smooth; many of their
+            ! thresholds are small.
+            cell = min(self%step / self%stretch * max(even, edge), max_distance - edge)
+            middle = edge + 0.5_wp * cell
+            edge = edge + cell
+            call self%add(-middle * self%stretch, force, share * cell, moments, &
+               & max(broken, broken_threshold(coupling, force, middle)), 0.0_wp, &
+               & -self%ageing%initial_age, 0.0_wp)
+         end do
+      end associate
+   end subroutine add_sliding
 
    !> Attach contacts as one population for each force, where they do on average.
    subroutine attach(self, births, moment, direction, displacement, birth, time, lost)

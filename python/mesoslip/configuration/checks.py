@@ -155,13 +155,6 @@ def newborn_problems(config: Setting) -> Complaints:
     if width == 0:
         return
     key = "contacts.newborn_width"
-    if contacts.initial == "steady":
-        yield Complaint(
-            key,
-            'must be 0 with contacts.initial = "steady", where all contacts attached with one '
-            'force; start with "relaxed" and slide for some breaking stretches',
-            width,
-        )
     if contacts.ageing is not None:
         yield Complaint(
             key,

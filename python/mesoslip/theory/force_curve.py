@@ -211,6 +211,18 @@ class ForceCurve:
                     )
                 ]
             )
+        if contacts.newborn_width > 0 and contacts.initial == "steady":
+            raise ConfigError(
+                [
+                    Problem(
+                        "",
+                        "contacts.initial",
+                        'must be "relaxed" for a force curve with contacts.newborn_width: from the '
+                        'start "steady" the force stays at F_steady of `mesoslip info`',
+                        contacts.initial,
+                    )
+                ]
+            )
         newborn_width = newborn_stretch(config)
         if newborn_width is None:
             raise ConfigError([Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)])

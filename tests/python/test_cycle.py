@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import mesoslip
 import numpy as np
@@ -159,11 +160,35 @@ def test_branches_go_on_from_the_value_before(regular):
         mesoslip.branches(configuration(), "contacts.count", [10, 20])
 
 
-def test_another_spring_bears_the_same_force(regular):
-    stiffer = regular.config.replace("slider.stiffness=150")
-    state = Archive(adapted(regular.state, regular.config, stiffer))
-    gap = state.number(SLIDER, "drive value") - state.number(SLIDER, "displacement")
-    assert 150 * gap == pytest.approx(regular.section.force, rel=1e-6)
+@pytest.mark.parametrize(
+    ("change", "damping"),
+    [
+        ("slider.stiffness=150 N/m", 319.44),  # sqrt(K / M), as the damping ratio is 1
+        ("slider.mass=3 g", 179.81),
+        ("slider.damping_ratio=0.3", 77.063),
+    ],
+)
+def test_another_slider_keeps_velocities_and_forces(regular, change, damping):
+    """The damper pulls by its rate times the difference of two velocities, which stays."""
+    other = regular.config.replace(change)
+    early = Archive(regular.state)
+    late = Archive(adapted(regular.state, regular.config, other))
+    gap = late.number(SLIDER, "drive value") - late.number(SLIDER, "displacement")
+    force = other.spring_stiffness * gap
+    assert force == pytest.approx(regular.section.force, rel=1e-6)
+    assert late.number(SLIDER, "velocity") == early.number(SLIDER, "velocity")
+    difference = early.number(SLIDER, "damper") / math.sqrt(97 / 1.47e-3)
+    damper = late.number(SLIDER, "damper")
+    assert damper == pytest.approx(damping * difference, rel=1e-4)
+    # What is left of spring and contacts accelerates the slider and pulls at the damper.
+    net = [
+        one.slider.oscillator.mass * (state.number(SLIDER, "acceleration") + pull)
+        for one, state, pull in (
+            (regular.config, early, early.number(SLIDER, "damper")),
+            (other, late, damper),
+        )
+    ]
+    assert net[1] == pytest.approx(net[0], abs=1e-5 * force)
 
 
 def test_command(command, tmp_path):

@@ -23,6 +23,7 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Words
+from mesoslip.simulation.start import put_on_spring
 from mesoslip.theory.steady_sliding import steady_sliding
 
 if TYPE_CHECKING:
@@ -144,7 +145,8 @@ def _next(
 
 
 def adapted(words: Words, before: Config, config: Config, *, modulation: float = 0.0) -> Words:
-    """A state of another configuration as one of this: the forces stay as they are.
+    """A state of another configuration as one of this: velocities and forces, but that of the
+    damper, stay as they are.
 
     Parameters
     ----------
@@ -158,15 +160,14 @@ def adapted(words: Words, before: Config, config: Config, *, modulation: float =
     """
     motion = Motion(config)
     archive = Archive(words)
-    time, here = (archive.number(SLIDER, name) for name in ("time", "displacement"))
+    put_on_spring(archive, SLIDER, before, config)
+    time = archive.number(SLIDER, "time")
     drive = archive.number(SLIDER, "drive value") + archive.number(SLIDER, "drive rate") * (
         time - archive.number(SLIDER, "drive time")
     )
-    # The spring of another stiffness is stretched by as much as bears the same force.
-    gap = (drive - here) * before.spring_stiffness / config.spring_stiffness
     for name, value in (
         ("drive time", time),
-        ("drive value", here + gap),
+        ("drive value", drive),
         ("drive rate", motion.velocity),
         ("impulse", 0.0),
     ):

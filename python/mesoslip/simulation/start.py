@@ -128,7 +128,8 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
     )
     words = end.words
     if config.spring_stiffness != end.config.spring_stiffness:
-        words = with_spring(archive, slider, end.config, config)
+        put_on_spring(archive, slider, end.config, config)
+        words = archive.words()
     kernel.restore(words)
     kernel.follow()
     energy = kernel.energy()
@@ -136,9 +137,12 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
     return kernel, Start(kernel.ask(), slips, energy)
 
 
-def with_spring(archive: Archive, slider: str, before: Config, config: Config) -> Words:
-    """A state of a rigid slider on another spring: velocities and all forces but that of the damper
-    stay as they are. The drive is displaced, so that the spring bears the same force."""
+def put_on_spring(archive: Archive, slider: str, before: Config, config: Config) -> None:
+    """Put a state of a rigid slider on another spring and damper.
+
+    Velocities, also the damper's, and all forces but that of the damper stay as they are. The drive
+    is displaced, so that the spring bears the same force.
+    """
     here, value = (archive.number(slider, name) for name in ("displacement", "drive value"))
     time, since, rate = (
         archive.number(slider, name) for name in ("time", "drive time", "drive rate")
@@ -148,9 +152,9 @@ def with_spring(archive: Archive, slider: str, before: Config, config: Config) -
     archive.set_number(slider, "drive value", value + (here + gap - drive))
     earlier, now = before.slider.oscillator, config.slider.oscillator
     if earlier is not None and now is not None and earlier.damping > 0:
-        # The damper pulls in proportion to its rate, which a damping ratio ties to the stiffness.
+        # The damper pulls in proportion to its rate, which a damping ratio ties to stiffness and
+        # mass.
         damper, acceleration = (archive.number(slider, one) for one in ("damper", "acceleration"))
         change = damper * (now.damping / earlier.damping - 1)
         archive.set_number(slider, "damper", damper + change)
         archive.set_number(slider, "acceleration", acceleration - change)
-    return archive.words()

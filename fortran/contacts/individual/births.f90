@@ -265,9 +265,9 @@ contains
 
    !> Draw a contact of slow sliding if forces at attaching have a width.
    !>
-   !> Contacts that attach with the threshold u and the force b, abs(b) < u, slide from b to u: their
-   !> number is proportional to u - b, and their forces are uniform in between. A threshold is drawn
-   !> with the weight 2 u, and b; they are accepted with the probability (u - b)/(2 u).
+   !> Contacts that attach with the threshold u and the force b, abs(b) < u, slide from b to u.
+   !> Their number is proportional to u - b, and their forces are uniform in between. A threshold is
+   !> drawn with the weight 2 u, and b; they are accepted with the probability (u - b)/(2 u).
    pure subroutine draw_sliding(parameters, carried, contact, threshold, force)
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters

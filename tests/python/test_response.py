@@ -17,6 +17,7 @@ from mesoslip import Config, FileError
 from mesoslip.analysis.rate_and_state import Loading, RateAndState, spring_slider
 from mesoslip.analysis.response import line, rows_of, scalars_of, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
+from mesoslip.theory.activated_sliding import ActivatedSliding
 from response_coverage import autoregression, steady_coverage
 
 # F_s = 18 uN and a mean breaking stretch of 9 nm.
@@ -426,3 +427,28 @@ def test_pictures(sliding):
     mesoslip.plot(record(LAW, HOLDS, 4000.0), view="response", ax=axes)
     assert len(axes.lines) >= 2
     assert len(mesoslip.plot(record(LAW, HOLDS, 4000.0), view="response").axes) == 2
+
+
+def test_contacts_are_the_spring_of_a_prescribed_slider():
+    """The direct effect of activated contacts comes as they are loaded, with the stiffness N k."""
+    config = Config.load(ROOT / "runs" / "velocity-step.toml").replace(
+        {
+            "run.duration": 0.135,
+            "run.realizations": 1,
+            "contacts.count": 8000,
+            "contacts.thermal.force_ratio": 0.04,
+            "drive.stage": [
+                {"velocity": 1e-6, "displacement": 60e-9},
+                {"velocity": 1e-5, "displacement": 75e-9},
+            ],
+            "output.interval": 2e-5,
+            "output.slip_interval": None,
+        }
+    )
+    known = ActivatedSliding(config, math.sqrt(1e-11)).rate_and_state
+    found = rows_of(mesoslip.response(mesoslip.run(config), free_stiffness=True), "rate_and_state")[
+        0
+    ]
+    assert found["stiffness"] == pytest.approx(config.contacts.stiffness, rel=0.2)
+    assert found["a"] == pytest.approx(known.a, rel=0.2)
+    assert found["b"] == pytest.approx(known.b, rel=0.2)

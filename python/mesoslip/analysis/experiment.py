@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -220,6 +221,18 @@ class Experiment:
         changed.__dict__.pop("steady_means", None)
         moved = self.displacement - self.displacement[:, :1]
         changed.force = self.force - trend * moved
+        return changed
+
+    def with_stiffness(self, stiffness: float) -> Experiment:
+        """The experiment with another stiffness of the spring.
+
+        Parameters
+        ----------
+        stiffness
+            K, unit of the force per metre.
+        """
+        changed = copy.copy(self)
+        changed.apparatus = dataclasses.replace(self.apparatus, stiffness=stiffness)
         return changed
 
     @property

@@ -34,7 +34,11 @@ def response(
     ] = None,
     fit: Annotated[bool, typer.Option(help="Fit rate-and-state parameters")] = True,
     free_stiffness: Annotated[
-        bool, typer.Option("--free-stiffness", help="Fit the stiffness of the spring too")
+        bool,
+        typer.Option(
+            "--free-stiffness",
+            help="Fit the stiffness of the spring too (prescribed slider: of the contacts)",
+        ),
     ] = False,
     as_latex: Annotated[
         bool, typer.Option("--latex", help="Print rate-and-state parameters as a LaTeX table")

@@ -74,8 +74,11 @@ def fit_rows(
     number
         Its number.
     free_stiffness
-        Whether the stiffness is fitted too.
+        Whether the stiffness is fitted too. Under a prescribed slider it is that of the contacts.
     """
+    config = experiment.config
+    if free_stiffness and math.isinf(experiment.stiffness) and config is not None:
+        experiment = experiment.with_stiffness(config.contacts.stiffness)
     record = record_of(experiment)
     if isinstance(record, str):
         return [empty_row(number, "", record)]

@@ -58,7 +58,8 @@ def response(
     fit
         Whether rate-and-state parameters are fitted, which takes some seconds.
     free_stiffness
-        Whether the stiffness of the spring is fitted too, instead of that of the run.
+        Whether the stiffness of the spring is fitted too, instead of that of the run; under a
+        prescribed slider that of the contacts.
 
     Returns
     -------

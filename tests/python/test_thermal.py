@@ -375,6 +375,20 @@ def first_breaks(events: list[tuple[float, int]]) -> np.ndarray:
             "rate",
             "at once",
         ),
+        (
+            {
+                "contacts__thermal__rate": 1e5,
+                "contacts__ageing": {
+                    "law": "relax",
+                    "time": 100.0,
+                    "young_force_ratio": 0.1,
+                    "young_relative_width": 0.1,
+                },
+                "run__duration": 1e6,
+            },
+            "thermal.rate",
+            "break at once",
+        ),
         ({"contacts__coupling": "scaled"}, "contacts.coupling", '"equal"'),
     ],
 )

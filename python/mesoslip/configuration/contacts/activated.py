@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
+
+import numpy as np
 
 from mesoslip.configuration.contacts.ageing import ageing_of, ageing_problems
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
@@ -19,6 +22,9 @@ from mesoslip.configuration.table import Complaint, Complaints
 from mesoslip.configuration.tables import Run
 
 INITIAL_AGE = "contacts.ageing.initial_age"
+# Ages of the life of a contact that bears the back force: the first over the scales of time, and
+# their number; exponent beyond which a rate is infinite.
+MIN_AGE, AGES, MAX_EXPONENT = 1e-3, 400, 500.0
 
 
 def thermal_of(config: Setting) -> Thermal:
@@ -50,15 +56,34 @@ def thermal_problems(config: Setting) -> Complaints:
             "contact breaks, so that contacts do not share a clock",
             config.interaction.strength,
         )
-    rate = thermal.rate_under(contacts.back_force_ratio, contacts.contact_static_force)
-    breaks = config.expected_duration / (contacts.delay + 1 / rate) if rate > 0 else 0.0
-    if breaks > MAX_IDLE_BREAKS or rate * contacts.delay > MAX_IDLE_DELAY:
+    life = _idle_life(contacts, thermal, config.expected_duration)
+    breaks = config.expected_duration / (contacts.delay + life)
+    if breaks > MAX_IDLE_BREAKS or contacts.delay > MAX_IDLE_DELAY * life:
         yield Complaint(
             "contacts.thermal.rate",
             f"makes contacts break at once: one that bears no more than the back force has a mean "
-            f"life of {1 / rate:.3g} s; a lower rate or f_T is needed",
+            f"life of {life:.3g} s; a lower rate or f_T is needed",
             thermal.rate,
         )
+
+
+def _idle_life(contacts: Contacts, thermal: Thermal, duration: float) -> float:
+    """Mean life of a contact of mean threshold that bears the back force [s], up to a duration."""
+    static, back = contacts.contact_static_force, contacts.back_force_ratio
+    rate = thermal.rate_under(back, static)
+    if contacts.ageing is None:
+        return 1 / rate if rate > 0 else math.inf
+    first = MIN_AGE * min(1 / thermal.rate, contacts.ageing.time, duration)
+    age = np.concatenate([[0.0], np.geomspace(first, duration, AGES)])
+    threshold = contacts.ageing.threshold(1.0, contacts.threshold.relative_width, age)
+    exponent = np.minimum((back - threshold) / thermal.ratio(static), MAX_EXPONENT)
+    rates = thermal.rate * np.exp(exponent)
+    steps = np.diff(age)
+    hazard = np.concatenate([[0.0], np.cumsum(steps * (rates[1:] + rates[:-1]) / 2)])
+    # Constant hazard rates between ages: exact where a life is shorter than a step.
+    passed = np.diff(hazard)
+    share = np.where(passed > 0, -np.expm1(-passed) / np.where(passed > 0, passed, 1.0), 1.0)
+    return float(np.sum(steps * np.exp(-hazard[:-1]) * share))
 
 
 class ActivatedContacts(ContactKind):

@@ -91,6 +91,12 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         "The densities at the displacements of `curve.density_at`.",
     ),
     (
+        "mesoslip curve of contacts that age or creep: root",
+        variables.STEADY,
+        "Dimension `velocity`: [steady sliding](../../steady-sliding.md) over velocity; the "
+        "attribute `boundaries` has the velocities at which it turns stable or unstable.",
+    ),
+    (
         "mesoslip onset: groups sequential and melting",
         variables.ONSET,
         "The onset of slip by Eqs. S46 and S47 of the source, without dimensions.",

@@ -14,6 +14,7 @@ from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import run_realizations
 from mesoslip.theory.ageing import mean_life, restart_peak, steady_force
+from mesoslip.theory.force_curve import ForceCurve
 from oracles import Contacts, aged, ageing_force, fixed_step, stationary_force
 from scipy import optimize
 from test_events import breaks
@@ -417,10 +418,10 @@ def test_bad_input_is_one_message(klein, ageing, changes, key, message):
     assert message in error.value.problems[0].message.replace('"', "'")
 
 
-def test_a_curve_is_refused_and_info_reports_of_young_and_old(klein):
+def test_a_force_curve_is_refused_and_info_reports_of_young_and_old(klein):
     config = klein(contacts__coupling="equal", contacts__ageing=RELAX)
     with pytest.raises(ConfigError, match=r"contacts\.ageing: has no force curve"):
-        mesoslip.curve(config)
+        ForceCurve(config)
     printed = mesoslip.derived(config)
     assert printed["young_static_force"].value == pytest.approx(0.5 * STATIC)
     assert printed["young_relative_width"].value == pytest.approx(0.3)

@@ -62,16 +62,21 @@ def curve(
 ) -> None:
     """Compute the force curve F(X), its instability, and K*.
 
-    This is the master equation (N to infinity) under a slider that moves slowly.
+    This is the master equation (N to infinity) under a slider that moves slowly. For contacts that
+    age or break by thermal activation it is steady sliding over velocity instead: F(v), dF/d ln v,
+    and the stiffness above which sliding is linearly stable.
     """
     from mesoslip.output import targets, writing
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
-    from mesoslip.theory.steady_sliding import steady_sliding
+    from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
 
     checked = load(config, changes)
     if output is not None:
         targets.check_output(output, [config])
     _warn_of_interaction(checked)
+    if depends_on_velocity(checked):
+        _steady_curve(checked, output, as_json=as_json)
+        return
     force_curve = ForceCurve(checked)
     if output is not None:
         writing.write(force_curve.to_tree(), output)
@@ -125,6 +130,53 @@ def onset(
     for name, value in summary.items():
         show(name, value, *slip_onset.SUMMARY[name], digits=DERIVED_DIGITS)
     typer.echo(tree.attrs["comment"])
+
+
+def _steady_curve(config: Config, output: Path | None, *, as_json: bool) -> None:
+    """Print steady sliding over velocity, and its stability."""
+    from mesoslip.output import writing
+    from mesoslip.quantities import with_unit
+    from mesoslip.theory.steady_curve import SteadyCurve
+    from mesoslip.theory.steady_sliding import steady_sliding
+
+    found = SteadyCurve(config)
+    if output is not None:
+        writing.write(found.to_tree(), output)
+    columns = {
+        "velocity": found.velocity,
+        "steady_force": found.force,
+        "steady_slope": found.slope,
+        "critical_stiffness": found.critical_stiffness,
+    }
+    if as_json:
+        print_json(
+            {name: values.tolist() for name, values in columns.items()}
+            | {"boundaries": list(found.boundaries)}
+        )
+        return
+    typer.echo("".join(f"{one:>14}" for one in ("velocity", "F(v)", "dF/d ln v", "stable above")))
+    for velocity, force, slope, stiffness in zip(*columns.values(), strict=True):
+        typer.echo(
+            f"{with_unit(velocity, 'm/s', 3):>14}"
+            f"{with_unit(force, 'N', DERIVED_DIGITS):>14}"
+            f"{with_unit(slope, 'N', DERIVED_DIGITS):>14}"
+            f"{_limit(stiffness):>14}"
+        )
+    typer.echo(found.verdict)
+    sliding = steady_sliding(config, MAX_WORK)
+    if sliding is not None:
+        for sentence in (sliding.summary, sliding.limit):
+            if sentence is not None:
+                typer.echo(sentence)
+
+
+def _limit(stiffness: float) -> str:
+    """A critical stiffness in a table."""
+    from mesoslip.quantities import with_unit
+
+    if math.isnan(stiffness):
+        return "-"
+    return with_unit(stiffness, "N/m", 3) if stiffness > 0 else "any spring"
 
 
 def _digits(name: str, curve: ForceCurve) -> int:

@@ -28,6 +28,9 @@ KINDS = {
     "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
     "cycle": Kind("a cycle", lambda tree: "settled_motion" in tree.attrs),
     "branches": Kind("branches of cycles", lambda tree: "continued_key" in tree.attrs),
+    "steady": Kind(
+        "steady sliding over velocity", lambda tree: "critical_stiffness" in tree.data_vars
+    ),
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
     "lyapunov": Kind("a Lyapunov exponent", lambda tree: "lyapunov_exponent" in tree.data_vars),

@@ -20,6 +20,8 @@ SUMMARIES = {
     "earthquake-like model of multicontact friction or its master equation",
     "curve": "Force of infinitely many contacts with random breaking thresholds under a slider "
     "that moves forward slowly, from the master equation of multicontact friction",
+    "steady": "Steady sliding of infinitely many contacts that age or break by thermal activation, "
+    "over velocity, and its linear stability",
     "onset": "Onset of the slip of a slider on contacts with random breaking thresholds, for "
     "contacts that break one after another and for a film that melts at once",
     "cycle": "The motion that a slider on infinitely many contacts settles to, from the master "

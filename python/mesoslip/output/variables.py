@@ -328,6 +328,15 @@ BRANCHES = Group(
     growth_rate=Meaning("s-1", "growth rate of small perturbations of steady sliding"),
 )
 
+STEADY = Group(
+    velocity=Meaning("m s-1", "velocity of steady sliding"),
+    steady_force=Meaning("N", "force of steady sliding"),
+    steady_slope=Meaning("N", "derivative of the force by the logarithm of the velocity"),
+    critical_stiffness=Meaning(
+        "N m-1", "stiffness of the spring above which sliding is linearly stable; 0: with any"
+    ),
+)
+
 CYCLE_TRACE = Group(
     time=Meaning("s", "time since the first passage of the section"),
     spring_force=Meaning("N", "force of the spring of the drive"),

@@ -88,6 +88,18 @@ def branches_method(tree: xr.DataTree, config: Config) -> str:
     )
 
 
+def steady_method(_tree: xr.DataTree, config: Config) -> str:
+    """The method of steady sliding over velocity."""
+    return " ".join(
+        (
+            f"The force of steady sliding of the {MODEL}, and its linear stability, were computed "
+            "with mesoslip [@mesoslip] for infinitely many contacts, from the survival of contacts "
+            "over their lives and its change under a small oscillation of the slider.",
+            *model(config),
+        )
+    )
+
+
 def onset_method(_tree: xr.DataTree, config: Config) -> str:
     """The method of an onset of slip."""
     return " ".join(

@@ -17,11 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.quantities import with_unit
 from mesoslip.theory.activated_lives import ActivatedLives
 from mesoslip.theory.activated_response import MAX_TURN, ActivatedResponse, Motion
 from mesoslip.theory.linear_stability import LinearStability, Parts
-from mesoslip.theory.sliders import dynamic_stiffness
 from mesoslip.theory.thermal import steady_force, steady_slope
 
 Array = NDArray[np.float64]
@@ -44,8 +42,6 @@ SLOW = 1e-3
 # stiffness is sought with fewer points.
 POINTS_A_DECADE = 15
 SMOOTH_FROM, THINNING = 1.5, 3
-# Rounds of the search for a critical frequency, and points of each.
-ROUNDS, POINTS_A_ROUND = 3, 12
 
 
 class RateAndState(NamedTuple):
@@ -163,7 +159,7 @@ class ActivatedSliding(LinearStability):
         lives = self.lives
         turn = lives.life + self.delay
         stiffness = self.config.contacts.stiffness
-        own = math.sqrt((stiffness + max(self._spring, 0.0)) / self._mass)
+        own = math.sqrt((stiffness + self._spring) / self._mass)
         low = 1e-3 * min(self._scale, 1 / turn)
         last = 3 * max(own, self._scale)
         count = math.ceil(POINTS_A_DECADE * math.log10(last / low))
@@ -203,50 +199,12 @@ class ActivatedSliding(LinearStability):
             a, a - net, (area + a * self.velocity / self._breaking_rate) / (a - net)
         )
 
-    @cached_property
-    def critical_stiffness(self) -> tuple[float, float] | None:
-        """Stiffness of the spring above which steady sliding is linearly stable [N/m], and the
-        angular frequency of the oscillation there [1/s]; None if it is stable with any spring.
-
-        It is the largest K for which K + Z(iω) + Λ(iω) = 0 at a frequency, with the dynamic
-        stiffness Z of the rest of the slider.
-        """
-        if not self._has_motion or not 0 < self._spring < math.inf:
-            return None
-        path = self._path[1:]
+    @property
+    def _search_path(self) -> Array:
         # Faster than contacts break, the response has no cycles of births any more.
+        path = super()._search_path
         is_slow = path < SMOOTH_FROM * self._breaking_rate
-        path = np.concatenate([path[is_slow], path[~is_slow][::THINNING]])
-        values = self._without_spring(path)
-        crossings = np.flatnonzero(np.diff(np.sign(values.imag)) != 0)
-        found = None
-        for at in crossings:
-            if max(-values.real[at], -values.real[at + 1]) <= 0:
-                continue
-            frequency = self._crossing(path[at], path[at + 1])
-            stiffness = -float(self._without_spring(np.array([frequency])).real[0])
-            if stiffness > 0 and (found is None or stiffness > found[0]):
-                found = (stiffness, frequency)
-        return found
-
-    def _crossing(self, low: float, high: float) -> float:
-        """Frequency between two others at which the response without the spring is real."""
-        for _ in range(ROUNDS):
-            points = np.geomspace(low, high, POINTS_A_ROUND)
-            values = self._without_spring(points).imag
-            first = int(np.flatnonzero(np.diff(np.sign(values)) != 0)[0])
-            low, high = points[first : first + 2]
-        before, after = values[first : first + 2]
-        return float(low + (high - low) * before / (before - after))
-
-    def _without_spring(self, frequency: Array) -> Complex:
-        """Z(iω) + Λ(iω) - K [N/m]."""
-        rate = 1j * frequency
-        slider = dynamic_stiffness(self.config.slider, rate)
-        assert slider is not None
-        whole: Complex = slider.numerator / slider.denominator + self.response_at(rate)
-        whole -= self._spring
-        return whole
+        return np.concatenate([path[is_slow], path[~is_slow][::THINNING]])
 
     @property
     def work(self) -> int:
@@ -261,19 +219,3 @@ class ActivatedSliding(LinearStability):
     def _ingredients(self) -> str:
         contacts = self.config.contacts
         return "temperature" + (" and ageing" if contacts.ageing is not None else "")
-
-    @property
-    def summary(self) -> str | None:
-        known = super().summary
-        if known is None:
-            return None
-        change = "strengthens" if self.slope > 0 else "weakens"
-        limit = self.critical_stiffness
-        if limit is None:
-            return f"{known}. It {change} with velocity, and is linearly stable with any spring"
-        stiffness, frequency = limit
-        return (
-            f"{known}. It {change} with velocity, and is linearly stable with springs stiffer than "
-            f"{with_unit(stiffness, 'N/m', 3)}, with which it oscillates at "
-            f"{with_unit(frequency / (2 * math.pi), 'Hz', 3)}"
-        )

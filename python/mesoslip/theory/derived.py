@@ -13,7 +13,7 @@ from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.linear_stability import SHOWN_BY, LinearStability
 from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import quantities
-from mesoslip.theory.steady_sliding import steady_sliding
+from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
 
 # Maximum work for the stability of steady sliding, about a tenth of a second.
 MAX_WORK = 10_000
@@ -73,9 +73,12 @@ def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
 def verdict(config: Config) -> str | None:
     """Predictions for the motion, and their limits; None without a spring."""
     sliding = steady_sliding(config, MAX_WORK)
-    stability = None if sliding is None else sliding.summary
-    sentences = [one for one in (_verdict_of_stiffness(config), stability) if one is not None]
-    return "\n".join(sentences) or None
+    sentences: tuple[str | None, ...] = (_verdict_of_stiffness(config),)
+    if sliding is not None:
+        # Contacts that age or creep have no force curve, and no K*, but a limit at each velocity.
+        limit = sliding.limit if depends_on_velocity(config) else None
+        sentences = (*sentences, sliding.summary, limit)
+    return "\n".join(one for one in sentences if one is not None) or None
 
 
 def _stability(sliding: LinearStability | None) -> Iterator[tuple[str, float, str, str]]:
@@ -86,8 +89,8 @@ def _stability(sliding: LinearStability | None) -> Iterator[tuple[str, float, st
         "steady_growth_rate",
         sliding.growth_rate,
         "1/s",
-        "growth rate of small perturbations of steady sliding at the drive's velocity, with delay; "
-        "negative: they decay",
+        "growth rate of small perturbations of steady sliding at the drive's velocity, with delay, "
+        "ageing and temperature; negative: they decay",
     )
     yield "steady_frequency", sliding.frequency, "1/s", "angular frequency of these perturbations"
 
@@ -95,7 +98,7 @@ def _stability(sliding: LinearStability | None) -> Iterator[tuple[str, float, st
 def _verdict_of_stiffness(config: Config) -> str | None:
     """The spring against the estimate of K*; None without a spring."""
     spring = config.spring_stiffness
-    if not 0 < spring < math.inf:
+    if not 0 < spring < math.inf or depends_on_velocity(config):
         return None
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
     if spring >= estimate:
@@ -230,7 +233,7 @@ def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str
             "weakens with velocity",
         )
         yield from _rate_and_state(config, speed)
-    force = _first_force(config)
+    force = first_force(config)
     if force > 0:
         yield (
             "creep_velocity",
@@ -240,7 +243,7 @@ def _thermal(config: Config, thermal: Thermal) -> Iterator[tuple[str, float, str
         )
 
 
-def _first_force(config: Config) -> float:
+def first_force(config: Config) -> float:
     """Constant force of the drive, or that of the first stage [N]; 0 for a ramp from 0."""
     if config.drive.force is not None:
         return config.drive.force

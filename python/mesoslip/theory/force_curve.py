@@ -31,6 +31,7 @@ from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.simulation.kernel import checked
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.sliders import loading_rate
+from mesoslip.theory.steady_sliding import depends_on_velocity
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -146,14 +147,20 @@ def curve(config: ConfigLike) -> xr.DataTree:
         Root: force, slope, stiffness and rate of breaks over ``displacement``; ``K_star``, ``X_c``,
         ``F_peak``, ``F_steady``, ``D0`` to ``D3``, ``stable`` as attributes, in SI. Group
         ``critical``: all X_c; ``stretch_density``: the densities that ``curve.density_at`` asks
-        for.
+        for. Of contacts that age or break by thermal activation: steady sliding over ``velocity``.
 
     Raises
     ------
     FileError, ConfigError
         If the configuration cannot be read or is wrong.
     """
-    return ForceCurve(as_config(config)).to_tree()
+    checked = as_config(config)
+    if depends_on_velocity(checked):
+        # It is imported here, as few curves need it.
+        from mesoslip.theory.steady_curve import SteadyCurve
+
+        return SteadyCurve(checked).to_tree()
+    return ForceCurve(checked).to_tree()
 
 
 class ForceCurve:

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
+from mesoslip.theory.critical_spring import critical_spring
 from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
@@ -375,6 +377,25 @@ class LinearStability(abc.ABC):
         root = np.where(np.abs(root.imag) < REAL * np.abs(root), root.real + 0j, root)
         return np.where(root.imag < 0, root.conj(), root)
 
+    @cached_property
+    def critical_stiffness(self) -> tuple[float, float] | None:
+        """Stiffness of the spring above which steady sliding is linearly stable [N/m], and the
+        angular frequency of the oscillation there [1/s].
+
+        None if it is stable with any spring, or the slider is not a mass on one spring.
+
+        The damping is that of the configuration, which grows with the spring where it is a ratio.
+        """
+        slider = self.config.slider
+        if self.is_passive or not isinstance(slider, RigidSlider):
+            return None
+        return critical_spring(slider, self.response, self._search_path)
+
+    @property
+    def _search_path(self) -> Array:
+        """Frequencies between which critical ones are sought."""
+        return self._path[1:]
+
     @property
     def _mass(self) -> float:
         """Inertia of the slider at high frequencies [kg]."""
@@ -428,6 +449,27 @@ class LinearStability(abc.ABC):
             f"{where} is linearly unstable, with {self._ingredients}: {self._perturbation} grows "
             f"at {growth}, {other} for contacts out of step (thresholds of "
             f"{percent(OUT_OF_STEP)}). {NO_AMPLITUDE}"
+        )
+
+    @property
+    def has_critical_stiffness(self) -> bool:
+        """Whether the slider is a mass on one spring."""
+        return isinstance(self.config.slider, RigidSlider)
+
+    @property
+    def limit(self) -> str | None:
+        """The stiffness above which sliding is stable, in words; None without such a limit."""
+        if self.is_passive or not self.has_critical_stiffness:
+            return None
+        change = "strengthens" if self.slope > 0 else "weakens"
+        found = self.critical_stiffness
+        if found is None:
+            return f"it {change} with velocity, and is linearly stable with any spring"
+        stiffness, frequency = found
+        return (
+            f"it {change} with velocity, and is linearly stable with springs stiffer than "
+            f"{with_unit(stiffness, 'N/m', 3)}, with which it oscillates at "
+            f"{with_unit(frequency / (2 * math.pi), 'Hz', 3)}"
         )
 
     @property

@@ -143,6 +143,11 @@ class SteadySliding(LinearStability):
         return "delay"
 
 
+def depends_on_velocity(config: Config) -> bool:
+    """Whether slow sliding has no force of its own, so that F(X) has no curve."""
+    return config.contacts.ageing is not None or config.contacts.thermal is not None
+
+
 def sliding_of(config: Config, velocity: float | None = None) -> LinearStability:
     """Steady sliding of a configuration, by the theory that its contacts have.
 

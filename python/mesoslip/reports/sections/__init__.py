@@ -39,6 +39,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
     "cycle": (changes, pictures, cycle, methods, configuration, provenance),
     "branches": (changes, pictures, methods, configuration, provenance),
     "curve": (changes, pictures, curve, methods, configuration, provenance),
+    "steady": (changes, pictures, methods, configuration, provenance),
     "onset": (changes, pictures, onset, methods, configuration, provenance),
     "lyapunov": (changes, pictures, lyapunov, methods, configuration, provenance),
     "fit": (parameters, methods, configuration, provenance),

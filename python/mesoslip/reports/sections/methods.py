@@ -19,6 +19,7 @@ from mesoslip.reports.methods import (
     measured_method,
     onset_method,
     run_method,
+    steady_method,
     sweep_method,
 )
 from mesoslip.reports.references import PROGRAM, REFERENCES, numbered, program
@@ -30,6 +31,7 @@ METHODS: dict[str, Callable[[xr.DataTree, Config], str]] = {
     "cycle": cycle_method,
     "branches": branches_method,
     "curve": curve_method,
+    "steady": steady_method,
     "onset": onset_method,
     "fit": fit_method,
 }

@@ -1,0 +1,164 @@
+"""Linear stability of steady sliding of contacts that age or break by thermal activation."""
+
+from __future__ import annotations
+
+import math
+
+import mesoslip
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+from mesoslip import Config, SteadySliding
+from mesoslip.configuration.sliders.rigid import RigidSlider
+from mesoslip.theory import steady_curve
+from mesoslip.theory.activated_sliding import ActivatedSliding, RateAndState
+from mesoslip.theory.ageing_sliding import AgeingSliding
+from mesoslip.theory.critical_spring import critical_spring
+from mesoslip.theory.steady_sliding import sliding_of, stable_stiffness, steady_sliding
+from test_steady_sliding import study
+
+LOG = {"law": "log", "time": 1e-3, "growth": 0.05}
+RELAX = {"law": "relax", "time": 1e-2, "young_force_ratio": 0.6, "young_relative_width": 0.3}
+HOT = {"rate": 1e4, "force_ratio": 0.03}
+COLD = {"rate": 1e-6, "force_ratio": 0.02}
+
+
+def sliding(klein, **changes):
+    equal = {"contacts__coupling": "equal", "contacts__threshold__relative_width": 0.1}
+    return klein(**equal | changes)
+
+
+@pytest.mark.parametrize("law", ["fixed", "exponential"])
+@pytest.mark.parametrize("ageing", [None, LOG, RELAX], ids=["", "log", "relax"])
+def test_without_temperature_stability_is_that_of_contacts_without(klein, ageing, law):
+    """Roots, their number, and the spring that makes sliding stable; two velocities."""
+    changes = {"contacts__delay_law": law} | ({"contacts__ageing": ageing} if ageing else {})
+    cold = sliding(klein, **changes)
+    warm = sliding(klein, **changes, contacts__thermal=COLD)
+    for velocity in (1e-7, 1e-5):
+        expected, found = sliding_of(cold, velocity), sliding_of(warm, velocity)
+        assert type(expected) is (SteadySliding if ageing is None else AgeingSliding)
+        assert found.unstable_count == expected.unstable_count
+        assert found.leading_root == pytest.approx(expected.leading_root, rel=1e-6)
+        assert found.force == pytest.approx(expected.force, rel=1e-6)
+        assert found.slope == pytest.approx(expected.slope, rel=1e-5)
+    assert found.is_stable_out_of_step == expected.is_stable_out_of_step
+    if ageing is None:
+        assert found.critical_stiffness == pytest.approx(expected.critical_stiffness, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "velocity"),
+    [
+        ({"thermal": {"rate": 1e4, "force_ratio": 0.1}}, 1e-5),
+        ({"thermal": {"rate": 1e4, "force_ratio": 0.1}, "delay_law": "exponential"}, 1e-5),
+        ({"ageing": LOG, "delay": 0.0}, 1e-5),
+    ],
+    ids=["temperature", "exponential delays", "ageing"],
+)
+def test_the_engine_answers_as_the_theory(contacts, velocity):
+    """The master equation under a slider that is shaken a little."""
+    module = study()
+    contacts = contacts | {"coupling": "equal"}
+    config = Config.from_dict(
+        {
+            **module.tables(contacts=contacts),
+            "run": {"engine": "me", "duration": 1.0},
+            "drive": {"velocity": velocity},
+        }
+    )
+    expected = complex(sliding_of(config).response(600.0))
+    found = module.shaken_response(velocity, 600.0, 1e-9, 0.05, periods=4, contacts=contacts)
+    assert abs(found - expected) < 0.01 * abs(expected)
+
+
+def test_the_critical_spring_of_rate_and_state_is_that_of_rice_and_ruina():
+    """Exactly, with the response of one state, at three masses."""
+    law, velocity = RateAndState(0.2e-6, 0.5e-6, 3e-9), 1e-7
+
+    def response(frequency):
+        rate = 1j * frequency / velocity
+        return rate * (law.a - law.b / (1 + rate * law.slip_distance))
+
+    for mass in (1e-9, 1e-2, 10.0):
+        slider = RigidSlider(mass=mass, stiffness=97.0, damping=0.0)
+        found = critical_spring(slider, response, np.geomspace(1e-2, 1e4, 40))
+        assert found is not None
+        assert found[0] == pytest.approx(law.critical_stiffness(velocity, mass), rel=1e-4)
+        frequency = math.sqrt((law.b - law.a) / law.a) * velocity / law.slip_distance
+        assert found[1] == pytest.approx(frequency, rel=1e-4)
+
+
+@pytest.mark.parametrize(("growth", "ratio"), [(0.05, 0.01), (0.02, 0.01)])
+def test_the_critical_spring_of_contacts_is_near_that_of_rate_and_state(klein, growth, ratio):
+    """Within a third while the limit grows a hundredfold with the mass; one state is not all."""
+    for mass in (1e-9, 1.0):
+        config = sliding(
+            klein,
+            contacts__delay=0.0,
+            contacts__back_force_ratio=0.0,
+            contacts__ageing=LOG | {"growth": growth},
+            contacts__thermal={"rate": 1e4, "force_ratio": ratio},
+            slider={"mass": mass, "stiffness": 97.0, "damping": 0.0},
+        )
+        found = ActivatedSliding(config)
+        expected = found.rate_and_state.critical_stiffness(config.drive_speed, mass)
+        assert found.critical_stiffness is not None
+        assert 0.75 < found.critical_stiffness[0] / expected < 1.35
+
+
+def test_the_critical_spring_is_where_stability_ends(klein):
+    """With a damping that is a ratio, and grows with the spring: by counting roots instead."""
+    for delay, velocity in ((1e-4, 1e-6), (2e-3, 1e-7)):
+        config = klein(
+            contacts__delay=delay,
+            drive__velocity=velocity,
+            contacts__threshold__relative_width=0.2,
+        )
+        found = SteadySliding(config).critical_stiffness
+        assert found is not None
+        assert found[0] == pytest.approx(stable_stiffness(config), rel=2e-3)
+
+
+def test_curve_and_info_report_stability_over_velocity(klein, tmp_path, command, monkeypatch):
+    monkeypatch.setattr(steady_curve, "DECADES", 1)
+    config = sliding(
+        klein,
+        drive__velocity=3e-6,
+        contacts__delay=0.0,
+        contacts__back_force_ratio=0.0,
+        contacts__ageing=LOG | {"growth": 0.1},
+        contacts__thermal=HOT,
+    )
+    file, output = tmp_path / "creep.toml", tmp_path / "curve.nc"
+    file.write_text(config.to_toml())
+    status, printed, _ = command("curve", file, "-o", output)
+    assert status == 0
+    assert "stable above" in printed
+    assert "is linearly unstable, with temperature and ageing" in printed
+    printed = command("info", file)[1]
+    assert "stable with springs stiffer than" in printed
+    assert "mesoslip curve computes K*" not in printed.splitlines()[-1]
+    with xr.open_datatree(output) as tree:
+        assert isinstance(mesoslip.plot(tree), Figure)
+        velocity, force, slope, stiffness = (
+            tree[one].values
+            for one in ("velocity", "steady_force", "steady_slope", "critical_stiffness")
+        )
+        boundary = float(tree.attrs["boundaries"])
+    np.testing.assert_array_equal(stiffness > config.spring_stiffness, velocity < boundary)
+    stable = [sliding_of(config, factor * boundary).is_stable for factor in (0.95, 1.05)]
+    assert stable == [False, True]
+    # The slope is that of F(v).
+    np.testing.assert_allclose(
+        np.diff(force), np.diff(np.log(velocity)) * (slope[1:] + slope[:-1]) / 2, rtol=0.1
+    )
+
+
+def test_sweeps_measure_the_growth_of_creep(klein):
+    config = sliding(klein, contacts__thermal=HOT, drive__velocity=1e-6)
+    found = steady_sliding(config, 10**6)
+    assert found is not None
+    assert found.growth_rate == ActivatedSliding(config).growth_rate
+    assert found.work < 10**4

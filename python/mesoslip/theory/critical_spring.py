@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import singledispatch
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.configuration.sliders.rigid import RigidSlider
 
 Array = NDArray[np.float64]
@@ -22,8 +24,22 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 ROUNDS, POINTS_A_ROUND = 3, 12
 
 
+@singledispatch
+def is_on_one_spring(slider: SliderTable) -> bool:  # noqa: ARG001
+    """Whether a slider is a mass on one spring, of which a critical one is known."""
+    return False
+
+
+@is_on_one_spring.register
+def _is_rigid(slider: RigidSlider) -> bool:  # noqa: ARG001
+    return True
+
+
+@singledispatch
 def critical_spring(
-    slider: RigidSlider, response: Callable[[Array], Complex], path: Array
+    slider: SliderTable,  # noqa: ARG001
+    response: Callable[[Array], Complex],  # noqa: ARG001
+    path: Array,  # noqa: ARG001
 ) -> tuple[float, float] | None:
     """Largest stiffness of the spring at which a perturbation neither grows nor decays.
 
@@ -39,8 +55,16 @@ def critical_spring(
     Returns
     -------
     tuple of float, or None
-        The stiffness [N/m] and the angular frequency of the perturbation [1/s].
+        The stiffness [N/m] and the angular frequency of the perturbation [1/s]; None also for a
+        slider that is not on one spring.
     """
+    return None
+
+
+@critical_spring.register
+def _of_rigid_slider(
+    slider: RigidSlider, response: Callable[[Array], Complex], path: Array
+) -> tuple[float, float] | None:
     stiffness, excess = _spring(slider, path, response(path))
     found = None
     for at in np.flatnonzero(np.diff(np.sign(excess)) != 0):

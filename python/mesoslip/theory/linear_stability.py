@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
-from mesoslip.theory.critical_spring import critical_spring
+from mesoslip.theory.critical_spring import critical_spring, is_on_one_spring
 from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
@@ -386,10 +385,9 @@ class LinearStability(abc.ABC):
 
         The damping is that of the configuration, which grows with the spring where it is a ratio.
         """
-        slider = self.config.slider
-        if self.is_passive or not isinstance(slider, RigidSlider):
+        if self.is_passive or not self.has_critical_stiffness:
             return None
-        return critical_spring(slider, self.response, self._search_path)
+        return critical_spring(self.config.slider, self.response, self._search_path)
 
     @property
     def _search_path(self) -> Array:
@@ -454,7 +452,7 @@ class LinearStability(abc.ABC):
     @property
     def has_critical_stiffness(self) -> bool:
         """Whether the slider is a mass on one spring."""
-        return isinstance(self.config.slider, RigidSlider)
+        return is_on_one_spring(self.config.slider)
 
     @property
     def limit(self) -> str | None:

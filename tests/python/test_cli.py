@@ -121,6 +121,23 @@ def test_start_up_is_quick():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_reading_an_output_does_without_dask(short, tmp_path, command):
+    output = tmp_path / "short.nc"
+    command("run", short, "-o", output, "--quiet", "--set", "run.duration=1s")
+    code = (
+        "import sys\n"
+        "from mesoslip.__main__ import start\n"
+        "sys.argv[1:] = ['regime', *sys.argv[1:]]\n"
+        "try:\n"
+        "    start()\n"
+        "finally:\n"
+        "    assert 'xarray' in sys.modules\n"
+        "    slow = {'dask.base', 'scipy.stats', 'matplotlib'} & sys.modules.keys()\n"
+        "    assert not slow, slow\n"
+    )
+    subprocess.run([sys.executable, "-c", code, output], check=True, capture_output=True)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -72,7 +72,7 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "Group snapshots",
         variables.SNAPSHOTS,
-        "Dimensions `snapshot`, `row`, `column`: the contacts on their lattice.",
+        "Dimensions `snapshot`, `contact`, on a lattice `snapshot`, `row`, `column`.",
     ),
     (
         "mesoslip curve: root",

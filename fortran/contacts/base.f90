@@ -252,11 +252,11 @@ contains
    end function individual_count
 
    !> How the contacts are; nothing for contacts that are not kept one by one.
-   pure subroutine snapshot(self, displacement, values)
+   pure subroutine snapshot(self, time, displacement, values)
       !> The contacts
       class(contacts_type), intent(in) :: self
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
+      !> Time [s], displacement of the slider [m]
+      real(wp), intent(in) :: time, displacement
       !> Of each contact the numbers in the order of snapshot_length, shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
 
@@ -264,9 +264,11 @@ contains
    end subroutine snapshot
 
    !> What each contact is; nothing for contacts that are not kept one by one.
-   pure subroutine records(self, values)
+   pure subroutine records(self, time, values)
       !> The contacts
       class(contacts_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
       !> Numbers in the order of contact_record_length, shape (contact_record_length,
       !> individual_count)
       real(wp), intent(out) :: values(:, :)

@@ -438,11 +438,11 @@ contains
    end subroutine rebuild
 
    !> How the contacts are.
-   pure subroutine snapshot(self, displacement, values)
+   pure subroutine snapshot(self, time, displacement, values)
       !> The contacts
       class(contact_lattice_type), intent(in) :: self
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
+      !> Time [s], displacement of the slider [m]
+      real(wp), intent(in) :: time, displacement
       !> Of each contact its stretch, huge if it is detached [m], force over threshold, and
       !> generation in the present avalanche, shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
@@ -450,7 +450,7 @@ contains
       integer :: contact
       real(wp) :: centre, limit
 
-      call snapshot_individual(self, displacement, values)
+      call snapshot_individual(self, time, displacement, values)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          call bearing(self%record(:, contact), self%surroundings(:, contact), self%bond, centre, &

@@ -248,7 +248,7 @@ contains
       real(wp), allocatable :: values(:, :)
 
       allocate (values(snapshot_length, contacts%individual_count()))
-      call contacts%snapshot(relative, values)
+      call contacts%snapshot(time, relative, values)
       call self%events%add([time, displacement, self%size])
       call self%snapshots%add(reshape(values, [size(values)]))
    end subroutine take_snapshot

@@ -211,7 +211,7 @@ contains
       integer :: neighbour(4, contacts%parameters%count), place
 
       call find_neighbours(lattice_square, columns, rows, neighbour)
-      call contacts%snapshot(displacement, values)
+      call contacts%snapshot(0.0_wp, displacement, values)
       associate (record => contacts%record)
          stretch = merge(displacement - record(row_origin, :), 0.0_wp, &
             & record(row_stiffness, :) > 0.0_wp)
@@ -234,7 +234,7 @@ contains
 
       real(wp) :: values(3, contacts%parameters%count)
 
-      call contacts%snapshot(displacement, values)
+      call contacts%snapshot(0.0_wp, displacement, values)
       bearing = all(abs(values(2, :)) < 1.0_wp + 1.0e-12_wp)
    end function bearing
 

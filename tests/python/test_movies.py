@@ -35,6 +35,13 @@ def ensemble():
 
 
 @pytest.fixture(scope="module")
+def free(ensemble):
+    """The same without sites."""
+    config = mesoslip.Config.from_toml(ensemble.attrs["configuration"])
+    return mesoslip.run(config.replace({"interaction": None}))
+
+
+@pytest.fixture(scope="module")
 def layered():
     changes = ["slider.kind=layered", "slider.layers=4", "output.layers=true"]
     return mesoslip.run(mesoslip.Config.load(KLEIN, [*COMMON, *changes]))
@@ -90,6 +97,37 @@ def test_a_movie_of_snapshots(ensemble, tmp_path, view):
     assert path.stat().st_size < movies.MAX_GIF_BYTES
 
 
+def test_snapshots_need_no_sites(ensemble, free, tmp_path):
+    """The same contacts by their numbers, and the same movie."""
+    assert free["snapshots/stretch"].dims == ("snapshot", "contact")
+    assert free["spring_force"].identical(ensemble["spring_force"])
+    for name in ("stretch", "load", "pinned"):
+        sites = ensemble[f"snapshots/{name}"].stack(contact=("row", "column")).values
+        np.testing.assert_allclose(free[f"snapshots/{name}"].values, sites, rtol=1e-12)
+    path = tmp_path / "free.gif"
+    mesoslip.plot(free, path)
+    with Image.open(path) as film:
+        assert film.n_frames == free["snapshots"].sizes["snapshot"]
+
+
+def test_the_load_of_ageing_contacts_is_that_of_the_moment():
+    """All contacts attached at the start; thresholds grow as the logarithm of the time since."""
+    times = [0.2, 0.4, 0.8, 1.6]
+    changes = [
+        *COMMON,
+        "slider.kind=prescribed",
+        "drive.velocity=1 nm/s",
+        "contacts.coupling=equal",
+        "contacts.ageing={law = 'log', time = '0.1 s', growth = 0.2, initial_age = '0 s'}",
+        f"output.snapshots={times}",
+    ]
+    tree = mesoslip.run(mesoslip.Config.load(KLEIN, changes))
+    data = tree["snapshots"].to_dataset()
+    limits = (data["stretch"] / data["load"]).values
+    grown = 1 + 0.2 * np.log1p(np.array(times) / 0.1)
+    np.testing.assert_allclose(limits / limits[0], np.outer(grown / grown[0], np.ones(120)))
+
+
 def test_axes_of_a_movie_stay(layered):
     with styled():
         film = movie_of(layered, "layers")
@@ -127,13 +165,15 @@ def test_without_ffmpeg_the_extra_is_named(ensemble, tmp_path, monkeypatch):
         mesoslip.plot(ensemble, tmp_path / "a.mp4", view="contacts")
 
 
-def test_what_a_movie_needs_is_said(layered, tmp_path):
+def test_what_a_movie_needs_is_said(layered, free, tmp_path):
     path = tmp_path / "a.gif"
     plain = mesoslip.run(mesoslip.Config.load(KLEIN, ["run.duration=0.1 s", "contacts.count=50"]))
     with pytest.raises(mesoslip.FileError, match=r"output.snapshots(.|\n)*output.layers = true"):
         mesoslip.plot(plain, path)
-    with pytest.raises(mesoslip.FileError, match=r"interaction.strength = 0"):
+    with pytest.raises(mesoslip.FileError, match=r"output.snapshots"):
         mesoslip.plot(plain, path, view="contacts")
+    with pytest.raises(mesoslip.FileError, match=r"have no sites, which \[interaction\].*contacts"):
+        mesoslip.plot(free, path, view="lattice")
     with pytest.raises(mesoslip.FileError, match=r"'run' has no movie; .*layers"):
         mesoslip.plot(layered, path, view="run")
     with pytest.raises(mesoslip.FileError, match="a movie is of one output"):

@@ -9,7 +9,7 @@
 !> bound.
 module mesoslip_contacts_activated_ageing
    use mesoslip_contacts_activated_contacts, only: contact_activated_type, initialize_activated, &
-      & offer_activated, respond_activated
+      & offer_activated
    use mesoslip_contacts_activated_keys, only: exchange_activated, life_left, set_up_activated
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
@@ -50,13 +50,11 @@ module mesoslip_contacts_activated_ageing
       real(wp), allocatable, private :: age(:, :)
       !> Contacts in the order in which their bounds change
       type(break_tree_type), private :: order_renewal
-      !> Time of the last response [s], and whether contacts are those of the start
-      real(wp), private :: now = 0.0_wp
+      !> Whether contacts are those of the start
       logical, private :: is_start = .false.
    contains
       procedure :: initialize
       procedure :: offer
-      procedure :: respond
       procedure :: plan
       procedure :: prepare
       procedure :: confirms
@@ -125,17 +123,6 @@ contains
       window%end_time = min(window%end_time, self%order_renewal%first())
    end subroutine offer
 
-   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
-   subroutine respond(self, before, after)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Where the slider was, and where it is
-      type(pose_type), intent(in) :: before, after
-
-      self%now = after%time
-      call respond_activated(self, before, after)
-   end subroutine respond
-
    !> Write no schedule: bounds of thresholds change with the time.
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
@@ -164,7 +151,7 @@ contains
       call self%bound(contact, pose)
    end subroutine prepare
 
-   !> Threshold of a contact now, as a stretch.
+   !> Threshold of a contact at a time, as a stretch.
    pure function threshold(self, contact, time)
       class(contact_activated_ageing_type), intent(in) :: self
       integer, intent(in) :: contact
@@ -303,19 +290,21 @@ contains
    end subroutine rebuild
 
    !> What each contact is.
-   pure subroutine records(self, values)
+   pure subroutine records(self, time, values)
       !> The contacts
       class(contact_activated_ageing_type), intent(in) :: self
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch of now [m], number of
-      !> renewals of each contact, shape (contact_record_length, count)
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
+      !> number of renewals of each contact, shape (contact_record_length, count)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact
 
-      call self%contact_activated_type%records(values)
+      call self%contact_activated_type%records(time, values)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         values(3, contact) = self%threshold(contact, self%now)
+         values(3, contact) = self%threshold(contact, time)
       end do
    end subroutine records
 
@@ -329,7 +318,6 @@ contains
       call exchange_activated(self, archive)
       call archive%section("ages of activated contacts")
       call archive%exchange("age", self%age)
-      call archive%exchange("now", self%now)
    end subroutine exchange
 
 end module mesoslip_contacts_activated_ageing

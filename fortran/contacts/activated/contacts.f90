@@ -29,7 +29,7 @@ module mesoslip_contacts_activated_contacts
 
    public :: contact_activated_type, make_contact_activated
    ! For kinds that extend this one: a call by a component would lose their own procedures.
-   public :: initialize_activated, offer_activated, respond_activated
+   public :: initialize_activated, offer_activated
 
    !> Minimum length of a schedule
    integer, parameter :: min_length = 4

@@ -272,11 +272,13 @@ contains
    end subroutine count_visits
 
    !> What each contact is.
-   pure subroutine records(self, values)
+   pure subroutine records(self, time, values)
       !> The contacts
       class(ageing_contacts_type), intent(in) :: self
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch of now [m], number of
-      !> renewals of each contact, shape (contact_record_length, count)
+      !> Time [s]
+      real(wp), intent(in) :: time
+      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
+      !> number of renewals of each contact, shape (contact_record_length, count)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact
@@ -286,7 +288,7 @@ contains
             & contact)
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          values(3, contact) = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
-            & self%now - self%life(life_birth, contact))
+            & time - self%life(life_birth, contact))
       end do
    end subroutine records
 

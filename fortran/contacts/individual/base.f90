@@ -6,7 +6,8 @@
 !> reverses (behind_of). Coordinates are along a direction of motion; displacements are relative to
 !> an origin that the caller shifts.
 module mesoslip_contacts_individual_base
-   use mesoslip_contacts_base, only: contacts_type, exchange_contacts, extent_length
+   use mesoslip_contacts_base, only: contact_record_length, contacts_type, exchange_contacts, &
+      & extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
       & new_avalanche_track, row_generation
    use mesoslip_contacts_individual_births, only: bear, births_type, drag_of
@@ -378,25 +379,29 @@ contains
    end subroutine take_extent
 
    !> State of each contact.
-   pure subroutine snapshot_individual(self, displacement, values)
+   pure subroutine snapshot_individual(self, time, displacement, values)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
+      !> Time [s], displacement of the slider [m]
+      real(wp), intent(in) :: time, displacement
       !> For each contact: stretch [m] (huge if it is detached), force over threshold, generation
       !> in the current avalanche; shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
 
+      real(wp), allocatable :: now(:, :)
       integer :: contact
 
+      ! Thresholds of now, which ageing contacts do not keep.
+      allocate (now(contact_record_length, self%parameters%count))
+      call self%records(time, now)
       do contact = 1, self%parameters%count
          values(:, contact) = [huge(1.0_wp), 0.0_wp, 0.0_wp]
          if (self%track%columns > 0) then
             values(3, contact) = real(self%track%contact(row_generation, contact), wp)
          end if
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         values(1, contact) = displacement - self%record(row_origin, contact)
-         values(2, contact) = values(1, contact) / self%record(row_limit, contact)
+         if (.not. now(2, contact) > 0.0_wp) cycle
+         values(1, contact) = displacement - now(1, contact)
+         values(2, contact) = values(1, contact) / now(3, contact)
       end do
    end subroutine snapshot_individual
 
@@ -445,9 +450,11 @@ contains
    end function individual_count
 
    !> Records of all contacts.
-   pure subroutine records(self, values)
+   pure subroutine records(self, time, values)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
+      !> Time [s]
+      real(wp), intent(in) :: time
       !> For each contact: origin [m], stiffness [N/m] (0 while detached), breaking stretch [m],
       !> number of renewals; shape (contact_record_length, count)
       real(wp), intent(out) :: values(:, :)

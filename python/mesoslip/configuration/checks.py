@@ -131,13 +131,15 @@ def output_problems(config: Setting) -> Complaints:
     if output.layers and not config.slider.layers_recorded(config):
         named = _named(kind for kind, table in SLIDERS.items() if "layers" in table.model_fields)
         yield Complaint("output.layers", f"is for {named} only", True)
-    if not config.contact_kind.on_lattice:
-        for key in ("snapshots", "snapshot_size"):
-            if getattr(output, key):
-                yield Complaint(
-                    f"output.{key}", "needs [interaction], which gives contacts their sites"
-                )
     times = list(output.snapshots)
+    if times and not config.contact_kind.is_discrete:
+        yield Complaint("output.snapshots", 'needs engine "eq", which has contacts one by one')
+    if output.snapshot_size is not None and not config.has_avalanches:
+        yield Complaint(
+            "output.snapshot_size",
+            f"needs [interaction] or {_named_jumping()}; output.snapshots needs neither",
+            output.snapshot_size,
+        )
     if times != sorted(set(times)) or (times and times[-1] > config.duration):
         yield Complaint("output.snapshots", "must increase, up to the duration of the run", times)
     if output.avalanche_size is not None and not config.has_avalanches:

@@ -72,7 +72,7 @@ def explored(config: Config) -> Config:
     """
     expected = config.expected_duration
     interval = max(config.output_interval, expected / MAX_SAMPLES)
-    output: dict[str, object] = {"interval": interval, "layers": False}
+    output: dict[str, object] = {"interval": interval, "layers": False, "snapshots": []}
     if config.slider.slip_velocity(config) > 0:
         fine = config.output.slip_interval or config.slider.quiet_time / SAMPLES_IN_SLIP
         output["slip_interval"] = min(interval, max(fine, expected / MAX_FINE_SAMPLES))

@@ -11,7 +11,6 @@ import numpy as np
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.execution.stop import StopRequest
-from mesoslip.explorer.controls import lattice_size
 from mesoslip.explorer.live_run import explored, run_live
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
@@ -71,22 +70,15 @@ def recorded_for_movie(config: Config) -> tuple[str, Config]:
     if not wanted.contact_kind.is_discrete:
         message = 'a movie shows contacts one by one, which engine "eq" has'
         raise ConfigError([Problem("", "run.engine", message, config.run.engine)])
-    count = wanted.contacts.count
-    columns, rows = lattice_size(count, "square")
-    if columns * rows != count:
-        message = f"has no movie, which needs columns and rows of contacts; {columns * rows} has"
-        raise ConfigError([Problem("", "contacts.count", message, count)])
-    # Contacts without interaction have no neighbours that matter: the motion is the same.
-    sites = {"lattice": "square", "columns": columns, "rows": rows, "strength": 0.0}
-    return "contacts", explored(wanted.replace({"interaction": sites}))
+    return "contacts", wanted
 
 
 def around_slip(config: Config, results: Results) -> Config:
-    """The same with most of the snapshots in the largest slip of a run."""
+    """The same with snapshots, most of them in the largest slip of a run."""
     slip = largest_slip(build_tree(results))
-    if slip is None:
-        return config
     end = config.expected_duration
+    if slip is None:
+        return config.replace({"output.snapshots": np.linspace(0.0, end, SNAPSHOTS).tolist()})
     low, high = slip_window(slip)
     inside = np.linspace(max(low, 0.0), min(high, end), round(IN_SLIP * SNAPSHOTS))
     around = np.linspace(0.0, end, round((1 - IN_SLIP) * SNAPSHOTS) + 1)[1:-1]

@@ -21,6 +21,7 @@ from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.extent import Extent
+from mesoslip.plots.lattice import is_on_lattice
 from mesoslip.plots.lines import line
 from mesoslip.plots.trace import NAMES, UNITS, force_of
 from mesoslip.quantities import UNKNOWN, Scale, scale_for, with_unit
@@ -328,7 +329,7 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
     if "snapshots" not in tree.children:
         return None
     data = group_of(tree, "snapshots")
-    if data.sizes["snapshot"] == 0:
+    if data.sizes["snapshot"] == 0 or not is_on_lattice(data):
         return None
     times = data["snapshot_time"].values
     step = max(1, math.ceil(max(data.sizes["row"], data.sizes["column"]) / MAX_SITES))

@@ -113,7 +113,7 @@ def describe(results: RunResults) -> dict[str, GroupLayout]:
     config = results.config
     layout = {"": _root(results), "slips": _slips(results), "energy": _energy(results)}
     layout["stages"] = _stages(results)
-    if config.output.slip_interval is not None and config.slider.slip_velocity(config) > 0:
+    if config.slip_interval is not None:
         layout["slip_traces"] = _slip_traces(results)
     if config.has_avalanches:
         layout["avalanches"] = _avalanches(results)
@@ -243,10 +243,8 @@ def _avalanches(results: RunResults) -> GroupLayout:
 
 
 def _snapshots(results: RunResults) -> GroupLayout:
-    """The contacts on their lattice, dimensions ``snapshot``, ``row``, ``column``."""
+    """All contacts: dimensions ``snapshot`` and ``contact``; on a lattice ``row``, ``column``."""
     config, lattice = results.config, results.config.interaction
-    assert lattice is not None
-    assert config.contacts.area is not None
     writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_events")
     how: dict[str, Any] = {"table": "snapshot_events"}
     writer.add(
@@ -258,10 +256,16 @@ def _snapshots(results: RunResults) -> GroupLayout:
     )
     writer.add("displacement", ("snapshot",), pick=column("snapshot_events", "displacement"), **how)
     writer.add("avalanche_size", ("snapshot",), pick=column("snapshot_events", "size"), **how)
-    spacing = np.sqrt(config.contacts.area / config.contacts.count)
-    for name, sites in zip("xy", lattice_sites(lattice), strict=True):
-        writer.add(name, ("row", "column"), is_coordinate=True, values=spacing * sites)
-    shape = (-1, lattice.rows, lattice.columns)
+    places = {"contact": config.contacts.count}
+    if lattice is None:
+        numbers = np.arange(config.contacts.count)
+        writer.add("contact", ("contact",), is_coordinate=True, values=numbers)
+    else:
+        places = {"row": lattice.rows, "column": lattice.columns}
+        assert config.contacts.area is not None
+        spacing = np.sqrt(config.contacts.area / config.contacts.count)
+        for name, sites in zip("xy", lattice_sites(lattice), strict=True):
+            writer.add(name, tuple(places), is_coordinate=True, values=spacing * sites)
     stretch, load, generation = (
         tables.SNAPSHOT_NUMBERS.index(name) for name in ("stretch", "load", "generation")
     )
@@ -269,20 +273,16 @@ def _snapshots(results: RunResults) -> GroupLayout:
         "stretch": lambda rows, _: rows[..., stretch],
         "load": lambda rows, _: np.where(np.isfinite(rows[..., stretch]), rows[..., load], np.nan),
         "pinned": lambda rows, _: np.isfinite(rows[..., stretch]),
-        "generation": lambda rows, _: rows[..., generation],
     }
+    if lattice is not None:
+        picks["generation"] = lambda rows, _: rows[..., generation]
 
-    def on_lattice(pick: Pick) -> Pick:
-        return lambda rows, owners: pick(rows, owners).reshape(shape)
+    def in_place(pick: Pick) -> Pick:
+        return lambda rows, owners: pick(rows, owners).reshape(-1, *places.values())
 
     for name, pick in picks.items():
-        where = ("snapshot", "row", "column")
-        writer.add(name, where, table="snapshots", pick=on_lattice(pick))
-    sizes = {
-        "snapshot": _count(results, "snapshots"),
-        "row": lattice.rows,
-        "column": lattice.columns,
-    }
+        writer.add(name, ("snapshot", *places), table="snapshots", pick=in_place(pick))
+    sizes = {"snapshot": _count(results, "snapshots"), **places}
     return GroupLayout(sizes, writer.entries, {})
 
 

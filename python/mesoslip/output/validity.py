@@ -24,7 +24,7 @@ NEEDS = {
     "stages": (("stage",), tuple(variables.STAGES)),
     "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
     "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
-    "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:8]),
+    "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:7]),
 }
 
 

@@ -224,6 +224,7 @@ SNAPSHOTS = Group(
     stretch=Meaning("m", "stretch of the contact, missing if it is detached"),
     load=Meaning("1", "force that breaks the contact over its threshold"),
     pinned=Meaning("1", "whether the contact is pinned", np.int8),
+    contact=Meaning("1", "number of the contact", np.int64),
     generation=Meaning(
         "1", "step of the avalanche in which the contact broke, 0 if it did not", np.int32
     ),

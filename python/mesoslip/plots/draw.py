@@ -21,7 +21,7 @@ from mesoslip.plots.views.base import Options, View
 
 NO_OPTIONS = Options()
 # Views of which a movie is made without a view, the first that an output has.
-MOVIES = ("lattice", "layers")
+MOVIES = ("lattice", "layers", "contacts")
 
 
 class Picture(NamedTuple):

@@ -61,9 +61,8 @@ def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
     """
     if "snapshots" not in tree.children:
         raise FileError(
-            "the output has no snapshots of its contacts; they are recorded with [interaction] and "
-            "output.snapshots (times) or output.snapshot_size (a minimum size of avalanches); with "
-            "interaction.strength = 0 the motion is that without [interaction]"
+            "the output has no snapshots of its contacts; they are recorded at the times of "
+            "output.snapshots, and after avalanches of output.snapshot_size and more"
         )
     data = group_of(tree, "snapshots")
     count = data.sizes["snapshot"]
@@ -78,6 +77,28 @@ def chosen_snapshot(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
     if not 0 <= number < count:
         raise FileError(f"there is no snapshot {number}; the last one is {count - 1}")
     return data.isel(snapshot=number)
+
+
+def chosen_lattice(tree: xr.DataTree, number: int | None = None) -> xr.Dataset:
+    """The same of contacts on a lattice.
+
+    Raises
+    ------
+    FileError
+        If the output has no such snapshot, or its contacts have no sites.
+    """
+    snapshot = chosen_snapshot(tree, number)
+    if not is_on_lattice(snapshot):
+        raise FileError(
+            "the contacts of the output have no sites, which [interaction] gives them; "
+            '--view contacts (view="contacts") shows their stretches'
+        )
+    return snapshot
+
+
+def is_on_lattice(snapshots: xr.Dataset) -> bool:
+    """Whether the contacts of snapshots have sites."""
+    return "row" in snapshots.sizes
 
 
 def draw_load(axes: Axes, snapshot: xr.Dataset) -> None:

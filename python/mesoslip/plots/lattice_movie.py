@@ -13,7 +13,7 @@ from mesoslip.output.access import group_of
 from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import curve, draw_curves
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.lattice import MAX_POLYGONS, chosen_snapshot, draw_contacts
+from mesoslip.plots.lattice import MAX_POLYGONS, chosen_lattice, draw_contacts
 from mesoslip.plots.movie import MAX_FRAMES, Movie, chosen_frames, time_bar
 from mesoslip.plots.style import canvas
 from mesoslip.plots.trace import driving_force_of
@@ -22,7 +22,7 @@ from mesoslip.quantities import with_unit
 
 def lattice_movie(tree: xr.DataTree, number: int | None = None) -> Movie:
     """An avalanche that spreads, or the snapshots one after another with a bar of time."""
-    snapshot = chosen_snapshot(tree, number)
+    snapshot = chosen_lattice(tree, number)
     if snapshot["avalanche_size"].item():
         return _spreading(snapshot)
     return _snapshots(tree, snapshot)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.axes import Axes
 
-from mesoslip.plots.lattice import chosen_snapshot, draw_generations, draw_load
+from mesoslip.plots.lattice import chosen_lattice, draw_generations, draw_load
 from mesoslip.plots.lattice_movie import lattice_movie
 from mesoslip.plots.style import Canvas, side_by_side, styled
 from mesoslip.plots.views.base import Options, View
@@ -13,7 +13,7 @@ from mesoslip.plots.views.base import Options, View
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
     """Force over threshold of each contact, and generations of the avalanche before."""
-    snapshot = chosen_snapshot(tree, options.snapshot)
+    snapshot = chosen_lattice(tree, options.snapshot)
     size = snapshot["avalanche_size"].item()
     with styled():
         figure, panels = side_by_side(figure, (6.5, 3.4) if size else (3.6, 3.4), 2 if size else 1)
@@ -26,7 +26,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     """Draw the force over threshold of each contact."""
-    draw_load(axes, chosen_snapshot(tree, options.snapshot))
+    draw_load(axes, chosen_lattice(tree, options.snapshot))
 
 
 VIEW = View(

@@ -8,6 +8,7 @@ from mesoslip.output.access import group_of
 from mesoslip.output.kinds import kind_of
 from mesoslip.plots import draw
 from mesoslip.plots.extent import Extent
+from mesoslip.plots.lattice import is_on_lattice
 from mesoslip.plots.views import view_of
 from mesoslip.plots.views.base import Options
 from mesoslip.reports.content import PARTS, Block, Section, Subject, drawn
@@ -33,6 +34,11 @@ def pictures(subjects: Sequence[Subject]) -> Section:
             caption = "Waves in the slider during its largest slip"
             blocks.append(picture_of(subjects, subject, caption, "layers", options))
         if "snapshots" in tree.children and group_of(tree, "snapshots").sizes["snapshot"]:
-            caption = "Contacts on their lattice"
-            blocks.append(picture_of(subjects, subject, caption, "lattice"))
+            has_sites = is_on_lattice(group_of(tree, "snapshots"))
+            caption, view = (
+                ("Contacts on their lattice", "lattice")
+                if has_sites
+                else ("Stretches of the contacts and their thresholds", "contacts")
+            )
+            blocks.append(picture_of(subjects, subject, caption, view))
     return Section("Pictures", tuple(blocks))

@@ -62,6 +62,9 @@ def session():
 
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda control: control.key)
 def test_controls_are_keys_of_the_configuration(control):
+    if control.is_switch:
+        assert key_kind(f"{control.key}.{control.choices[1]}") is not None
+        return
     kind = key_kind(control.key)
     assert kind is not None
     is_number = kind.unit is not None or kind.is_whole
@@ -293,6 +296,35 @@ def test_contacts_begin_to_age_and_cease_to(session):
     assert session.change("contacts.ageing.law", "none")
     assert session.changes == {}
     assert session.config == session.start
+
+
+def test_temperature_is_switched_on_and_off(session):
+    """By a force or a temperature of the same size; a file that has it can be without."""
+    for choice in ("force_ratio", "temperature"):
+        assert session.change("contacts.thermal", choice)
+        contacts = session.config.contacts
+        assert contacts.thermal.ratio(contacts.contact_static_force) == pytest.approx(0.04, rel=0.1)
+        assert session.is_changed("contacts.thermal")
+        assert session.text("contacts.thermal") == choice
+    assert "contacts.thermal.force_ratio" not in session.shown
+    assert session.change("contacts.thermal.temperature", "200 K")
+    # Ageing needs the same coupling, and keeps it.
+    assert session.change("contacts.ageing.law", "log")
+    assert session.change("contacts.thermal", "none")
+    assert session.config.contacts.coupling == "equal"
+    assert session.change("contacts.ageing.law", "none")
+    assert session.changes == {}
+    assert session.config == session.start
+
+    warm = Session(Config.load(KLEIN, STARTS["contacts.thermal.rate"]), KLEIN)
+    assert warm.text("contacts.thermal") == "force_ratio"
+    assert warm.change("contacts.thermal", "none")
+    assert warm.config.contacts.thermal is None
+    assert "contacts.thermal=none" in warm.command
+    assert warm.change("contacts.thermal", "temperature")
+    assert warm.config.contacts.thermal.temperature == 300
+    assert warm.change("contacts.thermal", "force_ratio")
+    assert warm.changes == {}
 
 
 def test_what_the_kernel_refuses_is_reported_too(session):
@@ -803,9 +835,8 @@ def test_a_movie_is_made_or_the_key_is_named():
     )
     assert movie.startswith(b"GIF8")
     assert said == ["the movie: running …", "the movie: drawing …"]
-    for change, key in (("run.engine=me", "run.engine"), ("contacts.count=401", "contacts.count")):
-        with pytest.raises(ConfigError, match=f"{key}.*movie"):
-            movie_of(Config.load(KLEIN, (*FAST_MOVIE, change)), Stop(), said.append)
+    with pytest.raises(ConfigError, match=r"run.engine.*movie"):
+        movie_of(Config.load(KLEIN, (*FAST_MOVIE, "run.engine=me")), Stop(), said.append)
     stop = Stop()
     stop.set()
     assert movie_of(Config.load(KLEIN), stop, said.append) is None

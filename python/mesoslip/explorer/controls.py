@@ -7,7 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES, LATTICES
+from mesoslip.configuration.contacts.tables import (
+    BOLTZMANN,
+    COUPLINGS,
+    INITIAL_STATES,
+    LATTICES,
+)
 from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.sliders import SLIDERS
@@ -48,6 +53,8 @@ class Control:
         Keys that a choice requires, with their default values.
     is_text
         Whether it is a list, which is written in words.
+    is_switch
+        Whether it is a table, of which a choice gives the keys.
     """
 
     key: str
@@ -60,6 +67,7 @@ class Control:
     choice_labels: Mapping[str, str] = field(default_factory=dict)
     required: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     is_text: bool = False
+    is_switch: bool = False
 
     @property
     def unit(self) -> str:
@@ -110,7 +118,9 @@ class Scale:
     def value(self, position: float) -> float:
         """The value at a position."""
         part = min(max(position / STEPS, 0.0), 1.0)
-        if self.is_logarithmic:
+        if part == 1:
+            value = self.high
+        elif self.is_logarithmic:
             value = self.low * (self.high / self.low) ** part
         else:
             value = self.low + part * (self.high - self.low)
@@ -156,6 +166,17 @@ def lattice_size(count: int, lattice: str) -> tuple[int, int]:
     others = [(max(2, round(count / rows)), rows) for rows in all_rows]
     nearly = [one for one in others if ratio(*one) <= math.log(MAX_RATIO)] or others
     return min(nearly, key=lambda pair: (abs(pair[0] * pair[1] - count), ratio(*pair)))
+
+
+# Activation that a switch brings: f_T/f_s, and the temperature [K] at which it is that.
+ACTIVATION_RATIO = 0.04
+ROOM_TEMPERATURE = 300.0
+
+
+def activation_length(config: Config) -> str:
+    """The activation length with which f_T/f_s is `ACTIVATION_RATIO` at room temperature."""
+    force = ACTIVATION_RATIO * config.contacts.contact_static_force
+    return with_unit(BOLTZMANN * ROOM_TEMPERATURE / force, "m", 2)
 
 
 CONTROLS = (
@@ -222,10 +243,51 @@ CONTROLS = (
     Control(
         "contacts.ageing.young_relative_width", "width of the young", "Ageing", 1, (1e-3, 1), 0.1
     ),
-    Control("contacts.thermal.rate", "rate at the threshold ω_0", "Temperature", 3),
-    Control("contacts.thermal.force_ratio", "force f_T/f_s", "Temperature", 1.5, (1e-3, 1)),
-    Control("contacts.thermal.temperature", "temperature", "Temperature", 1),
-    Control("contacts.thermal.activation_length", "activation length x_a", "Temperature", 1),
+    Control(
+        "contacts.thermal",
+        "contacts break",
+        "Temperature",
+        choices=(NONE, "force_ratio", "temperature"),
+        choice_labels={
+            NONE: "at their thresholds",
+            "force_ratio": "by activation, force f_T",
+            "temperature": "by activation, temperature T",
+        },
+        required={
+            "force_ratio": {
+                "contacts.thermal.rate": "1e4 1/s",
+                "contacts.thermal.force_ratio": f"{ACTIVATION_RATIO}",
+                "contacts.coupling": "equal",
+            },
+            # The activation length follows from the thresholds, see `activation_length`.
+            "temperature": {
+                "contacts.thermal.rate": "1e4 1/s",
+                "contacts.thermal.temperature": f"{ROOM_TEMPERATURE} K",
+                "contacts.thermal.activation_length": "",
+                "contacts.coupling": "equal",
+            },
+        },
+        is_switch=True,
+    ),
+    Control("contacts.thermal.rate", "rate at the threshold ω_0", "Temperature", 3, usual=1e4),
+    Control(
+        "contacts.thermal.force_ratio",
+        "force f_T/f_s",
+        "Temperature",
+        1.5,
+        (1e-3, 1),
+        ACTIVATION_RATIO,
+    ),
+    Control(
+        "contacts.thermal.temperature", "temperature T", "Temperature", 1, usual=ROOM_TEMPERATURE
+    ),
+    Control(
+        "contacts.thermal.activation_length",
+        "activation length x_a",
+        "Temperature",
+        1.5,
+        usual=1e-10,
+    ),
     Control(
         "interaction.lattice",
         "lattice",
@@ -245,6 +307,7 @@ BY_KEY = {control.key: control for control in CONTROLS}
 
 # Controls of whole tables: they are shown without the table too.
 TABLE_CONTROLS = ("contacts.ageing.law", "interaction.lattice")
+SWITCHES = tuple(control.key for control in CONTROLS if control.is_switch)
 
 
 def values(config: Config) -> dict[str, object]:
@@ -252,6 +315,9 @@ def values(config: Config) -> dict[str, object]:
     given = flat(config)
     for key in TABLE_CONTROLS:
         given.setdefault(key, NONE)
+    for key in SWITCHES:
+        there = (one for one in BY_KEY[key].required if f"{key}.{one}" in given)
+        given[key] = next(there, NONE)
     if config.drive.velocity is not None:
         given["drive.stage"] = ()
     if "damping_ratio" in type(config.slider).model_fields and "slider.damping" not in given:

@@ -100,7 +100,7 @@ class ControlView:
 
     @property
     def _may_lack(self) -> bool:
-        return self._session.start_text(self.control.key) == NONE
+        return self.control.is_switch or self._session.start_text(self.control.key) == NONE
 
     def _moved(self, _attribute: str, _old: Any, position: float) -> None:
         if position != self._position and self._scale is not None:

@@ -14,8 +14,10 @@ from mesoslip.explorer.controls import (
     BY_KEY,
     LATTICE_SIZE,
     NONE,
+    SWITCHES,
     TABLE_CONTROLS,
     Control,
+    activation_length,
     lattice_size,
     values,
 )
@@ -125,6 +127,9 @@ class Session:
         if control.is_text:
             self._set_stages(text)
             return
+        if control.is_switch:
+            self._switch(control, text)
+            return
         if text in {self.start_text(key), NONE}:
             self.changes.pop(key, None)
         else:
@@ -147,6 +152,40 @@ class Session:
             if self.start.drive.velocity is not None:
                 self.changes["drive.velocity"] = NONE
 
+    def _switch(self, control: Control, text: str) -> None:
+        """Give a table the keys of a choice, or omit it."""
+        table, needed = control.key, control.required
+        if text not in control.choices:
+            choices = ", ".join(control.choices)
+            raise ConfigError([Problem("", table, f"must be one of {choices}", text)])
+        every = {one for keys in needed.values() for one in keys}
+        for one in (*every, table):
+            if one not in self._needed_by_others(table):
+                self.changes.pop(one, None)
+        if text == self.start_text(table):
+            return
+        if text == NONE:
+            self.changes[table] = NONE
+            return
+        for one in sorted(every):
+            is_there = one in self._at_start
+            if one not in needed[text]:
+                if is_there:
+                    self.changes[one] = NONE
+            elif not one.startswith(table):
+                self.changes[one] = needed[text][one]
+            elif not is_there:
+                self.changes[one] = needed[text][one] or activation_length(self.config)
+
+    def _needed_by_others(self, table: str) -> set[str]:
+        """Keys that the choices of other tables require now."""
+        return {
+            one
+            for key in (*TABLE_CONTROLS, *SWITCHES)
+            if key != table
+            for one in BY_KEY[key].required.get(self.text(key), {})
+        }
+
     def start_text(self, key: str) -> str:
         """Value of a key at the start; empty if it was not given."""
         return self._text_of(key, self._at_start[key]) if key in self._at_start else ""
@@ -164,6 +203,8 @@ class Session:
 
     def is_changed(self, key: str) -> bool:
         """Whether a key differs from the start."""
+        if BY_KEY[key].is_switch:
+            return self.values.get(key) != self._at_start.get(key)
         return key in self.changes
 
     @property
@@ -186,7 +227,7 @@ class Session:
         known = self._at_start
         if key in TABLE_CONTROLS:
             # Changes within a table are removed with the table, or with their choice.
-            for one in mine.difference(needed.get(text, {})):
+            for one in mine.difference(needed.get(text, {}), self._needed_by_others(key)):
                 self.changes.pop(one, None)
         else:
             kept = SLIDERS[text].model_fields if text in SLIDERS else {}

@@ -63,6 +63,8 @@ def draw_curves(
     largest = max_size(*(one.y for one in curves))
     scale = scale_for(largest, UNITS[name])
     for x, y, style in curves:
+        # The dashes of the style are for curves of several outputs, which have them from it.
+        style = {"linestyle": "-"} | style
         axes.plot((x - horizontal.origin) / horizontal.scale.size, y / scale.size, **style)
     axes.set_ylabel(scale.label(label or NAMES[name]))
     if name == "detached_contacts" and largest == 0:

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.response import creep_line, friction_line, response_of
 from mesoslip.configuration.config import Config
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.record import MAX_MARKS
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles, write_title
 from mesoslip.quantities import scale_for, with_error
 from mesoslip.theory.thermal import creep_force
 
@@ -84,12 +85,12 @@ def _draw_creep(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
         theory = np.array([creep_force(config, one) for one in grid]) / experiment.static_force
         axes.plot(grid / unit.size, theory, color=RED, label="$F(v)$ and damping, theory")
         axes.legend(loc="upper left")
-    axes.set_xscale("log")
+    logarithmic(axes, "x")
     line = creep_line(data)
     if line is not None:
         scale = 1 / experiment.static_force
         slope = with_error(line.slope * scale, line.slope_error * scale)
-        axes.set_title(f"$dF/d\\ln v$ = {slope} $F_s$", loc="left")
+        write_title(axes, f"$dF/d\\ln v$ = {slope} $F_s$")
     axes.set_xlabel(unit.label("velocity of creep"))
     axes.set_ylabel("force over $F_s$")
 
@@ -107,12 +108,12 @@ def _draw_friction(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None
     unit = scale_for(float(np.max(rate)), "N/s")
     error = np.nan_to_num(data["static_friction_error"].values) * scale
     axes.errorbar(rate / unit.size, friction * scale, error, fmt="o", color="black", markersize=3)
-    axes.set_xscale("log")
+    logarithmic(axes, "x")
     line = friction_line(data)
     if line is not None:
         ends = np.array([rate.min(), rate.max()])
         axes.plot(ends / unit.size, (line.level + line.slope * np.log(ends)) * scale, color=RED)
         slope = with_error(line.slope * scale, line.slope_error * scale)
-        axes.set_title(f"slope over ln of the rate = {slope} $F_s$", loc="left")
+        write_title(axes, f"slope over ln of the rate = {slope} $F_s$")
     axes.set_xlabel(unit.label("rate of the force"))
     axes.set_ylabel("static friction over $F_s$")

@@ -16,6 +16,7 @@ from mesoslip.analysis.rate_and_state import (
 )
 from mesoslip.analysis.response import response_of, rows_of
 from mesoslip.errors import RunError
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.record import draw_record, force_unit, title_record
 from mesoslip.plots.style import RED, Canvas, canvas, styled
@@ -128,7 +129,7 @@ def _draw_rates(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
         axes.plot([], [], "s", color=RED, markersize=3, label="law")
         axes.legend()
     axes.axhline(0, color="0.7", zorder=0)
-    axes.set_xscale("log")
+    logarithmic(axes, "x")
     axes.set_xlim(velocity.min() / scale.size / MARGIN, velocity.max() / scale.size * MARGIN)
     axes.set_xlabel(scale.label("velocity after the step"))
     axes.set_ylabel(f"$a - b$ ({unit.name})")
@@ -156,7 +157,7 @@ def _draw_healing(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
         color="black",
         markersize=3,
     )
-    axes.set_xscale("log")
+    logarithmic(axes, "x")
     axes.set_xlabel("hold time (s)")
     axes.set_ylabel(f"healing ({unit.name})")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
 import string
@@ -14,7 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import MaxNLocator
 
 from mesoslip.errors import ConfigError, FileError, Problem
 
@@ -32,6 +35,8 @@ STYLE_FILE = Path(__file__).with_name("mesoslip.mplstyle")
 FONTS: dict[str, Any] = {"pdf.fonttype": 42, "ps.fonttype": 42}
 # Settings of matplotlib that are no matter of a style.
 NO_STYLE = ("backend", "interactive", "toolbar", "timezone", "webagg", "savefig.directory")
+# Ticks of an axis that has no room for more.
+FEW_TICKS = 4
 # Label of axes that get no letter, as colour bars have it.
 UNLETTERED = "<unlettered>"
 
@@ -173,7 +178,7 @@ def finish(figure: Figure | SubFigure) -> None:
         text = filled(how.title, 0.95 * figure.bbox.width / figure.figure.dpi)
         figure.suptitle(text, x=0.01, ha="left")
     if how.letters:
-        panels = [one for one in figure.axes if one.get_label() not in (UNLETTERED, "<colorbar>")]
+        panels = [one for one in figure.axes if _is_panel(one)]
         if len(panels) > 1:
             for letter, axes in zip(string.ascii_lowercase, panels, strict=False):
                 axes.annotate(
@@ -187,6 +192,16 @@ def finish(figure: Figure | SubFigure) -> None:
                 )
     if how.width is not None or how.font_size is not None:
         wrap_labels(figure)
+        thin_ticks(figure)
+
+
+def _is_panel(axes: Axes) -> bool:
+    """Whether axes are a panel of their own: no bar of colours, no second scale of others."""
+    others = [one for one in axes.get_shared_x_axes().get_siblings(axes) if one is not axes]
+    is_second = axes.patch.get_visible() is False and any(
+        one.get_subplotspec() == axes.get_subplotspec() for one in others
+    )
+    return axes.get_label() not in (UNLETTERED, "<colorbar>") and not is_second
 
 
 def wrap_labels(figure: Figure | SubFigure) -> None:
@@ -197,6 +212,17 @@ def wrap_labels(figure: Figure | SubFigure) -> None:
         height = axes.get_window_extent().height
         if label.get_text() and label.get_window_extent().height > height:
             label.set_text(_in_two_lines(label.get_text()))
+
+
+def thin_ticks(figure: Figure | SubFigure) -> None:
+    """Use fewer ticks on horizontal axes whose labels would touch each other."""
+    figure.figure.draw_without_rendering()
+    for axes in figure.axes:
+        labels = [one.get_window_extent() for one in axes.get_xticklabels() if one.get_text()]
+        gap = 0.5 * mpl.rcParams["font.size"] * figure.figure.dpi / 72
+        touch = any(after.x0 < before.x1 + gap for before, after in itertools.pairwise(labels))
+        if touch and isinstance(axes.xaxis.get_major_locator(), MaxNLocator):
+            axes.locator_params(axis="x", nbins=FEW_TICKS)
 
 
 def _in_two_lines(text: str) -> str:

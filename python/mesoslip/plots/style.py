@@ -85,6 +85,11 @@ def titles(
     axes.set_title("\n".join(lines), loc="left")
 
 
+def write_title(axes: Axes, text: str) -> None:
+    """Write a title, which may have symbols, in as many lines as it needs over axes."""
+    axes.set_title(wrapped(text, axes_width(axes)), loc="left")
+
+
 def headings(tree: xr.DataTree) -> list[str]:
     """The title of an output and its changes from its base; none if the picture has a title."""
     if current().title is not None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from mesoslip.configuration.units import from_cf_units
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.names import name_of
 from mesoslip.plots.style import axes_width, characters
 from mesoslip.quantities import Scale, number, scale_for
@@ -19,8 +19,6 @@ Array = NDArray[np.float64]
 
 # Keys whose values span more than this factor have a logarithmic axis.
 LOGARITHMIC_RANGE = 5.0
-# Logarithmic axes up to this range have labels at 2 and 5 too.
-LABELLED_RANGE = 100.0
 # Measures that span more than this factor have logarithmic colours and axes.
 LOGARITHMIC_MEASURE = 30.0
 # Share of the width of a map that its bar of colours takes.
@@ -86,13 +84,7 @@ class SweptKey:
         """Label an axis ("x" or "y") of a panel."""
         getattr(axes, f"set_{which}label")(self.label)
         if self.is_logarithmic:
-            getattr(axes, f"set_{which}scale")("log")
-            if np.max(self.values) < LABELLED_RANGE * np.min(self.values):
-                # A decade or two has more labels than its powers of ten.
-                axis = getattr(axes, f"{which}axis")
-                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-                axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-                axis.set_minor_formatter(NullFormatter())
+            logarithmic(axes, which)
         if self.words:
             getattr(axes, f"set_{which}ticks")(self.values, self.words)
 

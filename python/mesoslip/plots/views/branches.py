@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.plots.directions import STYLES
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.sweep_axis import SweptKey
 from mesoslip.plots.views.base import Options, View
@@ -58,7 +59,7 @@ def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     _mark_hysteresis(axes, axis.values, ratio)
     _mark_boundary(axes, axis.values, data["growth_rate"].values)
     if axis.is_logarithmic:
-        axes.set_xscale("log")
+        logarithmic(axes, "x")
     axes.set_ylabel("amplitude over $F_s$")
     axes.set_ylim(bottom=0)
     axes.set_xlabel(axis.label)

@@ -14,14 +14,18 @@ from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit,
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
 from mesoslip.plots.forced_response import draw_forced
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.record import draw_record, title_record
-from mesoslip.plots.style import RED, Canvas, canvas, styled
+from mesoslip.plots.style import RED, Canvas, axes_width, canvas, styled, wrapped, write_title
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
 Array = NDArray[np.float64]
+
+# Part of the width of axes that a line of a legend in them takes.
+LEGEND_PART = 0.7
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, scale: Scale) -> None:
@@ -35,8 +39,9 @@ def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, sc
     # As the table does for a law that does not describe the record.
     misfit = found.relative_misfit(record)
     label += f" (misfit {percent(misfit)})" if misfit > MAX_MISFIT else ""
+    label = wrapped(label, LEGEND_PART * axes_width(axes))
     axes.plot(drive / scale.size, force, color=RED, label=label)
-    axes.legend(loc="lower right")
+    axes.legend(loc="best")
 
 
 def draw_force(axes: Axes, tree: xr.DataTree, _: Options) -> None:
@@ -83,7 +88,7 @@ def draw_steady(axes: Axes, data: xr.Dataset) -> None:
         values = (found.level + found.slope * (ends + math.log(reference))) * scale
         slope = with_error(found.slope * scale, found.slope_error * scale)
         axes.plot(ends, values, color=RED)
-        axes.set_title(f"$a - b$ = {slope}", loc="left")
+        write_title(axes, f"$a - b$ = {slope}")
     axes.set_xlabel(f"$\\ln(V/V_0)$, $V_0$ = {with_unit(reference, 'm/s', 3)}")
     axes.set_ylabel("steady force over $F_s$")
 
@@ -101,12 +106,12 @@ def draw_healing(axes: Axes, data: xr.Dataset) -> None:
         markersize=3,
     )
     found = healing_line(data)
-    axes.set_xscale("log")
+    logarithmic(axes, "x")
     if found is not None:
         ends = np.array([hold.min(), hold.max()])
         axes.plot(ends, (found.level + found.slope * np.log10(ends)) * scale, color=RED)
         slope = with_error(found.slope * scale, found.slope_error * scale)
-        axes.set_title(f"healing per decade of hold time = {slope}", loc="left")
+        write_title(axes, f"healing per decade of hold time = {slope}")
     axes.set_xlabel("hold time (s)")
     axes.set_ylabel("(peak - steady force) over $F_s$")
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
 from mesoslip.plots.directions import DIRECTION, STYLES
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.names import name_of, symbol_or_name
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, styled, wrapped
@@ -175,7 +176,7 @@ def _scale_values(axes: Axes, measure: xr.DataArray, choices: tuple[str, ...]) -
         axes.set_yticks(range(len(choices)), choices)
         axes.set_ylim(-0.5, len(choices) - 0.5)
     elif spans_decades(measure.values):
-        axes.set_yscale("log")
+        logarithmic(axes, "y")
 
 
 def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[str, ...]) -> None:

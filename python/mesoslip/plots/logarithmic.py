@@ -1,0 +1,58 @@
+"""Logarithmic axes whose labels do not collide, however few decades they span."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+
+from mesoslip.quantities import number
+
+# Decades from which powers of ten alone are labelled, and multiples of them with fewer.
+MANY_DECADES = 2.0
+MULTIPLES = ((1, 2, 5), (1, 1.5, 2, 3, 5, 7), tuple(np.arange(10, 100) / 10))
+# Labels that an axis has at least, as far as its range allows.
+MIN_LABELS = 3
+
+
+def logarithmic(axes: Axes, which: str) -> None:
+    """Give axes a logarithmic scale, "x" or "y"."""
+    getattr(axes, f"set_{which}scale")("log")
+    axis = getattr(axes, f"{which}axis")
+    axis.set_major_locator(_Locator())
+    axis.set_major_formatter(_Formatter())
+    axis.set_minor_formatter(NullFormatter())
+
+
+class _Locator(LogLocator):
+    """Powers of ten; of a short range 1, 2, 5 times them, or more."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        """Places of labels between two values."""
+        low, high = sorted((vmin, vmax))
+        if not 0 < low < high or math.log10(high / low) >= MANY_DECADES:
+            return super().tick_values(vmin, vmax)
+        powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        for multiples in MULTIPLES:
+            places = np.unique(np.outer(powers, multiples).round(12).ravel())
+            inside = places[(places >= low) & (places <= high)]
+            if len(inside) >= MIN_LABELS:
+                break
+        step = math.ceil(len(inside) / (2 * MIN_LABELS))
+        chosen: list[float] = inside[::step].tolist()
+        return chosen
+
+
+class _Formatter(LogFormatterSciNotation):
+    """Powers of ten as such, over few decades plain numbers."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label at a place."""
+        assert self.axis is not None
+        low, high = sorted(self.axis.get_view_interval())
+        if 0 < low < high and math.log10(high / low) < MANY_DECADES and 1e-3 <= x < 1e5:
+            return number(x, 3)
+        return str(super().__call__(x, pos))

@@ -13,7 +13,7 @@ data = mesoslip.sweep(
         "base": "klein.toml",
         "run": {"duration": "30 s"},
         "contacts": {"count": 200, "threshold": {"relative_width": 0.05}},
-        "output": {"interval": "5 ms", "slip_interval": "5 ms"},
+        "output": {"interval": "5 ms", "slip_interval": 0},
         "sweep": {
             "measures": ["regime", "mean_force"],
             "grid": {

@@ -152,7 +152,6 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ),
         ("interaction", LATTICE | {"lattice": "cubic"}, ["interaction.lattice", "cubic", "square"]),
         ("interaction", LATTICE | {"xi": 1}, ["interaction.xi", "unknown key"]),
-        ("output__snapshots", ["1 s"], ["output.snapshots", "[interaction]"]),
         ("output__snapshot_size", 100, ["output.snapshot_size", "[interaction]"]),
         ("output__avalanche_size", 2, ["output.avalanche_size", "[interaction]"]),
         ("output__interval", "20 s", ["output.interval", "duration"]),
@@ -192,6 +191,10 @@ def test_what_is_wrong_is_reported(key, value, words):
         (
             {"slider": {"kind": "quasistatic", "stiffness": 1.0}, "drive": {"force_rate": 1.0}},
             ["slider.stiffness", "drive.force_rate"],
+        ),
+        (
+            {"run__engine": "me", "output__snapshots": ["1 s"]},
+            ["output.snapshots", 'engine "eq"', "one by one"],
         ),
         (
             {"interaction": LATTICE, "output__snapshots": [3.0, 2.0]},
@@ -1006,6 +1009,28 @@ def test_a_new_kind_names_the_keys_that_it_drops(command):
     changes = ["--set", "slider.kind=layered", "--set", "slider.layers=4"]
     _, _, printed = command("info", KLEIN, *changes)
     assert printed == 'not used with slider.kind = "layered": slider.damping_ratio\n'
+
+
+def test_slips_are_recorded_finely_by_default(klein):
+    """50 samples in a period of ringing, 5 in a delay; in all as many as the trace, or 20 000."""
+    ringing = klein(contacts__delay="1 s")
+    period = 2 * math.pi * math.sqrt(1.47e-3 / (97 + 2000))
+    assert ringing.slip_interval == pytest.approx(period / 50)
+    assert klein(contacts__delay="0.2 ms").slip_interval == pytest.approx(0.04e-3)
+    # A slip takes two periods of the setup of the 1.86 s in which the spring is loaded.
+    in_slips = 4 * math.pi * math.sqrt(1.47e-3 / 97) / (18e-6 / 97 / 1e-7)
+    bounded = {"contacts__delay": "1 us", "run__duration": 12.0}
+    assert klein(**bounded).slip_interval == pytest.approx(12 * in_slips / 20_000)
+    bounded["output__interval"] = 0.2e-3
+    assert klein(**bounded).slip_interval == pytest.approx(0.2e-3 * in_slips)
+    # Slips without a pause.
+    fast = {"drive__velocity": "1 mm/s", "run__duration": 10.0}
+    assert klein(**fast, output__interval="1 ms").slip_interval == pytest.approx(0.5e-3)
+    assert klein(**fast, output__interval="0.5 ms").slip_interval is None
+    assert klein(output__interval="10 us").slip_interval is None
+    assert klein(output__slip_interval=0).slip_interval is None
+    assert klein(slider={"kind": "prescribed"}).slip_interval is None
+    assert klein(output__slip_interval=1e-5).slip_interval == 1e-5
 
 
 def test_none_removes_a_key():

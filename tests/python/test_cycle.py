@@ -24,7 +24,7 @@ REGULAR = (
     "contacts.threshold.relative_width=0.1",
     "slider.damping_ratio=1",
     "drive.velocity=3um/s",
-    "output.slip_interval=none",
+    "output.slip_interval=0",
 )
 
 # Narrow thresholds, slow drive, no back force, and a delay in which the slider comes to rest:

@@ -526,7 +526,7 @@ def test_a_slip_without_finer_samples_is_drawn_as_recorded(runs):
                 config,
                 [
                     *("run.duration=2.2 s", "contacts.count=200"),
-                    *(f"output.interval={interval}", "output.slip_interval=none"),
+                    *(f"output.interval={interval}", "output.slip_interval=0"),
                 ],
             )
         )

@@ -30,7 +30,7 @@ APPARATUS = (
     "contacts.threshold.relative_width=0.2",
     "contacts.initial=steady",
     "drive.velocity=0.05 um/s",
-    "output.slip_interval=none",
+    "output.slip_interval=0",
     "output.interval=4 ms",
 )
 COUNTS = (1000, 2000, 4000, 8000, 12000, 16000, 24000, 32000)

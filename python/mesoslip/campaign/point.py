@@ -156,6 +156,9 @@ def _compute(
     """Run a point of a chain from the end of the one before: its outcome, none if it was stopped,
     and its end if another one follows."""
     config = Config.from_dict(task.configs[at])
+    if config.output.slip_interval is None and not task.trace:
+        # No measure needs finer traces, and a file of the run is not kept.
+        config = config.replace({"output.slip_interval": 0.0})
     realization = Realization(config, task.realization, after=after)
     try:
         while not realization.finished:

@@ -35,6 +35,12 @@ from mesoslip.configuration.tables import Curve, Output, Run
 from mesoslip.errors import ConfigError
 from mesoslip.quantities import with_unit
 
+# Samples of slips by default: in a period of the ringing on the pinned contacts, in a delay, and in
+# all slips of a run together at most as many as in its trace, or this number.
+SAMPLES_IN_RINGING = 50
+SAMPLES_IN_DELAY = 5
+SAMPLES_IN_SLIPS = 20_000
+
 
 class Config(Table):
     """A whole configuration."""
@@ -253,6 +259,21 @@ class Config(Table):
     def output_interval(self) -> float:
         """Interval of the trace [s]; a ten-thousandth of the run unless given."""
         return self.output.interval or self.expected_duration / 10000
+
+    @property
+    def slip_interval(self) -> float | None:
+        """Interval of the finer traces of slips [s]; None if there are none."""
+        given, interval = self.output.slip_interval, self.output_interval
+        if self.slider.slip_velocity(self) == 0 or given == 0:
+            return None
+        if given is not None:
+            return given
+        fine = self.slider.ringing_period(self) / SAMPLES_IN_RINGING
+        if self.contacts.delay > 0:
+            fine = min(fine, self.contacts.delay / SAMPLES_IN_DELAY)
+        samples = max(self.expected_duration / interval, SAMPLES_IN_SLIPS)
+        fine = max(fine, self.slider.time_in_slips(self) / samples)
+        return fine if fine < interval else None
 
     @classmethod
     def load(cls, path: PathLike, overrides: Iterable[Change] = ()) -> Config:

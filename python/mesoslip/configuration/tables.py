@@ -94,8 +94,10 @@ class Output(Table):
 
     interval: Annotated[Time, Field(gt=0)] | None = None
     """Sampling interval of the trace; by default 1/10000 of the run."""
-    slip_interval: Annotated[Time, Field(gt=0)] | None = None
-    """Sampling interval of the finer traces around slips; by default there are none."""
+    slip_interval: Annotated[Time, Field(ge=0)] | None = None
+    """Sampling interval of the finer traces around slips; 0 for none. By default 1/50 of the period
+    of ringing on the pinned contacts, or 1/5 of the delay if that is less; longer where slips would
+    then take more samples than the trace and than 20 000, and none where the trace is as fine."""
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
     """Velocity relative to the drive above which a slip is recorded; by default 0.02 Ω_S F_s/K."""
     layers: StrictBool = False
@@ -103,9 +105,9 @@ class Output(Table):
     avalanche_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
     """Minimum size of recorded avalanches; by default all are recorded."""
     snapshots: tuple[Annotated[Time, Field(ge=0)], ...] = ()
-    """Times at which a snapshot of the lattice is recorded."""
+    """Times at which a snapshot of all contacts is recorded; with engine `eq`."""
     snapshot_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
-    """Minimum size of avalanches after which a snapshot of the lattice is recorded."""
+    """Minimum size of avalanches after which a snapshot of all contacts is recorded."""
 
 
 class Curve(Table):

@@ -329,7 +329,7 @@ def _configured(config: Config, sampling: Sampling, name: str) -> Config:
         )
     changes: dict[str, Any] = {
         "run": {"engine": "eq", "realizations": 1},
-        "output": {"interval": interval},
+        "output": {"interval": interval, "slip_interval": 0.0},
     }
     if not config.drive.parts:
         # Longer by half an interval, so that rounding does not lose the last sample.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -128,9 +127,7 @@ class Sampling(NamedTuple):
         limit = fine = (end - start) / MIN_SAMPLES["slip"]
         if not is_measured(tree):
             config = config_of(tree)
-            mass = getattr(config.slider, "mass", math.inf)
-            period = 2 * math.pi * math.sqrt(mass / config.contacts.stiffness)
-            fine = min(fine, period / MIN_SAMPLES["period"])
+            fine = min(fine, config.slider.ringing_period(config) / MIN_SAMPLES["period"])
             if config.contacts.delay > 0:
                 fine = min(fine, config.contacts.delay / MIN_SAMPLES["delay"])
         return cls(count, (end - start) / max(count, 1), limit, fine)

@@ -75,7 +75,7 @@ def assemble(
     )
     kernel.set_recorder(
         interval=interval or config.output_interval,
-        slip_interval=output.slip_interval or 0.0,
+        slip_interval=config.slip_interval or 0.0,
         slip_velocity=slider.slip_velocity(config),
         quiet_time=slider.quiet_time,
         duration=float(ends[-1]),

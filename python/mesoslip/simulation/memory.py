@@ -58,7 +58,8 @@ def check_memory(config: Config, available: float | None = None) -> None:
     together = min(run.realizations, os.cpu_count() or 1)
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
-    finer = 0.0 if output.slip_interval is None else _time_in_slips(config) / output.slip_interval
+    fine = config.slip_interval
+    finer = 0.0 if fine is None else config.slider.time_in_slips(config) / fine
     lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
     after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
     problems = []
@@ -87,7 +88,7 @@ def check_memory(config: Config, available: float | None = None) -> None:
         (
             "output.slip_interval",
             BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations,
-            output.slip_interval,
+            fine,
         ),
     ):
         if needed > memory:
@@ -102,16 +103,6 @@ def check_memory(config: Config, available: float | None = None) -> None:
             )
     if problems:
         raise ConfigError(problems)
-
-
-def _time_in_slips(config: Config) -> float:
-    """About how long slips take together, if each lasts two periods, after the spring's loading to
-    the static force [s]."""
-    slider = config.slider
-    if config.drive_speed == 0 or slider.slip_velocity(config) == 0:
-        return 0.0
-    loading = config.contacts.static_force / slider.spring_stiffness / config.drive_speed
-    return config.expected_duration * min(1.0, 4 * slider.quiet_time / loading)
 
 
 def _breaks(config: Config) -> float:

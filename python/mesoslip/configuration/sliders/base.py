@@ -91,6 +91,14 @@ class SliderTable(Table):
         """Velocity relative to the drive above which it slips [m/s]; 0 if there are no slips."""
         return 0.0
 
+    def ringing_period(self, config: Setting) -> float:  # noqa: ARG002
+        """Period of its oscillation on the pinned contacts [s]; infinite without inertia."""
+        return math.inf
+
+    def time_in_slips(self, config: Setting) -> float:  # noqa: ARG002
+        """About how long the slips of a run take together [s]."""
+        return 0.0
+
     @property
     def oscillator(self) -> Oscillator | None:
         """The slider as one mass on a spring (S40, S41); None if it is not one."""

@@ -40,5 +40,16 @@ class InertialSlider(SliderTable):
         """Velocity of a slip, Omega_S F_s/K [m/s]."""
         return self.omega_s * config.contacts.static_force / self.stiffness
 
+    def ringing_period(self, config: Setting) -> float:
+        """2π √(M/(K + Nk)) [s]."""
+        return 2 * math.pi * math.sqrt(self.mass / (self.stiffness + config.contacts.stiffness))
+
+    def time_in_slips(self, config: Setting) -> float:
+        """Each slip takes about two periods, after the spring's loading to the static force [s]."""
+        if config.drive_speed == 0:
+            return 0.0
+        loading = config.contacts.static_force / self.stiffness / config.drive_speed
+        return config.expected_duration * min(1.0, 4 * self.quiet_time / loading)
+
     def slip_velocity(self, config: Setting) -> float:
         return config.output.slip_velocity or SLIP_VELOCITY_RATIO * self.velocity_scale(config)

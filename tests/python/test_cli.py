@@ -121,21 +121,35 @@ def test_start_up_is_quick():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_reading_an_output_does_without_dask(short, tmp_path, command):
+def test_commands_import_what_they_need(short, tmp_path, command):
+    """Large packages that each of several commands adds to those imported before."""
     output = tmp_path / "short.nc"
-    command("run", short, "-o", output, "--quiet", "--set", "run.duration=1s")
-    code = (
-        "import sys\n"
-        "from mesoslip.__main__ import start\n"
-        "sys.argv[1:] = ['regime', *sys.argv[1:]]\n"
-        "try:\n"
-        "    start()\n"
-        "finally:\n"
-        "    assert 'xarray' in sys.modules\n"
-        "    slow = {'dask.base', 'scipy.stats', 'matplotlib'} & sys.modules.keys()\n"
-        "    assert not slow, slow\n"
-    )
-    subprocess.run([sys.executable, "-c", code, output], check=True, capture_output=True)
+    command("run", short, "-o", output, "--quiet")
+    commands = [
+        ["info", str(short)],
+        ["slips", str(output)],
+        ["regime", str(output)],
+        ["plot", str(output), "-o", str(tmp_path / "short.png")],
+    ]
+    code = f"""
+import json, sys
+from mesoslip.command_line.main import main
+large = ["dask", "matplotlib", "netCDF4", "pandas", "pint"]
+large += [f"scipy.{{one}}" for one in ("interpolate", "linalg", "optimize", "special", "stats")]
+stdout, found = sys.stdout, []
+for arguments in {commands}:
+    before, sys.argv = set(sys.modules), ["mesoslip", *arguments]
+    with open({str(tmp_path / "printed")!r}, "w") as sys.stdout:
+        try:
+            main()
+        except SystemExit as end:
+            assert not end.code, end.code
+    found.append([one for one in large if one in sys.modules and one not in before])
+import dask.array, pint
+json.dump(found, stdout)
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    assert json.loads(done.stdout) == [[], ["netCDF4", "pandas"], [], ["matplotlib"]]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from mesoslip.command_line import (
+    array_packages,
     catalogues,
     cycle,
     example,
@@ -54,6 +55,15 @@ COMMANDS = (
     example.example,
 )
 
+# Those that never import xarray, or only for what they are asked to open.
+WITHOUT_XARRAY = {
+    run.run,
+    theory.info,
+    mean_field.mean_field,
+    explore.explore,
+    example.example,
+}
+
 # How to install the libraries that the kernels are linked to.
 LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev"
 
@@ -86,7 +96,9 @@ def _common(
 
 
 for _command in COMMANDS:
-    app.command(cls=pictures.PlotCommand if _command is pictures.plot else None)(_command)
+    app.command(cls=pictures.PlotCommand if _command is pictures.plot else None)(
+        _command if _command in WITHOUT_XARRAY else array_packages.numpy_only(_command)
+    )
 
 
 def main() -> None:

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 from mesoslip.plots.sweep_axis import SweptKey
 
@@ -78,6 +77,8 @@ def _interpolated(
     Splines are those of the logarithm of what is positive, over the axes as they are drawn.
     Measures that are unknown somewhere, or that jump, stay as they are.
     """
+    from scipy.interpolate import RectBivariateSpline
+
     axes = [key.values[key.order] for key in keys]
     level = boundary.value
     if (

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize.elementwise import find_root
 
 from mesoslip.theory.thresholds import threshold_quadrature
 
@@ -126,6 +125,8 @@ def lives(config: Config, configured: Array, speed: float, older: float = 0.0) -
 
     They are older than that by a time in which they were held.
     """
+    from scipy.optimize.elementwise import find_root
+
     back = config.contacts.back_force_ratio
 
     # Thresholds are concave in time where they grow, and fall otherwise: there is one solution.

@@ -155,7 +155,7 @@ contains
       else
          if (self%may_outrun) call bound_speed(self, pose, end_time)
          call scan_if_needed(self, pose)
-         call bound_leaders(self, pose, upper)
+         call bound_leaders(self, pose, end_time, upper)
          call bound_falling(self, pose, upper, lower, end_time)
       end if
       window = self%window_between(lower, upper, end_time)

@@ -19,24 +19,39 @@ module mesoslip_contacts_ageing_leaders
    real(wp), parameter :: max_excess = 1.0e-5_wp
    !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
    integer, parameter :: max_steps = 8
+   !> Contacts that are taken out of the queue for one window: where thresholds are narrow, all may
+   !> be queued before the first one is foreseen to break.
+   integer, parameter :: max_popped = 8
+   !> Duration up to which the motion is foreseen to bound how far the slider may come [s], and
+   !> factor by which that is beyond what is foreseen
+   real(wp), parameter :: max_duration = 1.0e9_wp, margin = 1.5_wp
 
 contains
 
-   !> Bring those to the leaders that may break next, and find until where the slider may go.
-   subroutine bound_leaders(self, pose, upper)
+   !> Bring those to the leaders that may break next, and find until where the slider may go. What
+   !> it cannot come to before the window ends is bounded by where the contacts are queued.
+   subroutine bound_leaders(self, pose, end_time, upper)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
+      !> Time at which the window ends at the latest [s]
+      real(wp), intent(in) :: end_time
       !> Coordinate until which no contact breaks [m]
       real(wp), intent(inout) :: upper
 
-      integer :: position, contact, visited
-      real(wp) :: key
+      integer :: position, contact, visited, popped
+      real(wp) :: key, reach
 
+      reach = reach_of(self, pose, end_time)
       visited = self%leaders%count
       do position = 1, self%leaders%count
-         upper = min(upper, foresee(self, self%leaders%contact(position), pose))
+         contact = self%leaders%contact(position)
+         key = ahead_coordinate(self%record(:, contact), self%direction)
+         if (key < reach) key = foresee(self, contact, pose)
+         upper = min(upper, key)
       end do
-      do while (self%queue%first_key < upper)
+      ! Contacts beyond those looked at are bounded by where they are queued, too.
+      do popped = 1, max_popped
+         if (.not. self%queue%first_key < min(upper, reach)) exit
          call self%queue%pop(self%record, contact)
          visited = visited + 1
          if (self%life(life_motion, contact) < any_motion) then
@@ -51,6 +66,7 @@ contains
          self%kept(contact) = in_leaders
          upper = min(upper, foresee(self, contact, pose))
       end do
+      upper = min(upper, self%queue%first_key)
       do position = self%leaders%count, 1, -1
          contact = self%leaders%contact(position)
          if (ahead_coordinate(self%record(:, contact), self%direction) > upper) then
@@ -60,6 +76,24 @@ contains
       end do
       call self%count_visits(visited)
    end subroutine bound_leaders
+
+   !> Coordinate that the slider does not come to before a time, by what is known of its motion.
+   pure function reach_of(self, pose, time) result(coordinate)
+      class(ageing_contacts_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> The time [s]
+      real(wp), intent(in) :: time
+      real(wp) :: coordinate
+
+      real(wp) :: duration, speed
+
+      coordinate = huge(1.0_wp)
+      duration = time - pose%time
+      if (self%jumps .or. duration > max_duration) return
+      speed = abs(pose%velocity) &
+         & + (abs(pose%acceleration) + safety * self%acceleration_jump) * duration
+      coordinate = self%direction * pose%displacement + margin * speed * duration
+   end function reach_of
 
    !> Where a leader is foreseen to break.
    pure function foresee(self, contact, pose) result(coordinate)

@@ -9,7 +9,8 @@
 !> slip is such a fall, or several that lead lower and lower, if
 !>
 !> - the block exceeds the drive's velocity by the slip velocity,
-!> - at least one contact breaks, and
+!> - at least one contact breaks in it, or most are detached when it starts: a film that breaks as
+!>   a whole breaks just before the maximum, and
 !> - the force falls by more than twice what it had regained by ringing, so that the block travels
 !>   farther beyond what ringing gives back than it rings. Regained is the part of its rise that is
 !>   ringing (mesoslip_recording_minima), from a minimum in the last three quarters of a period of
@@ -81,6 +82,8 @@ module mesoslip_recording_slips
       !> Time, force and breaks at the start of a fall or slip, and at its minimum so far
       real(wp), private :: start_time = 0.0_wp, force_before = 0.0_wp, breaks_before = 0.0_wp
       real(wp), private :: end_time = 0.0_wp, force_after = 0.0_wp, breaks_after = 0.0_wp
+      !> Contacts that were detached at its start
+      real(wp), private :: detached_before = 0.0_wp
       !> Force that ringing had regained at its start [N]
       real(wp), private :: regained_force = 0.0_wp
       !> Maximum of the velocity up to the minimum of the force, and since then [m/s]
@@ -107,6 +110,7 @@ module mesoslip_recording_slips
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: change_stage, pass_maximum, pass_minimum
       procedure, non_overridable, private :: begin_fall, drop_fall, close_slip, update, update_peak
+      procedure, non_overridable, private :: broken_contacts
    end type slip_recorder_type
 
 contains
@@ -291,7 +295,7 @@ contains
          continue
       end select
       if (self%trace%is_active) call self%trace%take_samples(slider, detached, motion%time)
-      call self%begin_fall(motion, breaks)
+      call self%begin_fall(motion, detached, breaks)
    end subroutine pass_maximum
 
    !> A fall of the force is over: it may make a slip.
@@ -319,7 +323,7 @@ contains
       if (.not. self%was_fast) then
          self%phase = phase_slow
          call self%trace%drop_or_stop()
-      else if (self%breaks_after - self%breaks_before >= 1.0_wp .and. self%direction &
+      else if (self%broken_contacts() >= 1.0_wp .and. self%direction &
          & * (self%force_before - self%force_after) > min_fall_ratio * self%regained_force) then
          self%phase = phase_slip
          call self%trace%confirm(self%count)
@@ -327,11 +331,11 @@ contains
    end subroutine pass_minimum
 
    !> A fall of the force starts: it may come to be a slip.
-   subroutine begin_fall(self, motion, breaks)
+   subroutine begin_fall(self, motion, detached, breaks)
       class(slip_recorder_type), intent(inout) :: self
       !> The motion at the maximum of the force
       type(motion_type), intent(in) :: motion
-      real(wp), intent(in) :: breaks
+      real(wp), intent(in) :: detached, breaks
 
       self%phase = phase_fall
       self%start_time = motion%time
@@ -339,6 +343,7 @@ contains
       self%force_before = motion%elastic_force
       self%force_after = motion%elastic_force
       self%breaks_before = breaks
+      self%detached_before = detached
       self%regained_force = self%minima%regained_force(motion, self%direction, &
          & self%parameters%quiet_time)
       self%peak_velocity = 0.0_wp
@@ -357,13 +362,24 @@ contains
       call self%trace%drop()
    end subroutine drop_fall
 
+   !> Contacts that broke up to the minimum: those that break in the fall, or if none does, those
+   !> that were detached when it started, if they were most.
+   pure function broken_contacts(self) result(number)
+      class(slip_recorder_type), intent(in) :: self
+      real(wp) :: number
+
+      number = self%breaks_after - self%breaks_before
+      if (number < 1.0_wp .and. 2.0_wp * self%detached_before >= self%parameters%contacts) &
+         & number = self%detached_before
+   end function broken_contacts
+
    !> Put a slip into the catalogue.
    subroutine close_slip(self)
       class(slip_recorder_type), intent(inout) :: self
 
       call self%catalogue%add([real(self%count, wp), self%start_time, self%end_time, &
          & self%force_before, self%force_after, self%direction * self%peak_velocity, &
-         & self%breaks_after - self%breaks_before])
+         & self%broken_contacts()])
       self%count = self%count + 1
       self%phase = phase_slow
       call self%trace%keep()
@@ -433,6 +449,7 @@ contains
       call archive%exchange("force_after", self%force_after)
       call archive%exchange("breaks_before", self%breaks_before)
       call archive%exchange("breaks_after", self%breaks_after)
+      call archive%exchange("detached_before", self%detached_before)
       call archive%exchange("regained_force", self%regained_force)
       call archive%exchange("peak_velocity", self%peak_velocity)
       call archive%exchange("later_peak_velocity", self%later_peak_velocity)

@@ -66,6 +66,22 @@ def test_both_engines_have_one_catalogue(klein):
     )
 
 
+@pytest.mark.parametrize("slider", [{}, {"slider": LAYERED}])
+def test_a_film_that_breaks_as_a_whole_slips(klein, slider):
+    """Its only break is just before the maximum of the force, and none follows in the fall."""
+    film = {"contacts__count": 1, "contacts__threshold__relative_width": 1e-6}
+    changes = {"contacts__coupling": "equal", "contacts__delay": 20e-3, "output__interval": 1e-4}
+    tree = mesoslip.run(klein(run__duration=2.1, **changes, **film, **slider))
+    slips = catalogue(tree)
+    name = "elastic_force" if "elastic_force" in tree else "spring_force"
+    time, force = tree["time"].values, tree[name].values[0]
+    assert slips.sizes["slip"] == 1
+    assert slips["start_time"].values[0] == pytest.approx(time[force.argmax()], abs=2e-4)
+    assert slips["end_time"].values[0] == pytest.approx(time[force.argmin()], abs=2e-4)
+    np.testing.assert_allclose(slips["force_drop"], np.ptp(force), rtol=2e-3)
+    np.testing.assert_array_equal(slips["contacts_broken"], 1)
+
+
 @pytest.mark.parametrize(
     "slider",
     [LAYERED, LAYERED | {"layers": 4, "base": {"mass": 0.02, "stiffness": 500.0, "damping": 5.0}}],

@@ -89,6 +89,14 @@ def klein():
 
 
 @pytest.fixture
+def few_replicas(monkeypatch):
+    """Fits of avalanche sizes with few synthetic samples, where their goodness does not matter."""
+    from mesoslip.analysis.avalanche_sizes.power_law import fit_power_law
+
+    monkeypatch.setitem(fit_power_law.__kwdefaults__, "replicas", 20)
+
+
+@pytest.fixture
 def command(monkeypatch, capfd):
     """Run a command; returns exit status, standard output and standard error."""
 

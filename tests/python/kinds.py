@@ -57,6 +57,9 @@ FORCE = {
     },
 }
 
+ME = {"run__engine": "me"}
+# Steps twice as long as by default, for master equations that take a second or more.
+COARSE = ME | {"run__resolution": 0.5}
 RANDOM = {"contacts__delay_law": "exponential"}
 NEWBORN = {"contacts__newborn_width": 0.05}
 TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
@@ -67,14 +70,14 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, steady": {"contacts__initial": "steady"},
     "rigid, bundle": {"contacts__reattach": False},
     "rigid, exponential delays": RANDOM,
-    "rigid, exponential delays, me": RANDOM | {"run__engine": "me"},
+    "rigid, exponential delays, me": RANDOM | ME,
     "rigid, newborn width": NEWBORN,
-    "rigid, newborn width, me": NEWBORN | {"run__engine": "me"},
+    "rigid, newborn width, me": NEWBORN | COARSE,
     "rigid, table": TABLE,
-    "rigid, table, me": TABLE | {"run__engine": "me"},
+    "rigid, table, me": TABLE | ME,
     "rigid, lattice": SNAPSHOTS,
     "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
-    "rigid, me": {"run__engine": "me"},
+    "rigid, me": ME,
     "rigid, ramps": RAMPS,
     "rigid, to a displacement": {"run__stop": {"displacement": 2.01e-7}},
     "rigid, to a slip": {"run__stop": {"slips": 1}},
@@ -109,7 +112,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "contacts__count": 2000,
     },
     "force": FORCE,
-    "force, me": FORCE | {"run__engine": "me"},
+    "force, me": FORCE | COARSE,
     "force, thermal": FORCE | THERMAL,
     "rigid, thermal": THERMAL,
     "rigid, thermal, ramps": THERMAL | RAMPS,
@@ -118,13 +121,17 @@ KINDS: dict[str, dict[str, Any]] = {
     "layered, thermal": THERMAL | {"slider": LAYERED | {"base": BASE}},
     "layered, thermal, adams": THERMAL | {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "quasistatic, thermal": THERMAL | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
-    "rigid, thermal, me": THERMAL | {"run__engine": "me"},
-    "rigid, thermal, me, newborn width": THERMAL | NEWBORN | RANDOM | {"run__engine": "me"},
+    "rigid, thermal, me": THERMAL | ME,
+    "rigid, thermal, me, newborn width": THERMAL
+    | NEWBORN
+    | RANDOM
+    | COARSE
+    | {"contacts__threshold__relative_width": 0.15},
     "prescribed, thermal, me, table": THERMAL
     | TABLE
     | {"run__engine": "me", "slider": {"kind": "prescribed"}},
     "layered, thermal, me": THERMAL | {"run__engine": "me", "slider": LAYERED | {"base": BASE}},
-    "force, thermal, me": FORCE | THERMAL | {"run__engine": "me"},
+    "force, thermal, me": FORCE | THERMAL | COARSE,
     "rigid, thermal, ageing": AGEING | THERMAL,
     "prescribed, thermal, ageing, log": AGEING
     | THERMAL
@@ -144,7 +151,7 @@ KINDS: dict[str, dict[str, Any]] = {
     },
     "rigid, ageing, log": AGEING
     | {"contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03}},
-    "rigid, ageing, me": AGEING | {"run__engine": "me"},
+    "rigid, ageing, me": AGEING | ME,
     "prescribed, ageing": AGEING | {"slider": {"kind": "prescribed"}},
     "layered, ageing": AGEING | {"slider": LAYERED | {"base": BASE}},
     "quasistatic, ageing": AGEING

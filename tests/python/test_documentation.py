@@ -52,6 +52,8 @@ SHORTER = {
     'duration = "100 s"': 'duration = "9 s"',
     'duration = "20 s"': 'duration = "0.3 s"',
     "count = 1_000_000": "count = 20_000",
+    # Klein's case, for pages on the master equation.
+    '[run]\nengine = "eq"': '[run]\nresolution = 0.5\nengine = "eq"',
 }
 HISTORY = "time [s],displacement [um]\n0,0\n1,0.1\n2,0.3\n"
 STATUS = re.compile(r"exit status (\d+)")

@@ -16,7 +16,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.campaign.plan import Plan
 from mesoslip.execution import local
@@ -25,6 +25,7 @@ from mesoslip.execution.pool import PoolError, WorkerLostError
 from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Folder, Pieces, Store
 from mesoslip.simulation.checkpoint import checkpoint_folder
+from pieces import divmod_of, kill_or_square, sleep_until_stopped
 from test_sweep import SIMPLE, TINY, sweep_file
 
 __all__ = ["sweep_file"]
@@ -44,10 +45,6 @@ def test_every_piece_comes_back_once(executor):
     assert sorted(found) == [(piece, divmod(*piece)) for piece in pieces]
     assert results(executor, divmod_of, pieces, in_order=True) == sorted(found)
     assert results(executor, divmod_of, []) == []
-
-
-def divmod_of(piece, _stop):
-    return divmod(*piece)
 
 
 def test_only_some_pieces_are_in_flight():
@@ -79,14 +76,6 @@ def test_an_error_is_that_of_its_piece_alone():
     assert isinstance(found[0], ZeroDivisionError)
 
 
-def kill_or_square(piece, _stop):
-    if piece == 3:
-        os.kill(os.getpid(), signal.SIGKILL)
-    if piece == 5:
-        raise ConfigError([])
-    return piece**2
-
-
 def test_a_killed_process_costs_its_piece_alone():
     found = {}
     with closing(
@@ -115,10 +104,6 @@ def test_a_stop_is_answered_at_once(executor):
     with closing(completed(executor, sleep_until_stopped, [60.0] * 1000, stop)) as work:
         assert not [future for _, future in work if future.exception() is None]
     assert time.monotonic() - begin < 5
-
-
-def sleep_until_stopped(piece, stop):
-    stop.wait(piece)
 
 
 def test_executors_are_checked():
@@ -372,7 +357,7 @@ def test_whole_numbers_of_a_range_are_exact():
 MANY = SIMPLE.replace("realizations = 2", "realizations = 1000000").replace(', "0.5 ms"', "")
 
 
-@pytest.mark.parametrize("seconds", [3.0, 8.0])
+@pytest.mark.parametrize("seconds", [3.0, long(8.0)])
 def test_a_sweep_of_a_million_points_answers_at_once(seconds, tmp_path, sweep_file):
     """At any time after its start; in computing time, as others may use the machine as well."""
     output = tmp_path / "many.nc"

@@ -13,7 +13,7 @@ from conftest import klein_tables
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
-from mesoslip.inference import checks, likelihood
+from mesoslip.inference import checks, fit_trace, likelihood
 from mesoslip.inference.experiment import prepare
 from mesoslip.inference.features import Feature
 from mesoslip.inference.plan import Plan
@@ -441,7 +441,7 @@ def test_warnings_report_what_is_not_determined():
     assert "describe the trace" not in printed
 
 
-def test_the_command_fits_and_draws(tmp_path, command):
+def test_the_command_fits_and_draws(tmp_path, command, monkeypatch):
     trace = tmp_path / "trace.csv"
     tree = experiment()
     force = tree["spring_force"].values[0]
@@ -462,7 +462,11 @@ def test_the_command_fits_and_draws(tmp_path, command):
     picture = tmp_path / "posterior.png"
     assert command("plot", posterior, "-o", picture)[0] == 0
     assert picture.stat().st_size > 20_000
+    # The same posterior, which is not computed again.
+    again = mesoslip.open_output(posterior)
+    monkeypatch.setattr(fit_trace, "fit", lambda *_, **__: again)
     status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
+    assert status == 0
     row = json.loads(printed)["parameters"]["contacts.delay"]
     assert row["interval_90"][0] < row["median"] < row["interval_90"][1]
 

@@ -22,6 +22,8 @@ from mesoslip.plots.views import VIEWS, names_of_views
 from mesoslip.plots.views.layers import layer_motion
 from mesoslip.plots.views.sweep import CHOICE_COLORS
 
+pytestmark = pytest.mark.usefixtures("few_replicas")
+
 
 @pytest.fixture(scope="module")
 def old():

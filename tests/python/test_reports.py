@@ -16,6 +16,8 @@ from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.quantities import column
 from mesoslip.reports.sections import SECTIONS
 
+pytestmark = pytest.mark.usefixtures("few_replicas")
+
 MOST_BYTES = 3_000_000
 # Elements of HTML that have no end.
 VOID = {"meta", "br", "link", "img", "input", "hr"}

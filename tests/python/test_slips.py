@@ -162,6 +162,7 @@ def test_ringing_about_fast_smooth_sliding_is_no_slip(klein, velocity, damping_r
             run__duration=0.5,
             drive__velocity=velocity,
             slider__damping_ratio=damping_ratio,
+            contacts__count=1000,
             contacts__delay=0.0,
             contacts__initial="steady",
             contacts__threshold={"law": "gaussian", "relative_width": 0.3},

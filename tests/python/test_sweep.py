@@ -18,7 +18,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import ROOT, klein_tables
+from conftest import ROOT, klein_tables, long
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.regime import REGIME, regimes
 from mesoslip.campaign import runner
@@ -349,7 +349,7 @@ def assert_same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize(
-    "executor", [mesoslip.Threads(2), mesoslip.Processes(1), mesoslip.Processes(2), 2]
+    "executor", [mesoslip.Threads(2), long(mesoslip.Processes(1)), mesoslip.Processes(2), 2]
 )
 def test_the_executor_does_not_matter(executor, whole):
     data = mesoslip.sweep(tables(realizations=3), executor=executor)
@@ -734,7 +734,7 @@ def test_a_script_without_a_guard_may_sweep(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import json, sys, mesoslip\n"
-        "data = mesoslip.sweep(json.loads(sys.argv[1]), executor=mesoslip.Processes(2))\n"
+        "data = mesoslip.sweep(json.loads(sys.argv[1]), executor=mesoslip.Processes(1))\n"
         "print(int(data['status'].sum()))\n"
     )
     result = subprocess.run(

@@ -31,6 +31,8 @@ export UV_PROJECT_ENVIRONMENT := $(CURDIR)/$(VENV)
 export UV_PYTHON_DOWNLOADS := never
 # Or the first start of each command compiles what it imports.
 export UV_COMPILE_BYTECODE := 1
+# Nor do tests have to be compiled again each time, as where a shell asks Python to keep nothing.
+export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

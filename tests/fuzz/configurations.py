@@ -11,6 +11,7 @@ from random import Random
 from typing import Any
 
 import tomli_w
+from mesoslip.configuration.threshold_laws.table import law_cells
 
 Tables = dict[str, Any]
 
@@ -20,8 +21,15 @@ MOST_PERIODS = 3e3
 
 # Part of the configurations with thermal activation, and how often contacts then break in a run
 # that bear no more than the back force.
-THERMAL = 0.25
+THERMAL = 0.35
 MOST_IDLE = 30.0
+# Parts of those with delays of the exponential law, with a width of the force at attaching, and
+# with a table of thresholds.
+EXPONENTIAL = 0.3
+NEWBORN = 0.2
+TABLE = 0.2
+# Largest force on a slider without a spring, over the static force.
+MOST_FORCE = 1.3
 
 MAX_WIDTH = {
     "gaussian": 1.0,
@@ -43,8 +51,8 @@ def _one_of(random: Random, **weights: float) -> str:
 
 def draw(random: Random) -> Tables:
     """The tables of a configuration that is meant to run."""
-    kind = _one_of(random, rigid=4, layered=3, prescribed=2, quasistatic=3)
-    engine = "me" if kind != "quasistatic" and random.random() < 0.25 else "eq"
+    kind = _one_of(random, rigid=4, layered=3, prescribed=2, quasistatic=3, force=2)
+    engine = "me" if kind != "quasistatic" and random.random() < 0.3 else "eq"
     contacts, interaction = _contacts(random, engine)
     force, stiffness = contacts["static_force"], contacts["stiffness"]
     slider = _slider(random, kind, stiffness)
@@ -52,6 +60,8 @@ def draw(random: Random) -> Tables:
     rate = math.sqrt(spring / mass)
     if random.random() < 0.7:
         contacts["delay"] = decades(random, -3, 1.5) / rate
+        if random.random() < EXPONENTIAL:
+            contacts["delay_law"] = "exponential"
     if random.random() < 0.6:
         contacts |= {"area": decades(random, -14, -6), "film_thickness": 3.5e-9}
         contacts |= {"film_density": 956.0, "drag_rate": decades(random, 3, 14)}
@@ -71,16 +81,45 @@ def draw(random: Random) -> Tables:
     fastest = math.sqrt(stiffness * slider.get("layers", 1) / mass) + rate * slider.get("layers", 1)
     most = min(MOST_BREAKS / contacts["count"] * stretch / speed, MOST_PERIODS * 6 / fastest)
     duration = min(stretch * loading / speed * random.uniform(0.3, 5), most)
+    if kind == "force":
+        contacts["initial"] = "relaxed"
+        most_path = MOST_BREAKS / contacts["count"] * stretch
+        duration = min(duration, _sliding_time(slider, MOST_FORCE * force, most_path))
     _drive(random, tables, duration, speed)
     tables["output"] = _output(random, tables, duration)
     if not interaction.get("strength") and random.random() < THERMAL:
         contacts["coupling"] = "equal"
         contacts["thermal"] = _thermal(random, contacts, speed / stretch, duration)
-        if engine == "me":
+        if engine == "me" and contacts["initial"] == "uniform":
             contacts["initial"] = random.choice(["relaxed", "steady"])
-        elif not interaction and random.random() < 0.4:
+        elif engine == "eq" and not interaction and random.random() < 0.4:
             contacts["ageing"] = _ageing(random, contacts, duration)
+    if contacts["initial"] != "steady" and "ageing" not in contacts and random.random() < NEWBORN:
+        contacts["newborn_width"] = _newborn_width(random, contacts, engine)
     return tables
+
+
+def _sliding_time(slider: Tables, force: float, path: float) -> float:
+    """Time in which a block without contacts comes at least so far under a force."""
+    mass, damping = slider["mass"], slider["damping"]
+    return max(math.sqrt(2 * mass * path / force), mass * damping * path / force)
+
+
+def _newborn_width(random: Random, contacts: Tables, engine: str) -> float:
+    """A width that the engine takes."""
+    most = 0.25
+    if engine == "me":
+        most = min(most, 2.9 * _width(contacts["threshold"]))
+    return most * decades(random, -2, 0)
+
+
+def _width(threshold: Tables) -> float:
+    """Relative width of thresholds."""
+    if threshold["law"] == "table":
+        weights = threshold.get("weights")
+        cells = law_cells(tuple(threshold["samples"]), weights and tuple(weights))
+        return cells.relative_width
+    return float(threshold["relative_width"])
 
 
 def _thermal(random: Random, contacts: Tables, rate: float, duration: float) -> Tables:
@@ -99,7 +138,7 @@ def _ageing(random: Random, contacts: Tables, duration: float) -> Tables:
         return {"law": "log", "time": time, "growth": decades(random, -3, -0.5)}
     # Young contacts that can attach, and are narrow enough.
     contacts["back_force_ratio"] = min(contacts["back_force_ratio"], 0.1)
-    width = contacts["threshold"]["relative_width"]
+    width = _width(contacts["threshold"])
     return {
         "law": "relax",
         "time": time,
@@ -109,10 +148,6 @@ def _ageing(random: Random, contacts: Tables, duration: float) -> Tables:
 
 
 def _contacts(random: Random, engine: str) -> tuple[Tables, Tables]:
-    law = random.choice(list(MAX_WIDTH))
-    width = min(decades(random, -4, 0.3), MAX_WIDTH[law])
-    if engine == "me":
-        width = max(width, 0.005)
     interaction: Tables = {}
     count = round(10 ** random.uniform(0, 2.6))
     if engine == "eq" and random.random() < 0.4:
@@ -127,7 +162,7 @@ def _contacts(random: Random, engine: str) -> tuple[Tables, Tables]:
         "coupling": random.choice(["scaled", "equal"]),
         "initial": random.choice(["relaxed", "steady", "uniform"]),
         "back_force_ratio": random.choice([0.0, 0.1, round(random.uniform(0, 0.95), 2)]),
-        "threshold": {"law": law, "relative_width": width},
+        "threshold": _threshold(random, engine),
     }
     contacts["stiffness"] = contacts["static_force"] / decades(random, -10, -4)
     if random.random() < 0.1:
@@ -135,9 +170,31 @@ def _contacts(random: Random, engine: str) -> tuple[Tables, Tables]:
     return contacts, interaction
 
 
+def _threshold(random: Random, engine: str) -> Tables:
+    if random.random() < TABLE:
+        # Of thresholds that are all above most back forces, or of areas over decades.
+        wide = random.random() < 0.3
+        samples = [decades(random, -1, 1) if wide else 1 + random.random() for _ in range(4)]
+        samples += random.choices(samples, k=random.randint(0, 4))
+        threshold: Tables = {"law": "table", "samples": samples}
+        if random.random() < 0.5:
+            rest = [random.choice([0.0, 1.0, 3.5]) for _ in samples[2:]]
+            threshold["weights"] = [1.0, 2.0, *rest]
+        return threshold
+    law = random.choice(list(MAX_WIDTH))
+    width = min(decades(random, -4, 0.3), MAX_WIDTH[law])
+    if engine == "me":
+        width = max(width, 0.005)
+    return {"law": law, "relative_width": width}
+
+
 def _slider(random: Random, kind: str, contact_stiffness: float) -> Tables:
     slider: Tables = {"kind": kind}
     if kind == "prescribed":
+        return slider
+    if kind == "force":
+        slider["mass"] = decades(random, -6, 1)
+        slider["damping"] = math.sqrt(contact_stiffness / slider["mass"]) * decades(random, -2, 1.5)
         return slider
     slider["stiffness"] = contact_stiffness * decades(random, -2.5, 1)
     if kind == "quasistatic":
@@ -168,6 +225,11 @@ def _slider(random: Random, kind: str, contact_stiffness: float) -> Tables:
 def _drive(random: Random, tables: Tables, duration: float, speed: float) -> None:
     """The drive, in stages with holds and reversals or not, and what ends the run."""
     run, slider, contacts = tables["run"], tables["slider"], tables["contacts"]
+    if slider["kind"] == "force":
+        tables["drive"] = _forces(random, contacts["static_force"], duration)
+        if "stage" not in tables["drive"]:
+            run["duration"] = duration
+        return
     if slider["kind"] == "quasistatic" and random.random() < 0.25:
         del slider["stiffness"]
         contacts["reattach"] = random.random() < 0.3
@@ -201,6 +263,29 @@ def _drive(random: Random, tables: Tables, duration: float, speed: float) -> Non
             run[end] = random.randint(1, 300)
         elif not {"duration", "drive_displacement"} & run.keys():
             run[end] = value
+
+
+def _forces(random: Random, static_force: float, duration: float) -> Tables:
+    """A force, one that grows, or jumps and ramps of it in stages."""
+
+    def force() -> float:
+        sign = random.choice([1, 1, 1, -1, 0])
+        return sign * static_force * random.choice([random.uniform(0, MOST_FORCE), 0.6, 0.05])
+
+    what = _one_of(random, force=1, rate=1, stages=2)
+    if what == "force":
+        return {"force": force()}
+    if what == "rate":
+        sign = random.choice([1, 1, -1])
+        return {"force_rate": sign * random.uniform(0.3, MOST_FORCE) * static_force / duration}
+    count = random.randint(1, 6)
+    stages = [{"duration": duration / count * random.uniform(0.2, 1)} for _ in range(count)]
+    for stage in stages:
+        if random.random() < 0.5:
+            stage["force"] = force()
+        else:
+            stage |= {"start_force": force(), "end_force": force()}
+    return {"stage": stages}
 
 
 def _output(random: Random, tables: Tables, duration: float) -> Tables:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import ROOT, klein_tables
+from conftest import ROOT, klein_tables, long
 from mesoslip.command_line.progress import say
 
 
@@ -419,8 +419,15 @@ def test_messages_do_not_steer_the_terminal(capsys):
     assert capsys.readouterr().err == "out\\x1b[2J.nc: a slip\nand another one\n"
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe: \x80\n", b"text.usetex: True\n"])
-@pytest.mark.parametrize("module", ["plots.style", "reports.content"])
+@pytest.mark.parametrize(
+    ("module", "content"),
+    [
+        ("plots.style", b"\xff\xfe: \x80\n"),
+        ("reports.content", b"text.usetex: True\n"),
+        long("plots.style", b"text.usetex: True\n"),
+        long("reports.content", b"\xff\xfe: \x80\n"),
+    ],
+)
 def test_a_matplotlibrc_of_the_current_folder_is_not_read(module, content, tmp_path):
     (tmp_path / "matplotlibrc").write_bytes(content)
     code = f"import mesoslip.{module}, matplotlib; assert not matplotlib.rcParams['text.usetex']"

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import klein_tables
+from conftest import klein_tables, long
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from invariants import differences
-from kinds import KINDS, configuration
+from kinds import KINDS, RANDOM, THERMAL, configuration
 from mesoslip import Config, FileError, RunError
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
@@ -375,18 +375,21 @@ def test_simulations_leave_no_memory_behind():
     assert resident() - before < 8
 
 
+# Runs that take some seconds, with both a trace and finer traces.
+LONG = {"output__interval": 1e-2, "output__slip_interval": 1e-3}
+LONG_RUNS = {
+    "contacts": LONG | {"run__duration": 150.0, "run__realizations": 2, "contacts__count": 1000},
+    "activated populations": LONG
+    | THERMAL
+    | RANDOM
+    | {"run__engine": "me", "run__duration": 12.0, "contacts__threshold__relative_width": 0.05},
+}
+
+
 @pytest.fixture
-def long_run(tmp_path):
-    """A run that takes some seconds, with both a trace and finer traces."""
+def long_run(request, tmp_path):
     path = tmp_path / "long.toml"
-    tables = klein_tables(
-        run__duration=150.0,
-        contacts__count=1000,
-        run__realizations=2,
-        output__interval=1e-2,
-        output__slip_interval=1e-3,
-    )
-    path.write_text(tomli_w.dumps(tables))
+    path.write_text(tomli_w.dumps(klein_tables(**LONG_RUNS[request.param])))
     return path
 
 
@@ -434,6 +437,7 @@ def inode(path):
         return 0
 
 
+@pytest.mark.parametrize("long_run", ["contacts", long("activated populations")], indirect=True)
 def test_killed_runs_go_on(long_run, tmp_path):
     """SIGKILL and SIGTERM at moments of all kinds; tests/resume/kill.py does it for hours."""
     expected, output = tmp_path / "whole.nc", tmp_path / "killed.nc"
@@ -464,6 +468,7 @@ def test_killed_runs_go_on(long_run, tmp_path):
     assert_same(read_whole(expected), read_whole(output))
 
 
+@pytest.mark.parametrize("long_run", ["contacts"], indirect=True)
 def test_ctrl_c_reports_how_to_go_on(long_run, tmp_path):
     """A partial file to look at, a checkpoint to go on from, exit status 130; twice is no harm."""
     output = tmp_path / "stopped.nc"

@@ -129,7 +129,7 @@ def test_breaks_come_where_their_deviates_say(ratio, direction):
     velocity = 0.3
     config = unit(
         3,
-        run__duration=1000.0,
+        run__duration=400.0,
         run__seed=1,
         drive__velocity=direction * velocity,
         contacts__thermal={"rate": 1.0, "force_ratio": ratio},
@@ -138,13 +138,13 @@ def test_breaks_come_where_their_deviates_say(ratio, direction):
     expected = []
     for contact in range(3):
         place, renewal = 0.0, 0
-        while place < 1000 * velocity:
+        while place < 400 * velocity:
             place += breaking_stretch(config, contact, renewal, velocity)
             renewal += 1
             expected.append((place / velocity, contact))
-    expected = sorted(one for one in expected if one[0] < 1000)
+    expected = sorted(one for one in expected if one[0] < 400)
     actual = breaks(config)
-    assert len(expected) == len(actual) > 800
+    assert len(expected) == len(actual) > 320
     assert [contact for _, contact in actual] == [contact for _, contact in expected]
     np.testing.assert_allclose(
         [time for time, _ in actual], [time for time, _ in expected], rtol=1e-12

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
 from apart import Command
 from conftest import klein_tables
 from invariants import differences
-from kinds import BASE, LAYERED
+from kinds import AGEING, BASE, COARSE, FORCE, LAYERED, NEWBORN, RANDOM, THERMAL
 from mesoslip import Config
 from mesoslip.simulation.checkpoint import PREVIOUS, STATE, checkpoint_folder
 from tally import Tally, arguments
@@ -43,11 +43,18 @@ LONG: dict[str, Any] = {
 }
 SITES = {"strength": 0.3, "lattice": "triangular", "columns": 60, "rows": 68}
 SOFT = {"contacts__stiffness": 200.0, "contacts__threshold__relative_width": 0.3}
+# So that a block under a force creeps, and slides in the end.
+RAMP: dict[str, Any] = {"drive": {"force_rate": 4e-7}}
 KINDS: dict[str, dict[str, Any]] = {
     "rigid": {"run__duration": 100.0},
     "rigid, realizations": {"run__realizations": 5, "run__duration": 25.0},
     "rigid, me": {"run__engine": "me", "run__duration": 40.0},
     "rigid, lattice": SOFT | {"interaction": SITES, "output__snapshot_size": 500},
+    "rigid, ageing": AGEING | {"run__duration": 25.0},
+    "rigid, thermal": THERMAL | NEWBORN | {"run__duration": 25.0},
+    "rigid, thermal, me": THERMAL | RANDOM | COARSE | {"run__duration": 40.0},
+    "force, thermal": FORCE | THERMAL | RAMP | {"run__duration": 40.0},
+    "force, thermal, me": FORCE | THERMAL | COARSE | RAMP | {"run__duration": 5.0},
     "prescribed": {"slider": {"kind": "prescribed"}, "run__duration": 40.0},
     "layered": {"slider": LAYERED | {"layers": 16, "base": BASE}, "run__duration": 8.0},
     "layered, bdf": {

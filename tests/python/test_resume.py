@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import subprocess
@@ -358,6 +359,7 @@ def test_simulations_leave_no_memory_behind():
     configs = [configuration(kind) for kind in KINDS if "me" not in kind]
 
     def resident() -> float:
+        gc.collect()
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 

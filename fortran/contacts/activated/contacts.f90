@@ -9,7 +9,7 @@
 !> step.
 module mesoslip_contacts_activated_contacts
    use mesoslip_contacts_activated_keys, only: activated_keys_type, exchange_activated, &
-      & life_clock, life_key, life_left, set_up_activated
+      & life_clock, life_key, life_left, motions, set_up_activated
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
    use mesoslip_contacts_individual_births, only: drag_of
@@ -117,7 +117,7 @@ contains
       real(wp) :: ahead
 
       law = total_law(self)
-      call self%order_motion(self%ahead)%first(ahead)
+      call self%order(self%ahead)%first(ahead)
       window = self%window_between(self%behind, ahead, self%detached%next_due)
       call set_next(self)
       call self%hazard%offer(pose%displacement, self%clock)
@@ -133,7 +133,7 @@ contains
       self%hazard%is_used = self%members > 0
       do number = 1, clocks
          if (self%members(number) > 0) then
-            call self%order_clock(number)%first(self%hazard%next(number))
+            call self%order(motions + number)%first(self%hazard%next(number))
          end if
       end do
    end subroutine set_next
@@ -181,7 +181,7 @@ contains
 
       if (self%members(number) == 0) return
       do
-         call self%order_clock(number)%due(self%hazard%reading(number), contact)
+         call self%order(motions + number)%due(self%hazard%reading(number), contact)
          if (contact == 0) return
          if (self%confirms(contact, pose, .true.)) call self%break_contact(contact, pose)
       end do
@@ -196,7 +196,7 @@ contains
       integer :: contact
 
       do
-         call self%order_motion(self%ahead)%due(self%direction * pose%displacement, contact)
+         call self%order(self%ahead)%due(self%direction * pose%displacement, contact)
          if (contact == 0) return
          if (force_sign(int(self%life(life_clock, contact))) * self%direction < 0.0_wp) then
             call self%change_sign(contact)
@@ -321,10 +321,10 @@ contains
 
       integer :: event
 
-      call self%order_motion(self%ahead)%preview(limit, self%listed, &
+      call self%order(self%ahead)%preview(limit, self%listed, &
          & schedule%break_coordinate, schedule%breaks)
-      call self%order_clock(schedule%number)%preview(limit, self%clock_listed, schedule%clock_key, &
-         & schedule%clock_breaks)
+      call self%order(motions + schedule%number)%preview(limit, self%clock_listed, &
+         & schedule%clock_key, schedule%clock_breaks)
       schedule%break_stop = 0
       schedule%clock_stop = 0
       schedule%broken = 0
@@ -356,7 +356,7 @@ contains
          self%entry(self%listed(event)) = 0
       end do
       if (schedule%clock_breaks == 0) then
-         call self%order_clock(schedule%number)%first(schedule%clock_key(1))
+         call self%order(motions + schedule%number)%first(schedule%clock_key(1))
          if (.not. schedule%clock_key(1) < never) then
             schedule%clock_breaks = 1
             schedule%clock_stop = 1

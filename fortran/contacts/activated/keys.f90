@@ -19,7 +19,7 @@ module mesoslip_contacts_activated_keys
    private
 
    public :: activated_keys_type, set_up_activated, exchange_activated
-   public :: life_clock, life_left, life_key
+   public :: life_clock, life_left, life_key, motions
 
    !> Stretch over the mean breaking stretch beyond zero at which the sign of a force changes: less
    !> than matters, and more than rounding
@@ -32,6 +32,9 @@ module mesoslip_contacts_activated_keys
    integer, parameter :: life_length = 3
    integer, parameter :: life_clock = 1, life_left = 2, life_key = 3
 
+   !> Directions of motion, the orders of which come before those of the clocks
+   integer, parameter :: motions = 2
+
    !> Contacts that break by thermal activation, in order.
    type, abstract, extends(individual_contacts_type) :: activated_keys_type
       !> The clocks
@@ -41,8 +44,9 @@ module mesoslip_contacts_activated_keys
       !> Numbers of their lives, shape (life_length, count)
       real(wp), allocatable :: life(:, :)
       !> Contacts in the order of what comes next in a motion up and down, a break at the threshold
-      !> or a change of the force's sign, and in that of their keys
-      type(scan_order_type) :: order_motion(2), order_clock(clocks)
+      !> or a change of the force's sign, then in that of their keys by each clock. In one array, as
+      !> of two components of this type gfortran 12 frees only one
+      type(scan_order_type) :: order(motions + clocks)
       !> The order of a motion ahead
       integer :: ahead = 1
       !> Number of contacts that go by each clock
@@ -111,10 +115,10 @@ contains
       end if
       do number = 1, clocks
          if (.not. allocated(error)) then
-            call new_scan_order(self%order_motion(number), self%parameters%count, error)
+            call new_scan_order(self%order(number), self%parameters%count, error)
          end if
          if (.not. allocated(error)) then
-            call new_scan_order(self%order_clock(number), self%parameters%count, error)
+            call new_scan_order(self%order(motions + number), self%parameters%count, error)
          end if
       end do
    end subroutine set_up_activated
@@ -151,12 +155,12 @@ contains
       integer :: number
 
       number = int(self%life(life_clock, contact))
-      call self%order_clock(number)%put(contact, self%life(life_key, contact))
+      call self%order(motions + number)%put(contact, self%life(life_key, contact))
       associate (origin => self%record(row_origin, contact), &
          & limit => self%record(row_limit, contact))
-         call self%order_motion(self%ahead)%put(contact, self%direction * origin &
+         call self%order(self%ahead)%put(contact, self%direction * origin &
             & + self%distance_ahead(number, limit))
-         call self%order_motion(3 - self%ahead)%put(contact, -(self%direction * origin &
+         call self%order(3 - self%ahead)%put(contact, -(self%direction * origin &
             & - self%distance_behind(number, limit)))
       end associate
       self%members(number) = self%members(number) + 1
@@ -170,9 +174,9 @@ contains
       integer :: number
 
       number = int(self%life(life_clock, contact))
-      call self%order_clock(number)%remove(contact)
-      call self%order_motion(1)%remove(contact)
-      call self%order_motion(2)%remove(contact)
+      call self%order(motions + number)%remove(contact)
+      call self%order(1)%remove(contact)
+      call self%order(2)%remove(contact)
       self%members(number) = self%members(number) - 1
    end subroutine take_out
 
@@ -258,7 +262,7 @@ contains
          call self%hazard%is_far(number, displacement, far)
          if (.not. far) return
          ! What is left until a key changes by one factor for all.
-         if (abs(exponent) < max_rescaling) call self%order_clock(number)%rescale(reading, &
+         if (abs(exponent) < max_rescaling) call self%order(motions + number)%rescale(reading, &
             & exp(-exponent), self%members(number), is_done)
          if (is_done) then
             call rescale_lives(self, number, reading, exp(-exponent))
@@ -307,11 +311,11 @@ contains
 
       integer :: contact
 
-      call self%order_clock(number)%clear()
+      call self%order(motions + number)%clear()
       do contact = 1, self%parameters%count
          if (int(self%life(life_clock, contact)) /= number) cycle
          call self%set_key(contact)
-         call self%order_clock(number)%put(contact, self%life(life_key, contact))
+         call self%order(motions + number)%put(contact, self%life(life_key, contact))
       end do
    end subroutine set_keys
 
@@ -323,12 +327,12 @@ contains
       real(wp), intent(in) :: displacement
 
       if (self%direction * displacement > self%behind) return
-      self%behind = -self%order_motion(3 - self%ahead)%lowest()
+      self%behind = -self%order(3 - self%ahead)%lowest()
       if (self%direction * displacement > self%behind) return
       self%ahead = 3 - self%ahead
       self%direction = -self%direction
-      self%behind = -self%order_motion(3 - self%ahead)%lowest()
-      if (self%direction > 0.0_wp) call self%order_motion(2)%rest()
+      self%behind = -self%order(3 - self%ahead)%lowest()
+      if (self%direction > 0.0_wp) call self%order(2)%rest()
    end subroutine turn_round
 
    !> Order all contacts anew, from the records and lives.
@@ -342,8 +346,8 @@ contains
 
       self%ahead = merge(1, 2, self%direction > 0.0_wp)
       do number = 1, clocks
-         call self%order_motion(number)%clear()
-         call self%order_clock(number)%clear()
+         call self%order(number)%clear()
+         call self%order(motions + number)%clear()
       end do
       self%members = 0
       do contact = 1, self%parameters%count

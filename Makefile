@@ -89,7 +89,7 @@ fuzz: $(INSTALLED) $(if $(FUZZ),,test-fortran) ## Attack the program with some t
 
 # A part of a file's name or of a mutant's text: make mutants MUTANTS=likelihood.
 MUTANTS ?=
-mutants: $(INSTALLED) ## Break the program in forty places, and report which the tests notice
+mutants: $(INSTALLED) ## Break the program in some fifty places, and report which the tests notice
 	$(VENV)/bin/python tests/mutants/mutants.py $(MUTANTS)
 
 reference: $(INSTALLED) ## Rewrite the reference outputs of the tests, on purpose only

@@ -391,6 +391,8 @@ def test_a_movie_is_saved(server, browser, tmp_path):
     assert eventually((tmp_path / "klein.gif").exists, PATIENCE)
     assert (tmp_path / "klein.gif").read_bytes().startswith(b"GIF8")
     assert browser.change("run.engine", "me")[1] == "drawn"
+    # What the run reports at its end would replace the message.
+    browser.wait_until_done()
     browser.element("movie", "button").click()
     assert eventually(lambda: "engine" in browser.value("status", "text"))
     assert browser.errors() == []

@@ -13,8 +13,6 @@ module mesoslip_contacts_ensemble
       & total_law
    use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_queue, only: contact_queue_type, new_contact_queue
-   use mesoslip_contacts_individual_listed, only: attach_listed, detach_listed, &
-      & list_attachments, list_births
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness, &
       & ahead_coordinate
    use mesoslip_schedule, only: max_events, schedule_type
@@ -159,9 +157,9 @@ contains
       schedule%moments = 0
       schedule%direction = self%direction
       schedule%behind = self%behind
-      call list_attachments(self, min(limit, max_events, 2 * number + 4), pose%direction, &
-         & schedule, contact)
-      call list_births(self, self%listed(:number), pose%direction, schedule)
+      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule, &
+         & contact)
+      call self%list_births(self%listed(:number), pose%direction, schedule)
       schedule%is_over = .false.
    end subroutine plan
 
@@ -176,9 +174,9 @@ contains
 
       integer :: event, contact(max_events)
 
-      call detach_listed(self, self%listed(:schedule%broken), schedule)
+      call self%detach_listed(self%listed(:schedule%broken), schedule)
       if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
-      call attach_listed(self, schedule, contact)
+      call self%attach_listed(schedule, contact)
       do event = 1, schedule%attached
          call self%queue%insert(contact(event), &
             & ahead_coordinate(self%record(:, contact(event)), self%direction))

@@ -13,7 +13,6 @@ module mesoslip_contacts_activated_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
    use mesoslip_contacts_individual_births, only: drag_of
-   use mesoslip_contacts_individual_listed, only: attach_listed, list_attachments
    use mesoslip_contacts_individual_record, only: row_origin, row_renewal, row_stiffness
    use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_hazard, only: force_sign, never
@@ -301,7 +300,7 @@ contains
       schedule%tiny_stretch = self%distance_behind(schedule%number, 0.0_wp)
       schedule%break_stiffness(1) = self%parameters%stiffness
       schedule%break_drag(1) = drag_of(self%parameters, self%parameters%stiffness)
-      call list_attachments(self, length, pose%direction, schedule, self%attaching)
+      call self%list_attachments(length, pose%direction, schedule, self%attaching)
       associate (attaching => self%attaching(:schedule%attachments))
          call self%draw_deviates(attaching)
          do number = 1, schedule%attachments
@@ -432,7 +431,7 @@ contains
 
       integer :: event, contact(max_events)
 
-      call attach_listed(self, schedule, contact)
+      call self%attach_listed(schedule, contact)
       do event = 1, schedule%attached
          self%life(life_clock, contact(event)) = real(schedule%number, wp)
          self%life(life_key, contact(event)) = schedule%attach_key(event)

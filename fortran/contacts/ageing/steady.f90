@@ -4,23 +4,18 @@
 !> which is solved once, at birth, or before that for the next lives of several contacts together.
 module mesoslip_contacts_ageing_steady
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, in_falling, &
-      & in_queue, life_birth, life_limit, life_motion, next_configured, next_length, next_limit, &
-      & next_speed, solved_together
+      & in_queue, life_limit, life_motion, next_length, next_limit, next_speed, solved_together
    use mesoslip_contacts_ageing_falling, only: scan
    use mesoslip_contacts_ageing_lists, only: append
    use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
-   use mesoslip_contacts_individual_births, only: drag_of
-   use mesoslip_contacts_individual_listed, only: attach_listed, detach_listed, &
-      & list_attachments, list_births
-   use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_stiffness, &
+   use mesoslip_contacts_individual_record, only: row_limit, row_next, row_stiffness, &
       & ahead_coordinate
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_schedule, only: max_events, schedule_type
    implicit none
    private
 
-   public :: begin_steady, end_steady, break_steady, queue_newborn, plan_steady, settle_steady
+   public :: begin_steady, end_steady, break_steady, queue_newborn
 
 contains
 
@@ -156,93 +151,8 @@ contains
       call meet_newborn(self%ageing, configured(:number), self%stretch, stretch, self%speed, &
          & limit(:number))
       do position = 1, number
-         self%next(:next_speed, contact(position)) = [limit(position), self%speed]
+         self%next(:, contact(position)) = [limit(position), self%speed]
       end do
    end subroutine solve_next_lives
-
-   !> Write a schedule of what comes next in a steady motion: the breaks at the front of the queue,
-   !> up to a contact that was queued for another motion, and about as many attachments.
-   subroutine plan_steady(self, pose, limit, schedule)
-      class(ageing_contacts_type), intent(inout) :: self
-      type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
-      integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
-      type(schedule_type), intent(inout) :: schedule
-
-      integer :: number, event, contact(max_events)
-
-      call self%queue%preview(self%record, min(limit, max_events), self%listed, &
-         & schedule%break_coordinate, number)
-      do event = 1, number
-         if (self%life(life_motion, self%listed(event)) < self%motion) exit
-         schedule%break_origin(event) = self%record(row_origin, self%listed(event))
-      end do
-      number = event - 1
-      if (number == 0) return
-      schedule%break_stiffness(:number) = self%parameters%stiffness
-      schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
-      schedule%breaks = number
-      schedule%broken = 0
-      schedule%moments = 0
-      schedule%direction = self%direction
-      schedule%behind = self%behind
-      call list_attachments(self, min(limit, max_events, 2 * number + 4), pose%direction, &
-         & schedule, contact)
-      call solve_listed(self, contact(:schedule%attachments), schedule%attach_limit)
-      call list_births(self, self%listed(:number), pose%direction, schedule)
-      if (schedule%has_births) then
-         call solve_listed(self, self%listed(:number), schedule%birth_limit)
-      end if
-      schedule%is_over = .false.
-   end subroutine plan_steady
-
-   !> Solve where listed contacts will break that are born in a steady motion.
-   subroutine solve_listed(self, contact, limit)
-      class(ageing_contacts_type), intent(inout) :: self
-      !> Numbers of the contacts
-      integer, intent(in) :: contact(:)
-      !> Their configured breaking stretches, and those at which they will break [m]
-      real(wp), intent(inout) :: limit(:)
-
-      real(wp) :: stretch
-      integer :: event
-
-      stretch = self%parameters%back_force_ratio * self%stretch
-      do event = 1, size(contact)
-         associate (next => self%next(:, contact(event)))
-            next(next_configured) = limit(event)
-            if (self%ageing%is_constant(limit(event), self%stretch)) cycle
-            if (abs(next(next_speed) - self%speed) > 0.0_wp) then
-               next(next_limit) = meet(self%ageing, limit(event), self%stretch, 0.0_wp, stretch, &
-                  & self%speed)
-               next(next_speed) = self%speed
-            end if
-            limit(event) = next(next_limit)
-         end associate
-      end do
-   end subroutine solve_listed
-
-   !> Keep the books of a schedule in a steady motion.
-   subroutine settle_steady(self, schedule)
-      class(ageing_contacts_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
-      type(schedule_type), intent(in) :: schedule
-
-      integer :: event, contact(max_events)
-
-      call detach_listed(self, self%listed(:schedule%broken), schedule)
-      if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
-      call attach_listed(self, schedule, contact)
-      do event = 1, schedule%attached
-         associate (one => contact(event))
-            self%life(life_birth, one) = schedule%attach_time(event)
-            self%life(life_limit, one) = self%next(next_configured, one)
-            call queue_newborn(self, one)
-            call self%put(one)
-            self%behind = max(self%behind, self%behind_at(one, schedule%attach_time(event)))
-         end associate
-      end do
-   end subroutine settle_steady
 
 end module mesoslip_contacts_ageing_steady

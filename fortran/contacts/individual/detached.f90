@@ -47,7 +47,7 @@ module mesoslip_contacts_individual_detached
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: sift_up, sift_down, heap_count, push_heap, &
-         & push_sorted, sort_next, heap_all, push_by_time, pop_sorted, preview_sorted
+         & push_sorted, sort_next, heap_all
    end type detached_contacts_type
 
 contains
@@ -93,27 +93,17 @@ contains
          self%count = self%count + 1
          if (self%attach) self%next_due = self%value(row_due, self%first + 1)
       else
-         call self%push_by_time(contact, [due, drag])
+         if (self%heap_count() == self%count) then
+            call self%push_heap(contact, [due, drag])
+         else if (due >= self%sorted_value(row_due, self%sorted_last)) then
+            call self%push_heap(contact, [due, drag])
+         else
+            call self%push_sorted(contact, [due, drag])
+         end if
+         self%count = self%count + 1
+         if (self%attach) self%next_due = min(self%next_due, due)
       end if
    end subroutine push
-
-   !> Put a contact in that has a delay of its own.
-   pure subroutine push_by_time(self, contact, value)
-      class(detached_contacts_type), intent(inout) :: self
-      integer, intent(in) :: contact
-      !> What is kept for it
-      real(wp), intent(in) :: value(length)
-
-      if (self%heap_count() == self%count) then
-         call self%push_heap(contact, value)
-      else if (value(row_due) >= self%sorted_value(row_due, self%sorted_last)) then
-         call self%push_heap(contact, value)
-      else
-         call self%push_sorted(contact, value)
-      end if
-      self%count = self%count + 1
-      if (self%attach) self%next_due = min(self%next_due, value(row_due))
-   end subroutine push_by_time
 
    !> Number of contacts in the heap.
    elemental function heap_count(self) result(number)
@@ -247,8 +237,8 @@ contains
       integer, intent(out) :: contact
       real(wp), intent(out) :: drag
 
+      call self%find_next(contact)
       if (self%in_order) then
-         contact = self%contact(self%first + 1)
          drag = self%value(row_drag, self%first + 1)
          self%count = self%count - 1
          self%first = self%first + 1
@@ -256,26 +246,15 @@ contains
          self%next_due = huge(1.0_wp)
          if (self%count > 0) self%next_due = self%value(row_due, self%first + 1)
       else
-         call self%pop_sorted(contact, drag)
+         drag = self%sorted_value(row_drag, self%sorted_first)
+         self%count = self%count - 1
+         self%sorted_first = self%sorted_first + 1
+         self%next_due = huge(1.0_wp)
+         if (self%count == 0) return
+         if (self%sorted_last < self%sorted_first) call self%sort_next()
+         self%next_due = self%sorted_value(row_due, self%sorted_first)
       end if
    end subroutine pop
-
-   !> Take the contact out that attaches next, of those with delays of their own.
-   pure subroutine pop_sorted(self, contact, drag)
-      class(detached_contacts_type), intent(inout) :: self
-      !> Its number, and its drag while it was detached [N s/m]
-      integer, intent(out) :: contact
-      real(wp), intent(out) :: drag
-
-      call self%find_next(contact)
-      drag = self%sorted_value(row_drag, self%sorted_first)
-      self%count = self%count - 1
-      self%sorted_first = self%sorted_first + 1
-      self%next_due = huge(1.0_wp)
-      if (self%count == 0) return
-      if (self%sorted_last < self%sorted_first) call self%sort_next()
-      self%next_due = self%sorted_value(row_due, self%sorted_first)
-   end subroutine pop_sorted
 
    !> Move the last contact of the heap up to its place.
    pure subroutine sift_up(self, last)
@@ -347,7 +326,17 @@ contains
       if (self%attach) number = min(limit, self%count)
       due(number + 1) = huge(1.0_wp)
       if (.not. self%in_order) then
-         call self%preview_sorted(number, contact, due, drag)
+         if (number == 0) return
+         position = self%sorted_last - self%sorted_first + 1
+         if (position <= number .and. self%heap_count() > 0) call self%sort_next()
+         do event = 1, number
+            position = self%sorted_first + event - 1
+            contact(event) = self%sorted_contact(position)
+            due(event) = self%sorted_value(row_due, position)
+            drag(event) = self%sorted_value(row_drag, position)
+         end do
+         if (self%count > number) due(number + 1) = &
+            & self%sorted_value(row_due, self%sorted_first + number)
          return
       end if
       position = self%first
@@ -360,30 +349,6 @@ contains
       end do
       if (self%attach .and. self%count > number) due(number + 1) = self%value(row_due, position + 1)
    end subroutine preview
-
-   !> The same of contacts with delays of their own.
-   pure subroutine preview_sorted(self, number, contact, due, drag)
-      class(detached_contacts_type), intent(inout) :: self
-      !> How many there are
-      integer, intent(in) :: number
-      !> Their numbers, and the times and drags, as in preview
-      integer, intent(inout) :: contact(:)
-      real(wp), intent(inout) :: due(:), drag(:)
-
-      integer :: event, position
-
-      if (number == 0) return
-      position = self%sorted_last - self%sorted_first + 1
-      if (position <= number .and. self%heap_count() > 0) call self%sort_next()
-      do event = 1, number
-         position = self%sorted_first + event - 1
-         contact(event) = self%sorted_contact(position)
-         due(event) = self%sorted_value(row_due, position)
-         drag(event) = self%sorted_value(row_drag, position)
-      end do
-      if (self%count > number) due(number + 1) = &
-         & self%sorted_value(row_due, self%sorted_first + number)
-   end subroutine preview_sorted
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

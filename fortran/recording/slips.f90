@@ -369,8 +369,9 @@ contains
       real(wp) :: number
 
       number = self%breaks_after - self%breaks_before
-      if (number < 1.0_wp .and. 2.0_wp * self%detached_before >= self%parameters%contacts) &
-         & number = self%detached_before
+      if (number < 1.0_wp .and. 2.0_wp * self%detached_before >= self%parameters%contacts) then
+         number = self%detached_before
+      end if
    end function broken_contacts
 
    !> Put a slip into the catalogue.

@@ -15,6 +15,7 @@ module mesoslip_contacts_ageing_base
    public :: ageing_contacts_type
    public :: tiny_gap, safety, few
    public :: in_queue, in_leaders, in_falling
+   public :: leaders, falling, near
    public :: life_length, life_birth, life_limit, life_motion, no_motion, any_motion
    public :: next_length, next_limit, next_speed, solved_together
 
@@ -30,6 +31,10 @@ module mesoslip_contacts_ageing_base
 
    !> Where a contact is kept: in the queue, among the leaders, among those that fall
    integer, parameter :: in_queue = 0, in_leaders = 1, in_falling = 2
+
+   !> The lists of contacts
+   integer, parameter :: lists = 3
+   integer, parameter :: leaders = 1, falling = 2, near = 3
 
    !> Numbers of the life of a contact: when it was born [s], its configured breaking stretch [m],
    !> and the steady motion under which it breaks where it is queued: none, one, or any
@@ -62,8 +67,9 @@ module mesoslip_contacts_ageing_base
       real(wp), allocatable :: next(:, :)
       !> Contacts for which it is still to be found
       integer :: unsolved_count = 0, unsolved(solved_together) = 0
-      !> Contacts that lead, whose thresholds fall, and those of them that are near
-      type(list_type) :: leaders, falling, near
+      !> Contacts that lead, whose thresholds fall, and those of them that are near. In one array,
+      !> as of several components of this type gfortran 12 frees only one
+      type(list_type) :: list(lists)
       !> Where each contact is kept, shape (count)
       integer, allocatable :: kept(:)
       !> Coordinates between which [m], and time until which [s], no other contacts whose thresholds
@@ -139,7 +145,7 @@ contains
 
       integer :: contact
 
-      self%leaders%count = 0
+      self%list(leaders)%count = 0
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          if (self%kept(contact) == in_falling .and. .not. self%is_steady) cycle

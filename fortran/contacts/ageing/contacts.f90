@@ -16,9 +16,9 @@
 !>
 !> A contact that does not age breaks as in the ensemble without ageing, to the bit.
 module mesoslip_contacts_ageing_contacts
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, in_falling, in_leaders, &
-      & in_queue, &
-      & life_birth, life_length, life_limit, life_motion, next_length, next_speed, no_motion
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, falling, in_falling, in_leaders, &
+      & in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, next_length, &
+      & next_speed, no_motion
    use mesoslip_contacts_ageing_falling, only: bound_falling, break_falling, scan, scan_if_needed
    use mesoslip_contacts_ageing_law, only: take_ageing_law
    use mesoslip_contacts_ageing_leaders, only: bound_leaders, break_leaders
@@ -92,9 +92,9 @@ contains
          allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%kept(count), source=in_queue, stat=stat)
-         if (stat == 0) allocate (self%leaders%contact(count), source=0, stat=stat)
-         if (stat == 0) allocate (self%falling%contact(count), source=0, stat=stat)
-         if (stat == 0) allocate (self%near%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%list(leaders)%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%list(falling)%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%list(near)%contact(count), source=0, stat=stat)
       end associate
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the ages of contacts")
@@ -210,7 +210,7 @@ contains
                call self%record_lateness(contact, pose)
                call self%detach(contact, pose%displacement, pose%time)
             else
-               call append(self%leaders, contact)
+               call append(self%list(leaders), contact)
                self%kept(contact) = in_leaders
             end if
          end do
@@ -254,8 +254,8 @@ contains
       else if (self%ageing%falls(self%life(life_limit, contact), self%stretch) &
          & .and. .not. self%ageing%is_old(time - self%life(life_birth, contact))) then
          self%kept(contact) = in_falling
-         call append(self%falling, contact)
-         call append(self%near, contact)
+         call append(self%list(falling), contact)
+         call append(self%list(near), contact)
          call self%refresh(contact, self%scan_time)
          self%life(life_motion, contact) = no_motion
       else
@@ -270,7 +270,7 @@ contains
 
       if (self%is_steady) call end_steady(self, pose)
       self%direction = -self%direction
-      if (self%falling%count > 0) call scan(self, pose)
+      if (self%list(falling)%count > 0) call scan(self, pose)
       call self%order_all(pose)
       self%behind = self%max_behind()
    end subroutine face
@@ -299,12 +299,12 @@ contains
       call exchange_individual(self, archive)
       call archive%exchange("life", self%life)
       call archive%exchange("kept", self%kept)
-      call archive%exchange("leaders", self%leaders%contact)
-      call archive%exchange("leaders_count", self%leaders%count)
-      call archive%exchange("falling", self%falling%contact)
-      call archive%exchange("falling_count", self%falling%count)
-      call archive%exchange("near", self%near%contact)
-      call archive%exchange("near_count", self%near%count)
+      call archive%exchange("leaders", self%list(leaders)%contact)
+      call archive%exchange("leaders_count", self%list(leaders)%count)
+      call archive%exchange("falling", self%list(falling)%contact)
+      call archive%exchange("falling_count", self%list(falling)%count)
+      call archive%exchange("near", self%list(near)%contact)
+      call archive%exchange("near_count", self%list(near)%count)
       call archive%exchange("scan_upper", self%scan_upper)
       call archive%exchange("scan_lower", self%scan_lower)
       call archive%exchange("scan_time", self%scan_time)

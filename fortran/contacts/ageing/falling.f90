@@ -4,8 +4,8 @@
 !> when the contact is foreseen to break, whether the slider moves or not. Few contacts do so in
 !> most cases; of many, those are near that may break before the next scan.
 module mesoslip_contacts_ageing_falling
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, few, life_birth, &
-      & life_limit, life_motion, tiny_gap, in_queue
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, few, &
+      & in_queue, life_birth, life_limit, life_motion, near, tiny_gap
    use mesoslip_contacts_ageing_lists, only: append, position_of, remove
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, ahead_coordinate, &
       & behind_coordinate
@@ -29,38 +29,38 @@ contains
       integer :: position, contact
       real(wp) :: fastest, limit, rate, reach
 
-      do position = self%falling%count, 1, -1
-         call retire(self, self%falling%contact(position), pose%time)
+      do position = self%list(falling)%count, 1, -1
+         call retire(self, self%list(falling)%contact(position), pose%time)
       end do
       self%scan_upper = huge(1.0_wp)
       self%scan_lower = -huge(1.0_wp)
       self%scan_time = huge(1.0_wp)
-      if (self%falling%count > few) then
+      if (self%list(falling)%count > few) then
          fastest = 0.0_wp
-         do position = 1, self%falling%count
-            contact = self%falling%contact(position)
+         do position = 1, self%list(falling)%count
+            contact = self%list(falling)%contact(position)
             call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, &
                & pose%time - self%life(life_birth, contact), limit, rate)
             fastest = max(fastest, -rate)
          end do
          ! About as many scans while the slider moves by a stretch as contacts that are near.
-         reach = 0.5_wp * self%stretch / sqrt(real(self%falling%count, wp))
+         reach = 0.5_wp * self%stretch / sqrt(real(self%list(falling)%count, wp))
          self%scan_upper = self%direction * pose%displacement + reach
          self%scan_lower = self%direction * pose%displacement - reach
          if (fastest > 0.0_wp) then
             self%scan_time = max(pose%time + reach / fastest, nearest(pose%time, 1.0_wp))
          end if
       end if
-      self%near%count = 0
-      do position = 1, self%falling%count
-         contact = self%falling%contact(position)
+      self%list(near)%count = 0
+      do position = 1, self%list(falling)%count
+         contact = self%list(falling)%contact(position)
          call self%refresh(contact, self%scan_time)
          if (ahead_coordinate(self%record(:, contact), self%direction) < self%scan_upper .or. &
             & behind_coordinate(self%record(:, contact), self%direction) > self%scan_lower) then
-            call append(self%near, contact)
+            call append(self%list(near), contact)
          end if
       end do
-      call self%count_visits(2 * self%falling%count)
+      call self%count_visits(2 * self%list(falling)%count)
    end subroutine scan
 
    !> Scan the contacts whose thresholds fall if that is due; those that are old do so no more.
@@ -70,14 +70,16 @@ contains
 
       integer :: position
 
-      if (self%falling%count == 0) return
-      do position = self%near%count, 1, -1
-         call retire(self, self%near%contact(position), pose%time)
+      if (self%list(falling)%count == 0) return
+      do position = self%list(near)%count, 1, -1
+         call retire(self, self%list(near)%contact(position), pose%time)
       end do
       if (pose%time >= self%scan_time &
          & .or. self%direction * pose%displacement >= self%scan_upper &
          & .or. self%direction * pose%displacement <= self%scan_lower &
-         & .or. self%near%count > max(few, self%falling%count / 2)) call scan(self, pose)
+         & .or. self%list(near)%count > max(few, self%list(falling)%count / 2)) then
+         call scan(self, pose)
+      end if
    end subroutine scan_if_needed
 
    !> Put a contact whose threshold has fallen into the queue.
@@ -90,9 +92,9 @@ contains
       integer :: position
 
       if (.not. self%ageing%is_old(time - self%life(life_birth, contact))) return
-      position = position_of(self%near, contact)
-      if (position > 0) call remove(self%near, position)
-      call remove(self%falling, position_of(self%falling, contact))
+      position = position_of(self%list(near), contact)
+      if (position > 0) call remove(self%list(near), position)
+      call remove(self%list(falling), position_of(self%list(falling), contact))
       self%record(row_limit, contact) = self%life(life_limit, contact)
       self%life(life_motion, contact) = any_motion
       call self%put(contact)
@@ -111,15 +113,15 @@ contains
       upper = min(upper, self%scan_upper)
       lower = max(lower, self%scan_lower)
       end_time = min(end_time, self%scan_time)
-      do position = 1, self%near%count
-         associate (contact => self%near%contact(position))
+      do position = 1, self%list(near)%count
+         associate (contact => self%list(near)%contact(position))
             if (ahead_coordinate(self%record(:, contact), self%direction) < upper &
                & .or. behind_coordinate(self%record(:, contact), self%direction) > lower) then
                call foresee_fall(self, contact, pose, upper, lower, end_time)
             end if
          end associate
       end do
-      call self%count_visits(self%near%count)
+      call self%count_visits(self%list(near)%count)
    end subroutine bound_falling
 
    !> Where and when a contact is foreseen to break whose threshold falls: before that, it cannot.
@@ -167,8 +169,8 @@ contains
       real(wp) :: stretch, limit
       integer :: position, contact
 
-      do position = self%near%count, 1, -1
-         contact = self%near%contact(position)
+      do position = self%list(near)%count, 1, -1
+         contact = self%list(near)%contact(position)
          stretch = abs(pose%displacement - self%record(row_origin, contact)) &
             & + tiny_gap * self%stretch
          if (self%record(row_limit, contact) > stretch) cycle
@@ -176,8 +178,8 @@ contains
             & pose%time - self%life(life_birth, contact))
          if (limit > stretch) cycle
          call self%detach(contact, pose%displacement, pose%time)
-         call remove(self%near, position)
-         call remove(self%falling, position_of(self%falling, contact))
+         call remove(self%list(near), position)
+         call remove(self%list(falling), position_of(self%list(falling), contact))
          self%kept(contact) = in_queue
       end do
    end subroutine break_falling

@@ -5,7 +5,7 @@
 !> and foresees again.
 module mesoslip_contacts_ageing_leaders
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, in_leaders, &
-      & in_queue, life_birth, life_limit, life_motion, safety, tiny_gap
+      & in_queue, leaders, life_birth, life_limit, life_motion, safety, tiny_gap
    use mesoslip_contacts_ageing_lists, only: append, remove
    use mesoslip_contacts_individual_record, only: row_origin, ahead_coordinate
    use mesoslip_interface_law, only: pose_type
@@ -42,9 +42,9 @@ contains
       real(wp) :: key, reach
 
       reach = reach_of(self, pose, end_time)
-      visited = self%leaders%count
-      do position = 1, self%leaders%count
-         contact = self%leaders%contact(position)
+      visited = self%list(leaders)%count
+      do position = 1, self%list(leaders)%count
+         contact = self%list(leaders)%contact(position)
          key = ahead_coordinate(self%record(:, contact), self%direction)
          if (key < reach) key = foresee(self, contact, pose)
          upper = min(upper, key)
@@ -62,16 +62,16 @@ contains
                cycle
             end if
          end if
-         call append(self%leaders, contact)
+         call append(self%list(leaders), contact)
          self%kept(contact) = in_leaders
          upper = min(upper, foresee(self, contact, pose))
       end do
       upper = min(upper, self%queue%first_key)
-      do position = self%leaders%count, 1, -1
-         contact = self%leaders%contact(position)
+      do position = self%list(leaders)%count, 1, -1
+         contact = self%list(leaders)%contact(position)
          if (ahead_coordinate(self%record(:, contact), self%direction) > upper) then
             call self%put(contact)
-            call remove(self%leaders, position)
+            call remove(self%list(leaders), position)
          end if
       end do
       call self%count_visits(visited)
@@ -160,8 +160,8 @@ contains
       do
          first = 0
          least = self%direction * pose%displacement + 2.0_wp * tiny_gap * self%stretch
-         do position = 1, self%leaders%count
-            contact = self%leaders%contact(position)
+         do position = 1, self%list(leaders)%count
+            contact = self%list(leaders)%contact(position)
             key = ahead_coordinate(self%record(:, contact), self%direction)
             if (.not. key < least) cycle
             call self%refresh(contact, pose%time)
@@ -172,9 +172,9 @@ contains
             end if
          end do
          if (first == 0) return
-         contact = self%leaders%contact(first)
+         contact = self%list(leaders)%contact(first)
          call self%record_lateness(contact, pose)
-         call remove(self%leaders, first)
+         call remove(self%list(leaders), first)
          self%kept(contact) = in_queue
          call self%detach(contact, pose%displacement, pose%time)
       end do

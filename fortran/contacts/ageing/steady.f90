@@ -3,8 +3,9 @@
 !> They are queued by where they break if it goes on so, whether their thresholds grow or fall,
 !> which is solved once, at birth, or before that for the next lives of several contacts together.
 module mesoslip_contacts_ageing_steady
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, in_falling, &
-      & in_queue, life_limit, life_motion, next_length, next_limit, next_speed, solved_together
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, in_falling, &
+      & in_queue, leaders, life_limit, life_motion, near, next_length, next_limit, next_speed, &
+      & solved_together
    use mesoslip_contacts_ageing_falling, only: scan
    use mesoslip_contacts_ageing_lists, only: append
    use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
@@ -34,19 +35,19 @@ contains
       if (was_slower) then
          call self%order_all(pose)
       else
-         do position = 1, self%leaders%count
-            call self%order(self%leaders%contact(position), pose%displacement, pose%time)
-            call self%put(self%leaders%contact(position))
+         do position = 1, self%list(leaders)%count
+            call self%order(self%list(leaders)%contact(position), pose%displacement, pose%time)
+            call self%put(self%list(leaders)%contact(position))
          end do
-         do position = 1, self%falling%count
-            call self%order(self%falling%contact(position), pose%displacement, pose%time)
-            call self%put(self%falling%contact(position))
+         do position = 1, self%list(falling)%count
+            call self%order(self%list(falling)%contact(position), pose%displacement, pose%time)
+            call self%put(self%list(falling)%contact(position))
          end do
-         self%leaders%count = 0
+         self%list(leaders)%count = 0
       end if
-      if (self%falling%count > 0) self%behind = self%max_behind()
-      self%falling%count = 0
-      self%near%count = 0
+      if (self%list(falling)%count > 0) self%behind = self%max_behind()
+      self%list(falling)%count = 0
+      self%list(near)%count = 0
    end subroutine begin_steady
 
    !> Take those out of the queue that may break earlier when the motion is another.
@@ -61,10 +62,10 @@ contains
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          if (self%life(life_motion, contact) >= any_motion) cycle
          if (.not. self%ageing%falls(self%life(life_limit, contact), self%stretch)) cycle
-         call append(self%falling, contact)
+         call append(self%list(falling), contact)
          self%kept(contact) = in_falling
       end do
-      if (self%falling%count == 0) return
+      if (self%list(falling)%count == 0) return
       call self%queue%clear(self%direction, self%direction * pose%displacement)
       call scan(self, pose)
       call self%rebuild(pose%displacement)

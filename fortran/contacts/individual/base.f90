@@ -80,7 +80,8 @@ module mesoslip_contacts_individual_base
       !> Update records and sums after a schedule, without the order of breaking
       procedure, non_overridable :: detach_listed
       procedure, non_overridable :: attach_listed
-      procedure, non_overridable, private :: attach_next, draw_births, give_birth, sum_totals
+      procedure, non_overridable, private :: attach_next, draw_births, give_birth, list_lives, &
+         & sum_totals
    end type individual_contacts_type
 
    abstract interface
@@ -282,18 +283,12 @@ contains
       !> Their numbers
       integer, intent(out) :: contact(max_events)
 
-      integer :: number, event
-      real(wp) :: back_force, force
+      integer :: number
 
       call self%detached%preview(limit, number, contact, schedule%attach_time, &
          & schedule%attach_drag)
-      call self%draw_births(contact(:number))
-      back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
-      do event = 1, number
-         call self%give_birth(contact(event), back_force, direction, &
-            & schedule%attach_stiffness(event), schedule%attach_limit(event), force)
-         schedule%attach_stretch(event) = force / schedule%attach_stiffness(event)
-      end do
+      call self%list_lives(contact(:number), direction, schedule%attach_stiffness, &
+         & schedule%attach_limit, schedule%attach_stretch)
       schedule%attachments = number
       schedule%attached = 0
       schedule%delay = self%parameters%delay
@@ -316,25 +311,50 @@ contains
       !> The schedule
       type(schedule_type), intent(inout) :: schedule
 
-      real(wp) :: back_force, force
       integer :: event
 
       schedule%has_births = self%parameters%reattach .and. (allocated(self%births%delay) &
          & .or. .not. self%parameters%delay > 0.0_wp)
       if (.not. schedule%has_births) return
-      call self%draw_births(contact)
-      back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
-      do event = 1, size(contact)
-         call self%give_birth(contact(event), back_force, direction, &
-            & schedule%birth_stiffness(event), schedule%birth_limit(event), force)
-         schedule%birth_stretch(event) = force / schedule%birth_stiffness(event)
-         schedule%birth_delay(event) = self%parameters%delay
-      end do
+      call self%list_lives(contact, direction, schedule%birth_stiffness, schedule%birth_limit, &
+         & schedule%birth_stretch)
+      schedule%birth_delay(:size(contact)) = self%parameters%delay
       if (.not. allocated(self%births%delay)) return
       do event = 1, size(contact)
          schedule%birth_delay(event) = self%births%delay(contact(event))
       end do
    end subroutine list_births
+
+   !> List the next lives of some contacts.
+   subroutine list_lives(self, contact, direction, stiffness, limit, stretch)
+      class(individual_contacts_type), intent(inout) :: self
+      !> Numbers of the contacts
+      integer, intent(in) :: contact(:)
+      !> Sign of the velocity at which they attach
+      real(wp), intent(in) :: direction
+      !> Stiffness [N/m], stretch at breaking and at first [m] of each
+      real(wp), intent(inout) :: stiffness(max_events), limit(max_events), stretch(max_events)
+
+      real(wp) :: threshold(max_events), back_force, force
+      integer :: event
+
+      call self%draw_births(contact)
+      back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
+      ! Apart from what follows, where several are done at once.
+      do event = 1, size(contact)
+         threshold(event) = self%record(row_next, contact(event))
+      end do
+      do event = 1, size(contact)
+         call bear(self%parameters, threshold(event), stiffness(event), limit(event))
+         stretch(event) = back_force / stiffness(event)
+      end do
+      if (.not. allocated(self%births%force)) return
+      do event = 1, size(contact)
+         call self%give_birth(contact(event), back_force, direction, stiffness(event), &
+            & limit(event), force)
+         stretch(event) = force / stiffness(event)
+      end do
+   end subroutine list_lives
 
    !> Have the next births of some contacts drawn.
    subroutine draw_births(self, contact)

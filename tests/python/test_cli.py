@@ -125,9 +125,15 @@ def test_commands_import_what_they_need(short, tmp_path, command):
     """Large packages that each of several commands adds to those imported before."""
     output = tmp_path / "short.nc"
     command("run", short, "-o", output, "--quiet")
+    study = tmp_path / "study.toml"
+    study.write_text(
+        'base = "short.toml"\n[sweep]\nmeasures = ["mean_force"]\n'
+        '[sweep.grid]\n"run.seed" = [1, 2]\n'
+    )
     commands = [
         ["info", str(short)],
         ["slips", str(output)],
+        ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
         ["regime", str(output)],
         ["plot", str(output), "-o", str(tmp_path / "short.png")],
     ]
@@ -149,7 +155,7 @@ import dask.array, pint
 json.dump(found, stdout)
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-    assert json.loads(done.stdout) == [[], ["netCDF4", "pandas"], [], ["matplotlib"]]
+    assert json.loads(done.stdout) == [[], ["netCDF4", "pandas"], [], [], ["matplotlib"]]
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,11 @@ import numpy as np
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
-from mesoslip.theory.force_curve import ForceCurve
-from mesoslip.theory.steady_sliding import steady_sliding
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mesoslip.theory.linear_stability import LinearStability
 
 # Length of the force curve in mean breaking stretches; its steepest descent is the first one.
 CURVE_LENGTH = 3.0
@@ -27,15 +27,23 @@ def _configuration(tree: xr.DataTree) -> Config:
     return Config.from_toml(tree.attrs["configuration"]).replace("run.seed=1")
 
 
+def _steady_sliding(tree: xr.DataTree) -> LinearStability | None:
+    """Steady sliding of a run, if it can be."""
+    # It needs SciPy, which most sweeps do not.
+    from mesoslip.theory.steady_sliding import steady_sliding
+
+    return steady_sliding(_configuration(tree), MAX_WORK)
+
+
 def growth_rate(tree: xr.DataTree) -> float:
     """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
-    sliding = steady_sliding(_configuration(tree), MAX_WORK)
+    sliding = _steady_sliding(tree)
     return math.nan if sliding is None else sliding.growth_rate
 
 
 def stable_out_of_step(tree: xr.DataTree) -> float:
     """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
-    sliding = steady_sliding(_configuration(tree), MAX_WORK)
+    sliding = _steady_sliding(tree)
     try:
         return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
     except RunError:
@@ -62,6 +70,8 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 # Realizations of a configuration come one after another.
 @lru_cache(maxsize=16)
 def _critical_stiffness_ratio(config: Config) -> float:
+    from mesoslip.theory.force_curve import ForceCurve
+
     spring = config.spring_stiffness
     contacts = config.contacts
     depends_on_time = contacts.ageing is not None or contacts.thermal is not None

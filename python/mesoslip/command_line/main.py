@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import os
 import shlex
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from mesoslip.array_packages import import_xarray
 from mesoslip.command_line import (
-    array_packages,
     catalogues,
     cycle,
     example,
@@ -95,9 +97,20 @@ def _common(
     pass
 
 
+def _with_numpy_only(command: Callable[..., None]) -> Callable[..., None]:
+    """A command in whose process xarray knows arrays of NumPy only."""
+
+    @functools.wraps(command)
+    def run(*arguments: Any, **options: Any) -> None:
+        import_xarray()
+        command(*arguments, **options)
+
+    return run
+
+
 for _command in COMMANDS:
     app.command(cls=pictures.PlotCommand if _command is pictures.plot else None)(
-        _command if _command in WITHOUT_XARRAY else array_packages.numpy_only(_command)
+        _command if _command in WITHOUT_XARRAY else _with_numpy_only(_command)
     )
 
 

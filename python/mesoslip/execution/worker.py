@@ -9,6 +9,7 @@ import threading
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 
+from mesoslip.array_packages import import_xarray
 from mesoslip.execution.local import pickled_error
 
 
@@ -25,6 +26,7 @@ def main(number: int) -> None:
     connection = Connection(number)
     calls: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_receive, args=(connection, calls), daemon=True).start()
+    import_xarray()
     while True:
         try:
             function, arguments = pickle.loads(calls.get())

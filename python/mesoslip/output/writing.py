@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import netCDF4
 
+from mesoslip import array_packages
 from mesoslip.output import filling, layout
 from mesoslip.output.hdf5 import LOCK
 from mesoslip.output.layout import Entry, GroupLayout
@@ -35,7 +36,8 @@ def write(tree: xr.DataTree, path: Path) -> None:
         If it cannot be written.
     """
     encoding = {group.path: _encoding(group.to_dataset(inherit=False)) for group in tree.subtree}
-    with written_whole(path) as part, LOCK:
+    # xarray asks Dask for the locks of its scheduler, of which there is none unless it is imported.
+    with written_whole(path) as part, LOCK, array_packages.hidden():
         tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
 
 

@@ -6,9 +6,10 @@ module mesoslip_contacts_base
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_parameters, only: name_length, parameters_type
-   use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled, delay_fixed, delay_names
+   use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled, coupling_table, &
+      & delay_fixed, delay_names
    use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
       & window_type
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
@@ -320,6 +321,11 @@ contains
       call parameters%take("threshold_law", law, error)
       if (allocated(error)) return
       call make_threshold_law(self%law, law, parameters, self%back_force_ratio, error)
+      if (allocated(error)) return
+      if (self%law%has_stiffnesses .neqv. self%coupling == coupling_table) then
+         call raise(error, status_invalid, "stiffnesses of a table of thresholds are for the " &
+            & // "coupling 'table', which needs them")
+      end if
    end subroutine take_contact_parameters
 
 end module mesoslip_contacts_base

@@ -4,10 +4,12 @@
 !> Dimensionless as in mesoslip_contacts_mechanics. Thresholds are drawn by inversion of the
 !> weighted law, E[d(u); u > U]/E[d] with d(u) = u - beta for equal contacts and
 !> u^(1/2) - beta u^(-1/2) for scaled ones: one draw consumes one deviate, however wide the law.
+!> Break stretches of a table with stiffnesses are drawn in the same way: d = x_s - beta/k.
 module mesoslip_contacts_carried_law
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal
+   use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal, coupling_table
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
+   use mesoslip_contacts_stretch_cells, only: stretch_cells_type
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
@@ -33,10 +35,14 @@ module mesoslip_contacts_carried_law
       real(wp), private :: back_force = 0.0_wp
       !> Mean of the distance
       real(wp), private :: mean = 1.0_wp
+      !> Cells of a law with stiffnesses, and the mean distance of those above each, times their
+      !> probability
+      type(stretch_cells_type), private :: cells
+      real(wp), allocatable, private :: above(:)
    contains
       !> Threshold that is exceeded with a given probability
       procedure, non_overridable :: quantile
-      procedure, non_overridable, private :: slope
+      procedure, non_overridable, private :: slope, sum_cells, quantile_in_cells
    end type carried_law_type
 
 contains
@@ -55,6 +61,10 @@ contains
       allocate (self%law, source=law)
       self%coupling = coupling
       self%back_force = back_force
+      if (coupling == coupling_table) then
+         call self%sum_cells()
+         return
+      end if
       if (coupling == coupling_equal) then
          call new_partial_moments(self%moments, law, [1.0_wp, 0.0_wp])
       else
@@ -63,18 +73,71 @@ contains
       self%mean = distance_of(self, self%moments%above(0.0_wp))
    end subroutine new_carried_law
 
+   !> Sum up the distances of contacts of a law with stiffnesses.
+   subroutine sum_cells(self)
+      class(carried_law_type), intent(inout) :: self
+
+      integer :: cell
+
+      self%cells = self%law%stretch_cells()
+      associate (cells => self%cells)
+         allocate (self%above(size(cells%share) + 1), source=0.0_wp)
+         do cell = size(cells%share), 1, -1
+            self%above(cell) = self%above(cell + 1) + cells%share(cell) * (0.5_wp &
+               & * (cells%low(cell) + cells%high(cell)) - self%back_force / cells%stiffness(cell))
+         end do
+      end associate
+      self%mean = self%above(1)
+   end subroutine sum_cells
+
+   !> Break stretch that is exceeded with a given probability, of a law with stiffnesses.
+   pure function quantile_in_cells(self, probability) result(stretch)
+      class(carried_law_type), intent(in) :: self
+      !> Probability to exceed the stretch, 0 < probability < 1
+      real(wp), intent(in) :: probability
+      real(wp) :: stretch
+
+      real(wp) :: wanted, life
+      integer :: cell, last, middle
+
+      wanted = probability * self%mean
+      cell = 1
+      last = size(self%above)
+      do while (last - cell > 1)
+         middle = (cell + last) / 2
+         if (self%above(middle) >= wanted) then
+            cell = middle
+         else
+            last = middle
+         end if
+      end do
+      ! Within a cell the probability grows with the square of the distance.
+      associate (cells => self%cells)
+         associate (low => cells%low(cell), high => cells%high(cell), &
+            & attached => self%back_force / cells%stiffness(cell))
+            life = sqrt(max(0.0_wp, (high - attached)**2 - 2.0_wp * (high - low) &
+               & / cells%share(cell) * (wanted - self%above(cell + 1))))
+            stretch = min(high, max(low, attached + life))
+         end associate
+      end associate
+   end function quantile_in_cells
+
    !> Threshold that is exceeded with a given probability.
    pure function quantile(self, probability) result(threshold)
       !> The weighted law
       class(carried_law_type), intent(in) :: self
       !> Probability to exceed the threshold, 0 < probability < 1
       real(wp), intent(in) :: probability
-      !> Relative threshold
+      !> Relative threshold, or break stretch of a law with stiffnesses
       real(wp) :: threshold
 
       real(wp) :: lower, upper, least, next, wanted, excess, slope, step, moment(2)
       integer :: iteration
 
+      if (self%coupling == coupling_table) then
+         threshold = self%quantile_in_cells(probability)
+         return
+      end if
       wanted = probability * self%mean
       ! Contacts of a low threshold break soon: there are fewer of them than among newborns.
       least = self%law%quantile(probability)

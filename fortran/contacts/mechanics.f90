@@ -8,7 +8,7 @@ module mesoslip_contacts_mechanics
    implicit none
    private
 
-   public :: coupling_scaled, coupling_equal, coupling_names
+   public :: coupling_scaled, coupling_equal, coupling_table, coupling_names
    public :: delay_fixed, delay_exponential, delay_names
    public :: initial_relaxed, initial_steady, initial_uniform, initial_names
    public :: stiffness_of, breaking_distance, broken_threshold, broken_threshold_slope
@@ -17,8 +17,11 @@ module mesoslip_contacts_mechanics
    integer, parameter :: coupling_scaled = 1
    !> k_i = k, m_i = m
    integer, parameter :: coupling_equal = 2
+   !> k_i from the table of thresholds, m_i = m k_i^2/<k^2>; the functions below are not for it
+   integer, parameter :: coupling_table = 3
    !> Names of the coupling_ codes
-   character(len=*), parameter :: coupling_names(2) = [character(len=6) :: "scaled", "equal"]
+   character(len=*), parameter :: coupling_names(3) = [character(len=6) :: "scaled", "equal", &
+      & "table"]
 
    !> All contacts wait for the same delay
    integer, parameter :: delay_fixed = 1

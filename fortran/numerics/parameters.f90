@@ -26,6 +26,8 @@ module mesoslip_numerics_parameters
    contains
       !> Take the parameter of a name: a number, a word, or a word that is one of some choices
       generic :: take => take_real, take_integer, take_logical, take_word, take_choice, take_list
+      !> Whether there is a parameter of a name
+      procedure, non_overridable :: has
       !> Add a word
       procedure, non_overridable :: add_word
       !> Make sure that each parameter was taken
@@ -54,6 +56,18 @@ contains
       if (present(word)) self%word = word
       allocate (self%is_taken(size(name)), source=.false.)
    end subroutine new_parameters
+
+   !> Whether there is a parameter of a name.
+   pure function has(self, name)
+      !> The table
+      class(parameters_type), intent(in) :: self
+      !> The name
+      character(len=*), intent(in) :: name
+      !> Whether it is there
+      logical :: has
+
+      has = any(self%name == name)
+   end function has
 
    !> Add a word.
    pure subroutine add_word(self, name, word)

@@ -7,12 +7,13 @@ module mesoslip_theory_lives
    use mesoslip_numerics_parameters, only: name_length, parameters_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, &
-      & broken_threshold_slope, coupling_equal, coupling_names, initial_names, initial_relaxed, &
-      & initial_steady, initial_uniform, stiffness_of
+      & broken_threshold_slope, coupling_equal, coupling_names, coupling_table, initial_names, &
+      & initial_relaxed, initial_steady, initial_uniform, stiffness_of
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
+   use mesoslip_theory_table_lives, only: new_table_lives, table_lives_type
    implicit none
    private
 
@@ -57,6 +58,8 @@ module mesoslip_theory_lives
       real(wp) :: steady_force = 0.0_wp, mean_mass = 1.0_wp
 
       type(partial_moments_type), private :: moments
+      !> Of contacts with the stiffnesses of a table
+      type(table_lives_type), private :: table
       !> Longest and shortest lives of contacts that attach with no spread
       real(wp), private :: sharp_longest = 0.0_wp, sharp_shortest = 0.0_wp
       !> Probability that a newborn of spread stretch is not broken at once
@@ -103,36 +106,24 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: initial
 
-      real(wp) :: state(3), all(size(exponents)), stretching
+      real(wp) :: state(3), stretching
 
       allocate (self%law, source=law)
       self%coupling = coupling
       self%back_force = back_force
       self%newborn_width = newborn_width
       self%initial = initial
-      call new_partial_moments(self%moments, self%law, exponents)
       call gauss_legendre(self%point, self%weight)
-
-      self%sharp_shortest = max(0.0_wp, &
-         & breaking_distance(coupling, back_force, self%moments%min_threshold))
-      self%sharp_longest = breaking_distance(coupling, back_force, self%moments%max_threshold)
+      if (coupling == coupling_table) then
+         call take_table(self, stretching)
+      else
+         call take_moments(self, stretching)
+      end if
       self%shortest = max(0.0_wp, self%sharp_shortest - reach * newborn_width)
       self%longest = self%sharp_longest + reach * newborn_width
-      self%first_shortest = breaking_distance(coupling, 0.0_wp, self%moments%min_threshold)
-      self%first_longest = breaking_distance(coupling, 0.0_wp, self%moments%max_threshold)
       if (newborn_width > 0.0_wp) then
          state = averaged(self, sharp_state, 0.0_wp)
          self%acceptance = state(1)
-      end if
-      ! Mean life <x_s - x_b> and the area under the force of a life, <k (x_s^2 - x_b^2)/2>.
-      all = self%moments%above(0.0_wp)
-      if (coupling == coupling_equal) then
-         self%mean_life = all(one) - back_force
-         stretching = 0.5_wp * (all(two) - back_force**2)
-      else
-         self%mean_mass = all(one)
-         self%mean_life = all(half) - back_force * all(minus_half)
-         stretching = 0.5_wp * (all(three_halves) - back_force**2 * all(minus_half))
       end if
       if (newborn_width > 0.0_wp) call integrate_life(self, self%mean_life, stretching)
       self%reattach = reattach
@@ -141,6 +132,54 @@ contains
       self%newborn_force = state(3)
       if (reattach) self%steady_force = stretching / self%mean_life
    end subroutine new_contact_lives
+
+   !> Moments and scales of lives of contacts without spread.
+   subroutine take_moments(self, stretching)
+      type(contact_lives_type), intent(inout) :: self
+      !> Area under the force of a life
+      real(wp), intent(out) :: stretching
+
+      real(wp) :: all(size(exponents))
+
+      call new_partial_moments(self%moments, self%law, exponents)
+      associate (coupling => self%coupling, back_force => self%back_force, &
+         & moments => self%moments)
+         self%sharp_shortest = max(0.0_wp, &
+            & breaking_distance(coupling, back_force, moments%min_threshold))
+         self%sharp_longest = breaking_distance(coupling, back_force, moments%max_threshold)
+         self%first_shortest = breaking_distance(coupling, 0.0_wp, moments%min_threshold)
+         self%first_longest = breaking_distance(coupling, 0.0_wp, moments%max_threshold)
+         ! Mean life <x_s - x_b> and the area under the force of a life, <k (x_s^2 - x_b^2)/2>.
+         all = moments%above(0.0_wp)
+         if (coupling == coupling_equal) then
+            self%mean_life = all(one) - back_force
+            stretching = 0.5_wp * (all(two) - back_force**2)
+         else
+            self%mean_mass = all(one)
+            self%mean_life = all(half) - back_force * all(minus_half)
+            stretching = 0.5_wp * (all(three_halves) - back_force**2 * all(minus_half))
+         end if
+      end associate
+   end subroutine take_moments
+
+   !> The same of contacts with the stiffnesses of a table.
+   subroutine take_table(self, stretching)
+      type(contact_lives_type), intent(inout) :: self
+      !> Area under the force of a life
+      real(wp), intent(out) :: stretching
+
+      call new_table_lives(self%table, self%law%stretch_cells(), self%law%mean_square_stiffness, &
+         & self%back_force)
+      associate (table => self%table)
+         self%sharp_shortest = table%shortest
+         self%sharp_longest = table%longest
+         self%first_shortest = table%first_shortest
+         self%first_longest = table%first_longest
+         self%mean_mass = table%mean_mass
+         self%mean_life = table%mean_life
+         stretching = table%stretching
+      end associate
+   end subroutine take_table
 
    !> Set up the lives of contacts from named numbers.
    subroutine make_contact_lives(self, parameters, error)
@@ -254,6 +293,10 @@ contains
 
       rates = 0.0_wp
       if (life < self%sharp_shortest .or. life > self%sharp_longest) return
+      if (self%coupling == coupling_table) then
+         rates = self%table%newborn_rates(life)
+         return
+      end if
       threshold = broken_threshold(self%coupling, self%back_force, life)
       density = self%law%density(threshold) &
          & * broken_threshold_slope(self%coupling, self%back_force, life)
@@ -268,6 +311,10 @@ contains
 
       real(wp) :: moment(size(exponents))
 
+      if (self%coupling == coupling_table) then
+         state = self%table%newborn_state(life)
+         return
+      end if
       moment = self%moments%above(broken_threshold(self%coupling, self%back_force, life))
       state(1) = moment(zero)
       state(2) = moment(half)
@@ -329,6 +376,17 @@ contains
       real(wp) :: threshold, density, moment(size(exponents)), back
 
       rates = 0.0_wp
+      if (self%coupling == coupling_table) then
+         select case (self%initial)
+         case (initial_steady)
+            rates = self%table%steady_rates(max(0.0_wp, displacement))
+         case (initial_uniform)
+            rates = self%table%uniform_rates(max(0.0_wp, displacement))
+         case default
+            rates = self%table%relaxed_rates(displacement)
+         end select
+         return
+      end if
       back = 0.0_wp
       if (self%initial == initial_steady) back = self%back_force
       threshold = broken_threshold(self%coupling, back, max(0.0_wp, displacement))
@@ -362,6 +420,17 @@ contains
 
       real(wp) :: m(size(exponents)), x, b, threshold
 
+      if (self%coupling == coupling_table) then
+         select case (self%initial)
+         case (initial_steady)
+            state = self%table%steady_state(displacement)
+         case (initial_uniform)
+            state = self%table%uniform_state(displacement)
+         case default
+            state = self%table%relaxed_state(displacement)
+         end select
+         return
+      end if
       x = displacement
       b = self%back_force
       if (self%initial == initial_steady) then

@@ -2,14 +2,15 @@
 !>
 !> Thresholds of the next births are drawn some at a time, which takes less time and gives the same
 !> numbers: each draw has a key of its own. So are delays and forces at attaching, if they differ
-!> between contacts.
+!> between contacts. Where contacts have the stiffnesses of a table their break stretches are drawn in
+!> the place of thresholds.
 module mesoslip_contacts_individual_births
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
    use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_renewal, &
       & row_stiffness
-   use mesoslip_contacts_mechanics, only: coupling_scaled, delay_exponential, initial_steady, &
-      & initial_uniform
+   use mesoslip_contacts_mechanics, only: coupling_scaled, coupling_table, delay_exponential, &
+      & initial_steady, initial_uniform
    use mesoslip_contacts_threshold_laws_gaussian, only: inverse_normal
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -211,15 +212,33 @@ contains
    pure subroutine bear(parameters, threshold, stiffness, limit)
       !> What the contacts are made of
       type(contact_parameters_type), intent(in) :: parameters
-      !> Relative threshold
+      !> Relative threshold, or break stretch where stiffnesses are those of a table
       real(wp), intent(in) :: threshold
       !> Stiffness [N/m] and breaking stretch [m]
       real(wp), intent(out) :: stiffness, limit
 
       stiffness = parameters%stiffness
+      if (parameters%coupling == coupling_table) then
+         limit = threshold * (parameters%static_force / stiffness)
+         stiffness = stiffness * parameters%law%stiffness_at(threshold)
+         return
+      end if
       if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
       limit = threshold * parameters%static_force / stiffness
    end subroutine bear
+
+   !> Relative threshold of a contact that was drawn.
+   pure function threshold_of(parameters, drawn) result(threshold)
+      type(contact_parameters_type), intent(in) :: parameters
+      !> The threshold, or its break stretch where stiffnesses are those of a table
+      real(wp), intent(in) :: drawn
+      real(wp) :: threshold
+
+      threshold = drawn
+      if (parameters%coupling == coupling_table) then
+         threshold = drawn * parameters%law%stiffness_at(drawn)
+      end if
+   end function threshold_of
 
    !> Draw the forces with which contacts attach, from a normal law.
    !>
@@ -243,7 +262,7 @@ contains
       do birth = 1, size(key)
          force(birth) = force_of(second(birth))
          do attempt = force_attempt - 1_i8, 1_i8, -1_i8
-            if (abs(force(birth)) < threshold(birth)) exit
+            if (abs(force(birth)) < threshold_of(parameters, threshold(birth))) exit
             call uniform_pair(parameters%seed, parameters%realization, key(birth), &
                & renewal(birth), attempt, uniform)
             threshold(birth) = parameters%law%quantile(uniform(1))
@@ -278,7 +297,7 @@ contains
       !> Relative threshold and force
       real(wp), intent(out) :: threshold, force
 
-      real(wp) :: uniform(2), other(2), newborn
+      real(wp) :: uniform(2), other(2), newborn, max_force
       integer(i8) :: attempt, key
 
       threshold = 1.0_wp
@@ -291,9 +310,10 @@ contains
          threshold = carried%quantile(uniform(1))
          newborn = parameters%back_force_ratio &
             & + parameters%newborn_width * inverse_normal(uniform(2))
-         force = newborn + other(2) * (threshold - newborn)
-         if (abs(newborn) < threshold &
-            & .and. 2.0_wp * threshold * other(1) < threshold - newborn) return
+         max_force = threshold_of(parameters, threshold)
+         force = newborn + other(2) * (max_force - newborn)
+         if (abs(newborn) < max_force &
+            & .and. 2.0_wp * max_force * other(1) < max_force - newborn) return
       end do
    end subroutine draw_sliding
 
@@ -309,6 +329,8 @@ contains
       drag = parameters%drag
       if (drag > 0.0_wp .and. parameters%coupling == coupling_scaled) then
          drag = drag * (stiffness / parameters%stiffness)**2
+      else if (drag > 0.0_wp .and. parameters%coupling == coupling_table) then
+         drag = drag * (stiffness / parameters%stiffness)**2 / parameters%law%mean_square_stiffness
       end if
    end function drag_of
 

@@ -62,7 +62,7 @@ module mesoslip_contacts_populations_breaking
       procedure, non_overridable :: break_tried
       procedure, non_overridable :: make_room_to_try
       procedure, non_overridable, private :: list_breaking, find_thresholds, find_moments, &
-         & sum_breaks, more_lost, remove_empty
+         & find_left_of_table, sum_breaks, more_lost, remove_empty
    end type breaking_populations_type
 
 contains
@@ -115,7 +115,9 @@ contains
             force = trial%direction * self%population(row, column_force)
             distance = trial%direction * (trial%end - self%population(row, column_origin)) &
                & / self%stretch
-            if (self%ages) then
+            if (self%has_table) then
+               broken = 0.0_wp
+            else if (self%ages) then
                broken = self%ageing%configured(max(0.0_wp, distance + force), &
                   & trial%time - self%population(row, column_birth))
             else
@@ -138,14 +140,40 @@ contains
       associate (trial => self%trial)
          do one = 1, trial%count
             row = trial%population(one)
-            call self%moments(int(self%population(row, column_law)))%interpolate( &
-               & trial%broken(one), moments)
+            if (self%has_table) then
+               call self%find_left_of_table(row, trial%distance(one), moments)
+            else
+               call self%moments(int(self%population(row, column_law)))%interpolate( &
+                  & trial%broken(one), moments)
+            end if
             if (moments(number) < unresolved_part) moments = 0.0_wp
             trial%moments(:, one) = min(self%population(row, column_weight) * moments, &
                & self%left(:, row))
          end do
       end associate
    end subroutine find_moments
+
+   !> Moments of what stays pinned of contacts with the stiffnesses of a table.
+   pure subroutine find_left_of_table(self, row, distance, moments)
+      class(breaking_populations_type), intent(in) :: self
+      integer, intent(in) :: row
+      !> From the origin along the direction
+      real(wp), intent(in) :: distance
+      real(wp), intent(out) :: moments(moments_length)
+
+      real(wp) :: ahead, behind
+
+      associate (one => self%population(row, :))
+         ahead = (one(column_ahead) - one(column_origin)) / self%stretch
+         behind = (one(column_origin) - one(column_behind)) / self%stretch
+         if (self%trial%direction > 0.0_wp) then
+            ahead = max(ahead, distance)
+         else
+            behind = max(behind, distance)
+         end if
+         call self%table_lives%left(nint(one(column_law)), ahead, behind, moments)
+      end associate
+   end subroutine find_left_of_table
 
    !> Sums over what breaks: contacts, mass, work and force.
    subroutine sum_breaks(self, before, column, late, onset)

@@ -3,13 +3,14 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_ageing_law, only: ageing_law_type
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
-      & initial_steady, initial_uniform
+      & coupling_table, initial_steady, initial_uniform
    use mesoslip_contacts_partial_moments, only: new_partial_moments
    use mesoslip_contacts_populations_activated, only: activated_populations_type, joining_part
    use mesoslip_contacts_populations_activation, only: new_activation
    use mesoslip_contacts_populations_breaking, only: unresolved_part
    use mesoslip_contacts_populations_rows, only: column_level, column_weight, compliant, &
       & moments_length, new_population_rows, number, stiff
+   use mesoslip_contacts_populations_table_lives, only: new_table_lives, newborn_law
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -48,7 +49,8 @@ module mesoslip_contacts_populations_pinned
       procedure, non_overridable :: initialize
       !> Attach contacts as a population, or as one for each force
       procedure, non_overridable :: attach
-      procedure, non_overridable, private :: spread_newborns, may_join_last, add_sliding
+      procedure, non_overridable, private :: tabulate_moments, place_classes, sum_newborns, &
+         & law_of, may_join_last, add_sliding
    end type pinned_populations_type
 
 contains
@@ -62,29 +64,39 @@ contains
       !> Length of a step over the spread of the breaking stretches, positive
       real(wp), intent(in) :: resolution
 
-      real(wp) :: exponent(moments_length), one_over_stretch, all(moments_length)
-
       call new_population_rows(self, parameters)
       self%step = step_length(parameters%law%width, resolution, self%stretch)
       if (parameters%coupling == coupling_scaled) self%step = 0.5_wp * self%step
 
+      self%class_force(1) = parameters%back_force_ratio
+      self%newborn_force = parameters%back_force_ratio
+      if (parameters%newborn_width > 0.0_wp) call self%place_classes()
+      self%has_table = parameters%coupling == coupling_table
+      if (self%has_table) then
+         call new_table_lives(self%table_lives, parameters%law%stretch_cells(), &
+            & parameters%law%mean_square_stiffness, self%class_force(:self%classes))
+      else
+         call self%tabulate_moments()
+      end if
+      call self%sum_newborns()
+   end subroutine new_pinned_populations
+
+   !> Tabulate the moments of the law of thresholds.
+   subroutine tabulate_moments(self)
+      class(pinned_populations_type), intent(inout) :: self
+
+      real(wp) :: exponent(moments_length), one_over_stretch
+
       exponent = [0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp]
       one_over_stretch = -1.0_wp
-      if (parameters%coupling == coupling_scaled) then
+      if (self%parameters%coupling == coupling_scaled) then
          exponent = [0.0_wp, 0.5_wp, -0.5_wp, 1.5_wp, 1.0_wp]
          one_over_stretch = -0.5_wp
       end if
-      call new_partial_moments(self%moments(1), parameters%law, exponent)
-      call new_partial_moments(self%moments(2), parameters%law, exponent + one_over_stretch)
-      self%first_broken = parameters%law%quantile(1.0_wp - unresolved_part)
-      call self%moments(1)%interpolate(0.0_wp, all)
-      self%newborn_stiffness = parameters%stiffness * all(stiff)
-      self%newborn_energy = 0.5_wp * parameters%back_force_ratio**2 * all(compliant) &
-         & * parameters%static_force * self%stretch
-      self%newborn_force = parameters%back_force_ratio
-      self%class_force(1) = parameters%back_force_ratio
-      if (parameters%newborn_width > 0.0_wp) call self%spread_newborns()
-   end subroutine new_pinned_populations
+      call new_partial_moments(self%moments(1), self%parameters%law, exponent)
+      call new_partial_moments(self%moments(2), self%parameters%law, exponent + one_over_stretch)
+      self%first_broken = self%parameters%law%quantile(1.0_wp - unresolved_part)
+   end subroutine tabulate_moments
 
    !> Maximum displacement in which one population attaches, of equal contacts.
    pure function step_length(spread, resolution, stretch) result(length)
@@ -107,11 +119,11 @@ contains
       self%step = step_length(hypot(self%parameters%law%width, width), resolution, self%stretch)
    end subroutine activate
 
-   !> Set the forces with which contacts attach, from a normal law cut off at the thresholds.
-   subroutine spread_newborns(self)
+   !> Set the forces with which contacts attach, from a normal law.
+   subroutine place_classes(self)
       class(pinned_populations_type), intent(inout) :: self
 
-      real(wp) :: left(moments_length, max_classes), deviate
+      real(wp) :: deviate
       integer :: class
 
       self%classes = max_classes
@@ -120,19 +132,40 @@ contains
          deviate = reach * (2.0_wp * (class - 1) / (max_classes - 1) - 1.0_wp)
          self%class_force(class) = self%parameters%back_force_ratio &
             & + self%parameters%newborn_width * deviate
-         self%class_broken(class) = abs(self%class_force(class))
          self%share(class) = exp(-0.5_wp * deviate**2)
-         call self%moments(1)%interpolate(self%class_broken(class), left(:, class))
+         ! The law of a table with stiffnesses has the contacts of each force.
+         if (self%parameters%coupling /= coupling_table) then
+            self%class_broken(class) = abs(self%class_force(class))
+         end if
       end do
-      self%share = self%share / sum(self%share * left(number, :))
-      self%newborn_share = self%share * left(number, :)
-      associate (static => self%parameters%static_force, force => self%class_force)
-         self%newborn_stiffness = self%parameters%stiffness * sum(self%share * left(stiff, :))
-         self%newborn_force = sum(self%share * left(number, :) * force)
-         self%newborn_energy = 0.5_wp * sum(self%share * left(compliant, :) * force**2) * static &
+   end subroutine place_classes
+
+   !> Sum up what attaches: the law of forces is cut off at the thresholds.
+   subroutine sum_newborns(self)
+      class(pinned_populations_type), intent(inout) :: self
+
+      real(wp) :: left(moments_length, max_classes)
+      integer :: class
+
+      do class = 1, self%classes
+         if (self%has_table) then
+            call self%table_lives%left(newborn_law(class, 1.0_wp), 0.0_wp, 0.0_wp, left(:, class))
+         else
+            call self%moments(1)%interpolate(self%class_broken(class), left(:, class))
+         end if
+      end do
+      associate (static => self%parameters%static_force, share => self%share(:self%classes), &
+         & force => self%class_force(:self%classes), all => left(:, :self%classes))
+         if (self%classes > 1) then
+            share = share / sum(share * all(number, :))
+            self%newborn_share(:self%classes) = share * all(number, :)
+            self%newborn_force = sum(share * all(number, :) * force)
+         end if
+         self%newborn_stiffness = self%parameters%stiffness * sum(share * all(stiff, :))
+         self%newborn_energy = 0.5_wp * sum(share * all(compliant, :) * force**2) * static &
             & * self%stretch
       end associate
-   end subroutine spread_newborns
+   end subroutine sum_newborns
 
    !> Let thresholds change with age.
    subroutine set_ageing(self, ageing)
@@ -159,8 +192,8 @@ contains
 
       if (state == initial_steady) then
          do class = 1, self%classes
-            call self%add_sliding(self%class_force(class), self%share(class), 1, &
-               & self%class_broken(class))
+            call self%add_sliding(self%class_force(class), self%share(class), &
+               & self%law_of(class, 1.0_wp), self%class_broken(class))
          end do
       else if (state == initial_uniform) then
          call self%add_sliding(0.0_wp, 1.0_wp, 2, 0.0_wp)
@@ -191,10 +224,14 @@ contains
       !> Relative threshold at or below which none attached
       real(wp), intent(in) :: broken
 
-      real(wp) :: max_distance, cell, middle, edge, even
+      real(wp) :: max_distance, cell, middle, edge, even, least
 
       associate (coupling => self%parameters%coupling)
-         max_distance = breaking_distance(coupling, force, self%moments(1)%max_threshold)
+         if (self%has_table) then
+            max_distance = self%table_lives%longest(moments)
+         else
+            max_distance = breaking_distance(coupling, force, self%moments(1)%max_threshold)
+         end if
          edge = 0.0_wp
          even = 1.0_wp
          if (self%parameters%law%width > max_spread) even = min_even
@@ -204,8 +241,9 @@ contains
             cell = min(self%step / self%stretch * max(even, edge), max_distance - edge)
             middle = edge + 0.5_wp * cell
             edge = edge + cell
-            call self%add(-middle * self%stretch, force, share * cell, moments, &
-               & max(broken, broken_threshold(coupling, force, middle)), 0.0_wp, &
+            least = middle
+            if (.not. self%has_table) least = max(broken, broken_threshold(coupling, force, middle))
+            call self%add(-middle * self%stretch, force, share * cell, moments, least, 0.0_wp, &
                & -self%ageing%initial_age, 0.0_wp)
          end do
       end associate
@@ -242,8 +280,8 @@ contains
             call self%join_last(self%count - self%classes + class, origin, &
                & births * self%newborn_share(class), level, displacement, time, lost)
          else
-            call self%add(origin, force, self%share(class) * births, 1, self%class_broken(class), &
-               & displacement, birth, time)
+            call self%add(origin, force, self%share(class) * births, &
+               & self%law_of(class, direction), self%class_broken(class), displacement, birth, time)
             self%population(self%count, column_level) = level
          end if
       end do
@@ -252,6 +290,18 @@ contains
       self%open_origin = origin
       self%open_direction = direction
    end subroutine attach
+
+   !> Law of the contacts that attach with one of the forces.
+   pure function law_of(self, class, direction) result(law)
+      class(pinned_populations_type), intent(in) :: self
+      !> Which force, and the direction of motion
+      integer, intent(in) :: class
+      real(wp), intent(in) :: direction
+      integer :: law
+
+      law = 1
+      if (self%has_table) law = newborn_law(class, direction)
+   end function law_of
 
    !> Whether contacts that attach may join the last populations.
    pure function may_join_last(self, origin, direction) result(joins)

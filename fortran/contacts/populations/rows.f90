@@ -8,6 +8,9 @@
 !> configured threshold of the last contact that did, as contacts of one age and force break in its
 !> order. It is found anew at the end of each step, from the force and the age.
 !>
+!> Of contacts with the stiffnesses of a table no threshold tells what has broken: a population
+!> remembers how far the slider was ahead of its origin and behind it, where it breaks next.
+!>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations_rows
    use mesoslip_contacts_ageing_law, only: ageing_law_type
@@ -15,6 +18,7 @@ module mesoslip_contacts_populations_rows
    use mesoslip_contacts_mechanics, only: breaking_distance
    use mesoslip_contacts_partial_moments, only: partial_moments_type
    use mesoslip_contacts_populations_survivors, only: no_level
+   use mesoslip_contacts_populations_table_lives, only: table_lives_type
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
@@ -41,7 +45,8 @@ module mesoslip_contacts_populations_rows
    integer, parameter :: column_weight = 3
    !> Threshold below which they have broken
    integer, parameter :: column_broken = 4
-   !> 1 for the law of thresholds, 2 for that weighted by one over the breaking stretch
+   !> 1 for the law of thresholds, 2 for that weighted by one over the breaking stretch; see
+   !> mesoslip_contacts_populations_table_lives for those of a table with stiffnesses
    integer, parameter :: column_law = 5
    !> Displacements at which contacts break, forward and backward [m]
    integer, parameter :: column_ahead = 6, column_behind = 7
@@ -77,6 +82,9 @@ module mesoslip_contacts_populations_rows
       real(wp) :: first_broken = 0.0_wp
       !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
       type(partial_moments_type) :: moments(2)
+      !> Whether contacts have the stiffnesses of a table, and what is left of them
+      logical :: has_table = .false.
+      type(table_lives_type) :: table_lives
       !> Whether populations keep their order, that in which they attached; the number of those at
       !> the end that contacts may still join, where the first of them attached [m], and in which
       !> direction their forces are
@@ -104,7 +112,7 @@ module mesoslip_contacts_populations_rows
       procedure, non_overridable :: elastic_energy
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
-      procedure, non_overridable, private :: make_room
+      procedure, non_overridable, private :: make_room, next_break_of_table
    end type population_rows_type
 
 contains
@@ -128,18 +136,24 @@ contains
       !> Where it attached [m], with what force, how many contacts, with which law
       real(wp), intent(in) :: origin, force, weight
       integer, intent(in) :: law
-      !> Threshold below which they have broken before
+      !> Threshold below which they have broken before; distance up to which they have of a table
       real(wp), intent(in) :: broken
       !> Where the slider is [m]: what is due to break there does so when the slider moves on
       real(wp), intent(in) :: displacement
       !> When it attached, and when that is [s]
       real(wp), intent(in) :: birth, time
 
-      real(wp) :: moments(moments_length)
+      real(wp) :: moments(moments_length), ahead, behind
 
       call self%make_room()
       self%count = self%count + 1
-      call self%moments(law)%interpolate(broken, moments)
+      if (self%has_table) then
+         ahead = max(broken, self%table_lives%shortest(law, 1.0_wp))
+         behind = self%table_lives%shortest(law, -1.0_wp)
+         call self%table_lives%left(law, ahead, behind, moments)
+      else
+         call self%moments(law)%interpolate(broken, moments)
+      end if
       associate (row => self%count, population => self%population)
          population(row, column_origin) = origin
          population(row, column_force) = force
@@ -149,6 +163,10 @@ contains
          population(row, column_birth) = birth
          population(row, column_level) = no_level
          self%left(:, row) = weight * moments
+         if (self%has_table) then
+            population(row, column_ahead) = origin + self%stretch * ahead
+            population(row, column_behind) = origin - self%stretch * behind
+         end if
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
          population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
          self%ahead = min(self%ahead, population(row, column_ahead))
@@ -181,6 +199,10 @@ contains
 
       real(wp) :: threshold
 
+      if (self%has_table) then
+         displacement = self%next_break_of_table(row, direction)
+         return
+      end if
       threshold = self%population(row, column_broken)
       if (self%ages) threshold = self%ageing%threshold(threshold, 1.0_wp, &
          & time - self%population(row, column_birth))
@@ -188,6 +210,26 @@ contains
          & * breaking_distance(self%parameters%coupling, &
          & direction * self%population(row, column_force), threshold)
    end function next_break
+
+   !> The same of contacts with the stiffnesses of a table: none in one direction while those break
+   !> in the other that would have been the first.
+   pure function next_break_of_table(self, row, direction) result(displacement)
+      class(population_rows_type), intent(in) :: self
+      integer, intent(in) :: row
+      real(wp), intent(in) :: direction
+      real(wp) :: displacement
+
+      real(wp) :: distance
+
+      associate (one => self%population(row, :))
+         displacement = one(merge(column_ahead, column_behind, direction > 0.0_wp))
+         distance = direction * (one(column_origin) &
+            & - one(merge(column_behind, column_ahead, direction > 0.0_wp))) / self%stretch
+         distance = self%table_lives%min_opposite(nint(one(column_law)), -direction, distance)
+         displacement = direction * max(direction * displacement, &
+            & direction * one(column_origin) + distance * self%stretch)
+      end associate
+   end function next_break_of_table
 
    !> Find again where populations break next, as their thresholds have changed.
    subroutine update_thresholds(self, displacement, time)

@@ -3,10 +3,15 @@
 !> Thresholds are relative, u = f_si/f_s. A law has mean 1 before thresholds that could not attach,
 !> u <= minimum, are rejected. Rejecting is done by inversion: the law that is left is the same as
 !> that of drawing again, and one draw consumes one deviate.
+!>
+!> A table may have a stiffness for each threshold. Its law is that of the relative break stretches
+!> x_s = f_s/k, which stand for thresholds in quantiles, densities and survival: contacts break in
+!> their order, and each has one stiffness.
 module mesoslip_contacts_threshold_laws_base
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_contacts_stretch_cells, only: stretch_cells_type
    implicit none
    private
 
@@ -25,6 +30,11 @@ module mesoslip_contacts_threshold_laws_base
       logical :: is_logarithmic = .false.
       !> Number of cells in which the density is constant; 0 for a law with a formula
       integer :: cells = 0
+      !> Whether the law is that of break stretches, each with a stiffness
+      logical :: has_stiffnesses = .false.
+      !> Mean of the squared stiffnesses before rejection, that of contacts being 1: masses are
+      !> proportional to squares
+      real(wp) :: mean_square_stiffness = 1.0_wp
    contains
       !> Take what the law is made of
       procedure(take_interface), deferred :: take
@@ -37,6 +47,11 @@ module mesoslip_contacts_threshold_laws_base
       procedure :: quantiles
       !> Edges of the cells before rejection
       procedure :: cell_edges
+      !> Of a law with stiffnesses: what is left by rejection, and the stiffness of a break stretch
+      procedure :: stretch_cells
+      procedure :: stiffness_at
+      !> Reject what a force breaks of a law with stiffnesses
+      procedure :: reject_stretches
       !> Threshold that is exceeded with a given probability
       procedure, non_overridable :: quantile
       !> Probability density
@@ -106,6 +121,10 @@ contains
          call raise(error, status_invalid, "the minimum of thresholds must not be negative")
          return
       end if
+      if (self%has_stiffnesses) then
+         call self%reject_stretches(minimum, error)
+         return
+      end if
       self%minimum = minimum
       self%acceptance = self%plain_survival(minimum)
       if (.not. self%acceptance > 0.0_wp) then
@@ -146,6 +165,42 @@ contains
 
       edge = 0.0_wp
    end function cell_edges
+
+   !> Cells of break stretches, after rejection; none of a law without stiffnesses.
+   pure function stretch_cells(self) result(cells)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> The cells; their probabilities add up to 1
+      type(stretch_cells_type) :: cells
+
+      allocate (cells%low(0), cells%high(0), cells%share(0), cells%stiffness(0))
+   end function stretch_cells
+
+   !> Stiffness of contacts that break at a stretch; that of all contacts but for a law with
+   !> stiffnesses.
+   elemental function stiffness_at(self, stretch) result(stiffness)
+      !> The law
+      class(threshold_law_type), intent(in) :: self
+      !> Relative break stretch
+      real(wp), intent(in) :: stretch
+      !> Relative stiffness
+      real(wp) :: stiffness
+
+      stiffness = 1.0_wp
+   end function stiffness_at
+
+   !> Reject what a force breaks of a law with stiffnesses; others have none.
+   subroutine reject_stretches(self, force, error)
+      !> The law
+      class(threshold_law_type), intent(inout) :: self
+      !> Relative thresholds at or below are rejected
+      real(wp), intent(in) :: force
+      !> Set if nothing is left
+      type(error_type), allocatable, intent(inout) :: error
+
+      self%minimum = force
+      call raise(error, status_invalid, "the threshold law has no stiffnesses")
+   end subroutine reject_stretches
 
    !> Smallest threshold that rejection leaves.
    pure function min_threshold(self) result(threshold)

@@ -19,7 +19,7 @@ EXCLUSIVE = {
     "drive": ("velocity", "stage", "cycle", "history", "force", "force_rate"),
     "cycle": ("velocity", "frequency"),
     "history": ("file", "time", "displacement"),
-    "threshold": ("relative_width", "file", "samples", "weights"),
+    "threshold": ("relative_width", "file", "samples", "weights", "stiffnesses"),
     "slider": ("damping", "damping_ratio"),
 }
 

@@ -33,13 +33,20 @@ from mesoslip.configuration.table import (
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
-from mesoslip.configuration.threshold_laws.table import law_cells, read_samples, sample_problem
+from mesoslip.configuration.threshold_laws.table import (
+    StretchCells,
+    law_cells,
+    read_samples,
+    sample_problem,
+    stretch_cells,
+)
 from mesoslip.errors import FileError
 
 Array = NDArray[np.float64]
 
 # Choices, by the names that the kernels know.
-COUPLINGS = ("scaled", "equal")
+COUPLINGS = ("scaled", "equal", "table")
+SAMPLE_KEYS = ("samples", "weights", "stiffnesses")
 DELAY_LAWS = ("fixed", "exponential")
 AGEING_LAWS = ("relax", "log")
 INITIAL_STATES = ("relaxed", "steady", "uniform")
@@ -78,12 +85,16 @@ class Threshold(Table):
     """Standard deviation of the relative thresholds, Δf_s/f_s. That of a table follows from its
     samples; leave it out."""
     file: Text | None = None
-    """With `table`: a CSV file with a column threshold or area, and maybe a column weight; relative
-    to the configuration. Outputs keep the samples, not the name of the file."""
+    """With `table`: a CSV file with a column threshold or area, and maybe the columns weight and
+    stiffness; relative to the configuration. Outputs keep the samples, not the name of the file."""
     samples: tuple[Number, ...] | None = None
     """With `table`: samples of the thresholds, instead of a file. Only their ratios matter."""
     weights: tuple[Number, ...] | None = None
     """Weights of the samples; by default they are equal."""
+    stiffnesses: tuple[Number, ...] | None = None
+    """Stiffnesses of the samples. Only their ratios matter: their mean is that of
+    `contacts.stiffness`, which is N k. Contacts have them with `contacts.coupling` "table", which is
+    the default then."""
 
     @model_validator(mode="before")
     @classmethod
@@ -94,7 +105,7 @@ class Threshold(Table):
         if table.get("law") != "table":
             return values
         if isinstance(table.get("file"), str):
-            if table.keys() & {"samples", "weights"}:
+            if table.keys() & set(SAMPLE_KEYS):
                 raise problem("file", "give either a file, or samples and weights")
             try:
                 table.update(read_samples(Path(table.pop("file"))))
@@ -107,13 +118,13 @@ class Threshold(Table):
     @model_validator(mode="after")
     def _samples_of_a_table(self) -> Self:
         if not self.kind.is_sampled:
-            for key in ("file", "samples", "weights"):
+            for key in ("file", *SAMPLE_KEYS):
                 if getattr(self, key) is not None:
                     raise problem(key, f'is for law = "table", not "{self.law}"')
             return self
         if self.samples is None:
             raise problem("file", 'needed for law = "table", or samples')
-        key, message = sample_problem(self.samples, self.weights)
+        key, message = sample_problem(self.samples, self.weights, self.stiffnesses)
         if key:
             raise problem(key, message)
         width = law_cells(self.samples, self.weights).relative_width
@@ -136,7 +147,16 @@ class Threshold(Table):
     @property
     def kernel_parameters(self) -> Parameters:
         """Parameters of the law in the kernel."""
-        return {"threshold_law": self.law, **self.kind.kernel_parameters(self)}
+        cells = self.stretch_cells
+        of_law = self.kind.kernel_parameters(self) if cells is None else cells.kernel_parameters
+        return {"threshold_law": self.law, **of_law}
+
+    @property
+    def stretch_cells(self) -> StretchCells | None:
+        """Cells of break stretches of samples with stiffnesses; None without those."""
+        if self.samples is None or self.stiffnesses is None:
+            return None
+        return stretch_cells(self.samples, self.weights, self.stiffnesses)
 
     def probability_above(self, threshold: float) -> float:
         """Probability that a draw is above a relative threshold."""
@@ -308,7 +328,9 @@ class Contacts(Table):
     force is normal, and drawn again with the threshold where it is not below that."""
     coupling: Annotated[str, choice(COUPLINGS)] = "scaled"
     """`scaled`: stiffness is proportional to the square root of the threshold, mass to the
-    threshold; `equal`: all contacts have the same stiffness and mass."""
+    threshold; `equal`: all contacts have the same stiffness and mass; `table`, the default where
+    `contacts.threshold` has stiffnesses: they are those of the contacts, and the mass is
+    proportional to their square."""
     initial: Annotated[str, choice(INITIAL_STATES)] = "relaxed"
     """State at the start. `relaxed`: no contact bears force; `steady`: as in slow sliding;
     `uniform`: stretches uniformly distributed up to breaking."""
@@ -320,6 +342,25 @@ class Contacts(Table):
     """Change of the thresholds with age; none by default."""
     thermal: Thermal | None = None
     """Thermally activated breaking; none by default."""
+
+    @model_validator(mode="after")
+    def _stiffnesses_of_the_table(self) -> Self:
+        has_table = self.threshold.stiffnesses is not None
+        if has_table and "coupling" not in self.model_fields_set:
+            object.__setattr__(self, "coupling", "table")
+        if has_table and self.coupling != "table":
+            raise problem(
+                "coupling",
+                f'must be "table" (is "{self.coupling}"): the table of thresholds has stiffnesses; '
+                "leave the key out, or remove them from the table",
+            )
+        if self.coupling == "table" and not has_table:
+            raise problem(
+                "coupling",
+                '"table" needs contacts.threshold with stiffnesses: a file with a column '
+                'stiffness, or the key stiffnesses; otherwise "scaled" or "equal"',
+            )
+        return self
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:
@@ -376,6 +417,15 @@ class Contacts(Table):
     def contact_drag(self) -> float:
         """m η [N s/m]."""
         return self.contact_mass * self.drag_rate
+
+    @property
+    def stretch_width(self) -> float:
+        """Standard deviation of the break stretches, in f_s/k; to first order in that of the
+        thresholds without a table of stiffnesses."""
+        cells = self.threshold.stretch_cells
+        if cells is not None:
+            return cells.width
+        return self.threshold.relative_width * (0.5 if self.coupling == "scaled" else 1.0)
 
     @property
     def break_stretch(self) -> float:

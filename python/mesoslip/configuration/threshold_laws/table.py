@@ -15,6 +15,7 @@ from mesoslip.configuration.columns import HEADER, Cells, FoundColumn, cells_of,
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.threshold_laws.base import Keys, ThresholdLawKind
+from mesoslip.configuration.units import to_si
 from mesoslip.errors import FileError
 
 # Names of the columns; a threshold is proportional to the area of its contact.
@@ -23,7 +24,11 @@ WEIGHT_COLUMN = "weight"
 STIFFNESS_COLUMN = "stiffness"
 # Maximum number of samples, and of the cells of a law in the kernels.
 MAX_SAMPLES, MAX_CELLS = 100_000, 4000
-WANTED = "the header must name a column threshold or area, and may name a column weight"
+# Relative difference of break stretches that counts as none.
+SAME_STRETCH = 1e-9
+WANTED = (
+    "the header must name a column threshold or area, and may name the columns weight and stiffness"
+)
 
 
 class LawCells(NamedTuple):
@@ -42,7 +47,42 @@ class LawCells(NamedTuple):
         return math.sqrt(max(0.0, square - 1))
 
 
-def sample_problem(samples: Sequence[float], weights: Sequence[float] | None) -> tuple[str, str]:
+class StretchCells(NamedTuple):
+    """Cells of break stretches f_s/k, in each of which density and stiffness are constant.
+
+    The mean stiffness is 1, and so is the mean threshold, the product of stretch and stiffness.
+    """
+
+    edges: NDArray[np.float64]
+    """Edges, ascending, shape (cells + 1)."""
+    weights: NDArray[np.float64]
+    """Probability of each cell, shape (cells)."""
+    stiffnesses: NDArray[np.float64]
+    """Stiffness in each cell, shape (cells)."""
+
+    @property
+    def width(self) -> float:
+        """Standard deviation of the break stretches, in units of mean threshold over mean k."""
+        low, high = self.edges[:-1], self.edges[1:]
+        mean = float(np.sum(self.weights * (low + high)) / 2)
+        square = float(np.sum(self.weights * (low**2 + low * high + high**2)) / 3)
+        return math.sqrt(max(0.0, square - mean**2))
+
+    @property
+    def kernel_parameters(self) -> Parameters:
+        """Parameters of the law in the kernel."""
+        return {
+            "threshold_edges": tuple(self.edges.tolist()),
+            "threshold_weights": tuple(self.weights.tolist()),
+            "threshold_stiffnesses": tuple(self.stiffnesses.tolist()),
+        }
+
+
+def sample_problem(
+    samples: Sequence[float],
+    weights: Sequence[float] | None,
+    stiffnesses: Sequence[float] | None = None,
+) -> tuple[str, str]:
     """The key and the error of samples; empty if they make a law.
 
     Parameters
@@ -51,6 +91,8 @@ def sample_problem(samples: Sequence[float], weights: Sequence[float] | None) ->
         Thresholds, in any unit.
     weights
         Weights of the samples; None for equal ones.
+    stiffnesses
+        Stiffnesses of the samples, in any unit; None if they are not known.
     """
     if len(samples) > MAX_SAMPLES:
         return "samples", f"must have at most {MAX_SAMPLES} values (has {len(samples)})"
@@ -90,17 +132,67 @@ def law_cells(samples: tuple[float, ...], weights: tuple[float, ...] | None) -> 
     weight = np.bincount(place, shares).astype(np.float64)
     value, weight = value[weight > 0], weight[weight > 0]
     if len(value) > MAX_CELLS:
-        middle_share = (np.cumsum(weight) - weight / 2) / np.sum(weight)
-        group = np.unique((MAX_CELLS * middle_share).astype(int), return_inverse=True)[1]
+        group = _groups(weight)
         total = np.bincount(group, weight)
         value = (np.bincount(group, weight * value) / total).astype(np.float64)
         weight = total.astype(np.float64)
-    middle = value[:-1] + np.diff(value) / 2
-    first = max(0.0, 2 * value[0] - middle[0])
-    edges = np.concatenate([[first], middle, [2 * value[-1] - middle[-1]]])
+    edges = _edges(value)
     weight = weight / np.sum(weight)
     mean = np.sum(weight * (edges[1:] + edges[:-1]) / 2)
     return LawCells(edges / mean, weight)
+
+
+def _edges(value: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges of cells around ascending values."""
+    middle = value[:-1] + np.diff(value) / 2
+    first = max(0.0, 2 * value[0] - middle[0])
+    return np.concatenate([[first], middle, [2 * value[-1] - middle[-1]]])
+
+
+def _groups(weight: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Number of the group of each sample, such that there are no more than `MAX_CELLS`."""
+    middle_share = (np.cumsum(weight) - weight / 2) / np.sum(weight)
+    return np.unique((MAX_CELLS * middle_share).astype(int), return_inverse=True)[1]
+
+
+@lru_cache(maxsize=8)
+def stretch_cells(
+    samples: tuple[float, ...], weights: tuple[float, ...] | None, stiffnesses: tuple[float, ...]
+) -> StretchCells:
+    """The law of samples with stiffnesses: each has a cell of break stretches around it.
+
+    The cells are those of `law_cells`, of thresholds over stiffnesses, in whose order contacts
+    break. Samples of one break stretch and several stiffnesses share a cell: each has a part of
+    it. Of neighbours that are combined the means of stretch and stiffness are kept.
+    """
+    threshold, stiffness = np.array(samples), np.array(stiffnesses)
+    weight = np.ones(len(samples)) if weights is None else np.array(weights)
+    used = weight > 0
+    threshold, stiffness, weight = threshold[used], stiffness[used], weight[used]
+    stretch = threshold / stiffness
+    order = np.lexsort((stiffness, stretch))
+    stretch, stiffness, weight = stretch[order], stiffness[order], weight[order]
+    if len(stretch) > MAX_CELLS:
+        is_new = (np.diff(stretch) > SAME_STRETCH * stretch[1:]) | (np.diff(stiffness) != 0)
+        place = np.concatenate([[0], np.cumsum(is_new)])
+        group = _groups(np.bincount(place, weight))[place]
+        total = np.bincount(group, weight)
+        stretch = np.bincount(group, weight * stretch) / total
+        stiffness = np.bincount(group, weight * stiffness) / total
+        weight = total
+    is_new = np.diff(stretch) > SAME_STRETCH * stretch[1:]
+    place = np.concatenate([[0], np.cumsum(is_new)])
+    first = np.concatenate([[0], np.flatnonzero(is_new) + 1])
+    edges = _edges(stretch[first])
+    # Samples of one stretch have parts of its cell.
+    before = np.cumsum(weight) - weight
+    part = (before - before[first][place]) / np.bincount(place, weight)[place]
+    low = edges[place] + part * np.diff(edges)[place]
+    edges = np.concatenate([low, edges[-1:]])
+    weight = weight / np.sum(weight)
+    stiffness = stiffness / np.sum(weight * stiffness)
+    mean = np.sum(weight * stiffness * (edges[1:] + edges[:-1]) / 2)
+    return StretchCells(edges / mean, weight, stiffness)
 
 
 class TableLaw(ThresholdLawKind):
@@ -119,13 +211,14 @@ TABLE = TableLaw("table", jumps="lower", is_sampled=True)
 
 
 def read_samples(path: Path) -> dict[str, list[float]]:
-    """Samples and weights of a file.
+    """Samples of a file, with weights and stiffnesses where it has them.
 
     Parameters
     ----------
     path
         A table, see `mesoslip.configuration.columns`. Its header names a column ``threshold`` or
-        ``area``, in any unit, and maybe a column ``weight``; others are not read.
+        ``area``, in any unit, and maybe the columns ``weight`` and ``stiffness``; others are not
+        read.
 
     Raises
     ------
@@ -139,35 +232,31 @@ def read_samples(path: Path) -> dict[str, list[float]]:
         raise FileError(f"{path}: there is no column threshold or area; {WANTED}")
     if len(found) > 1:
         raise FileError(f"{path}: has a column threshold and a column area; remove one of them")
-    if STIFFNESS_COLUMN in columns:
-        raise FileError(
-            f"{path}: has a column stiffness, which is not used: contacts.coupling gives the "
-            'stiffness ("scaled": as the root of the threshold; "equal"); remove the column'
-        )
     if len(cells.lines) < 2:
         raise FileError(f"{path}: must have at least two rows of numbers (has {len(cells.lines)})")
     wanted = {
-        name: FoundColumn(columns[name], 1.0) for name in (*found, WEIGHT_COLUMN) if name in columns
+        name: FoundColumn(columns[name], 1.0)
+        for name in (*found, WEIGHT_COLUMN, STIFFNESS_COLUMN)
+        if name in columns
     }
     values = values_of(cells, cells.first, wanted)
-    for (line, _), one in zip(cells.lines, values[found[0]], strict=True):
-        if not one > 0:
-            raise FileError(f"{path}: line {line}: the {found[0]} must be positive (is {one:g})")
+    for name in (found[0], STIFFNESS_COLUMN):
+        for (line, _), one in zip(cells.lines, values.get(name, []), strict=False):
+            if not one > 0:
+                raise FileError(f"{path}: line {line}: the {name} must be positive (is {one:g})")
     for (line, _), one in zip(cells.lines, values.get(WEIGHT_COLUMN, []), strict=False):
         if one < 0:
             raise FileError(f"{path}: line {line}: the weight must not be negative (is {one:g})")
-    key, message = sample_problem(values[found[0]], values.get(WEIGHT_COLUMN))
+    keys = {"samples": found[0], "weights": WEIGHT_COLUMN, "stiffnesses": STIFFNESS_COLUMN}
+    read = {key: values[column] for key, column in keys.items() if column in values}
+    key, message = sample_problem(read["samples"], read.get("weights"), read.get("stiffnesses"))
     if key:
-        column = WEIGHT_COLUMN if key == "weights" else found[0]
-        raise FileError(f"{path}: the column {column} {message}")
-    read = {"samples": values[found[0]]}
-    if WEIGHT_COLUMN in values:
-        read["weights"] = values[WEIGHT_COLUMN]
+        raise FileError(f"{path}: the column {keys[key]} {message}")
     return read
 
 
 def _columns(cells: Cells) -> dict[str, int]:
-    """Places of the columns by name; units do not matter, as only ratios of thresholds do."""
+    """Places of the columns by name; sizes of units do not matter, as only ratios do."""
     if not cells.has_header:
         raise FileError(f"{cells.source}: there is no header; {WANTED}")
     columns: dict[str, int] = {}
@@ -178,4 +267,10 @@ def _columns(cells: Cells) -> dict[str, int]:
             raise FileError(f"{cells.source}: has two columns {name}")
         if name in {*SAMPLE_COLUMNS, WEIGHT_COLUMN, STIFFNESS_COLUMN}:
             columns[name] = place
+        unit = "" if match is None else (match["unit"] or "").strip()
+        if name == STIFFNESS_COLUMN and unit not in {"", "1", "-"}:
+            try:
+                to_si(f"1 {unit}", "N/m", "5 N/m")
+            except ValueError as error:
+                raise FileError(f"{cells.source}: the column stiffness: {error}") from None
     return columns

@@ -1,0 +1,213 @@
+!> Lives of contacts with the stiffnesses of a table, under a slider that moves forward.
+!>
+!> Dimensionless as in mesoslip_contacts_mechanics, for one contact. A newborn of stiffness k and
+!> life l bears k d + beta after the displacement d, and breaks at d = l.
+module mesoslip_theory_table_lives
+   use mesoslip_contacts_life_moments, only: life_moments_type, new_life_moments
+   use mesoslip_contacts_stretch_cells, only: stretch_cells_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: table_lives_type, new_table_lives
+
+   !> Moments E[k^a l^b], and their places
+   integer, parameter :: orders = 9
+   integer, parameter :: stiffness_power(orders) = [0, 1, 0, 1, 0, 1, 2, 0, 1]
+   integer, parameter :: life_power(orders) = [0, 0, 1, 1, 2, 2, 0, -1, -1]
+   integer, parameter :: one = 1, k = 2, l = 3, k_l = 4, k_l_squared = 6, k_squared = 7, &
+      & inverse_l = 8, k_over_l = 9
+
+   !> The contacts.
+   type :: table_lives_type
+      !> Mean life, area under the force of a life and mean mass of newborns; shortest and longest
+      !> lives of newborns and of contacts that attached with no force
+      real(wp) :: mean_life = 0.0_wp, stretching = 0.0_wp, mean_mass = 1.0_wp
+      real(wp) :: shortest = 0.0_wp, longest = 0.0_wp
+      real(wp) :: first_shortest = 0.0_wp, first_longest = 0.0_wp
+      !> Force at attaching, f_b/f_s
+      real(wp), private :: back_force = 0.0_wp
+      !> Moments of newborns, and of contacts that attached with no force
+      type(life_moments_type), private :: newborn, unforced
+   contains
+      !> Breaks of newborns over displacement, the force and the stiffness lost by them
+      procedure, non_overridable :: newborn_rates
+      !> Part of newborns that is pinned, its stiffness and force
+      procedure, non_overridable :: newborn_state
+      !> The same of a first generation that was relaxed, as in slow sliding, or of uniform stretches
+      procedure, non_overridable :: relaxed_rates
+      procedure, non_overridable :: relaxed_state
+      procedure, non_overridable :: steady_rates
+      procedure, non_overridable :: steady_state
+      procedure, non_overridable :: uniform_rates
+      procedure, non_overridable :: uniform_state
+   end type table_lives_type
+
+contains
+
+   !> Set up the lives of the contacts of a table.
+   subroutine new_table_lives(self, cells, mean_square, back_force)
+      !> The lives
+      type(table_lives_type), intent(out) :: self
+      !> The table, without contacts that the back force breaks
+      type(stretch_cells_type), intent(in) :: cells
+      !> Mean of the squared stiffness, to which the mean mass belongs
+      real(wp), intent(in) :: mean_square
+      !> Force at attaching, f_b/f_s
+      real(wp), intent(in) :: back_force
+
+      real(wp) :: all(orders)
+
+      self%back_force = back_force
+      ! The shortest life may be 0, over which nobody asks for averages.
+      call new_life_moments(self%newborn, cells, back_force, stiffness_power(:k_squared), &
+         & life_power(:k_squared))
+      call new_life_moments(self%unforced, cells, 0.0_wp, stiffness_power, life_power)
+      self%shortest = self%newborn%shortest
+      self%longest = self%newborn%longest
+      self%first_shortest = self%unforced%shortest
+      self%first_longest = self%unforced%longest
+      call self%newborn%above(0.0_wp, all(:k_squared))
+      self%mean_life = all(l)
+      ! <k (x_s^2 - x_b^2)/2> with x_s = l + x_b.
+      self%stretching = 0.5_wp * all(k_l_squared) + back_force * all(l)
+      self%mean_mass = all(k_squared) / mean_square
+   end subroutine new_table_lives
+
+   !> Density of breaks, of the force released by them, and of the stiffness lost.
+   pure function break_rates(moments, force, life) result(rates)
+      type(life_moments_type), intent(in) :: moments
+      !> Force at attaching, and displacement since
+      real(wp), intent(in) :: force, life
+      real(wp) :: rates(3)
+
+      ! By powers of the stiffness from -1 on.
+      associate (density => moments%density_at(life))
+         rates = [density(2), density(3) * life + density(2) * force, density(3)]
+      end associate
+   end function break_rates
+
+   !> Breaks of newborns over displacement.
+   pure function newborn_rates(self, life) result(rates)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the attaching
+      real(wp), intent(in) :: life
+      !> Density of breaks, of the force released by them, and of the stiffness lost
+      real(wp) :: rates(3)
+
+      rates = break_rates(self%newborn, self%back_force, life)
+   end function newborn_rates
+
+   !> What is left of newborns.
+   pure function newborn_state(self, life) result(state)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the attaching
+      real(wp), intent(in) :: life
+      !> Part that is pinned, its stiffness and force
+      real(wp) :: state(3)
+
+      real(wp) :: moment(k_squared)
+
+      call self%newborn%above(life, moment)
+      state = [moment(one), moment(k), self%back_force * moment(one) + life * moment(k)]
+   end function newborn_state
+
+   !> Breaks of contacts that were relaxed.
+   pure function relaxed_rates(self, displacement) result(rates)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the start
+      real(wp), intent(in) :: displacement
+      !> As those of newborns
+      real(wp) :: rates(3)
+
+      rates = break_rates(self%unforced, 0.0_wp, displacement)
+   end function relaxed_rates
+
+   !> What is left of contacts that were relaxed.
+   pure function relaxed_state(self, displacement) result(state)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the start
+      real(wp), intent(in) :: displacement
+      !> As that of newborns
+      real(wp) :: state(3)
+
+      real(wp) :: moment(orders)
+
+      call self%unforced%above(displacement, moment)
+      state = [moment(one), moment(k), displacement * moment(k)]
+   end function relaxed_state
+
+   !> Breaks of contacts of slow sliding: as many for each displacement since the attaching.
+   pure function steady_rates(self, displacement) result(rates)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the start
+      real(wp), intent(in) :: displacement
+      !> As those of newborns
+      real(wp) :: rates(3)
+
+      real(wp) :: moment(k_squared)
+
+      call self%newborn%above(displacement, moment)
+      rates = [moment(one), moment(k_l) + self%back_force * moment(one), moment(k)] &
+         & / self%mean_life
+   end function steady_rates
+
+   !> What is left of contacts of slow sliding: of a life l the part 1 - x/l.
+   pure function steady_state(self, displacement) result(state)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the start
+      real(wp), intent(in) :: displacement
+      !> As that of newborns
+      real(wp) :: state(3)
+
+      real(wp) :: m(k_squared)
+
+      call self%newborn%above(displacement, m)
+      associate (x => displacement)
+         state(1) = m(l) - x * m(one)
+         state(2) = m(k_l) - x * m(k)
+         state(3) = 0.5_wp * (m(k_l_squared) - x**2 * m(k)) + self%back_force * state(1)
+      end associate
+      state = state / self%mean_life
+   end function steady_state
+
+   !> Breaks of contacts of uniform stretches.
+   pure function uniform_rates(self, displacement) result(rates)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the start
+      real(wp), intent(in) :: displacement
+      !> As those of newborns
+      real(wp) :: rates(3)
+
+      real(wp) :: moment(orders)
+
+      call self%unforced%above(displacement, moment)
+      rates = [moment(inverse_l), moment(k), moment(k_over_l)]
+   end function uniform_rates
+
+   !> What is left of contacts of uniform stretches: the part 1 - x/x_s, uniform above x.
+   pure function uniform_state(self, displacement) result(state)
+      !> The contacts
+      class(table_lives_type), intent(in) :: self
+      !> Displacement since the start
+      real(wp), intent(in) :: displacement
+      !> As that of newborns
+      real(wp) :: state(3)
+
+      real(wp) :: m(orders)
+
+      call self%unforced%above(displacement, m)
+      associate (x => displacement)
+         state = [m(one) - x * m(inverse_l), m(k) - x * m(k_over_l), &
+            & 0.5_wp * (m(k_l) - x**2 * m(k_over_l))]
+      end associate
+   end function uniform_state
+
+end module mesoslip_theory_table_lives

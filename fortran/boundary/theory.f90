@@ -77,6 +77,7 @@ subroutine force_curve(length, names, values, words, start, width, panels, point
    call new_parameters(parameters, names, values, words)
    call make_contact_lives(lives, parameters, error)
    if (.not. allocated(error)) then
+      call lives%spread_table(width)
       call solve_renewal(lives, start, width, panels, points, renewal)
       point = renewal%point
       breaks = renewal%breaks

@@ -24,6 +24,8 @@ module mesoslip_contacts_life_moments
    type :: life_moments_type
       !> Shortest and longest life
       real(wp) :: shortest = 0.0_wp, longest = 0.0_wp
+      !> Number of moments
+      integer :: orders = 0
       !> Exponents of the stiffness and of the life, shape (orders)
       integer, allocatable, private :: stiffness_power(:), life_power(:)
       !> Lives at which cells start or end, shape (pieces + 1), densities between them, shape
@@ -54,6 +56,7 @@ contains
       real(wp) :: total, scale
       integer :: piece
 
+      self%orders = size(stiffness_power)
       self%stiffness_power = stiffness_power
       self%life_power = life_power
       call self%find_pieces(cells, force)

@@ -74,6 +74,8 @@ module mesoslip_theory_lives
       procedure, non_overridable :: first_rates
       !> What is left of the first generation
       procedure, non_overridable :: first_state
+      !> Spread the lives of contacts of a table over a window
+      procedure, non_overridable :: spread_table
       !> The scales by name
       procedure, non_overridable :: scales
    end type contact_lives_type
@@ -180,6 +182,16 @@ contains
          stretching = table%stretching
       end associate
    end subroutine take_table
+
+   !> Spread the lives of contacts with the stiffnesses of a table over a window.
+   subroutine spread_table(self, window)
+      !> The contacts
+      class(contact_lives_type), intent(inout) :: self
+      !> Length of the window
+      real(wp), intent(in) :: window
+
+      call self%table%spread(window)
+   end subroutine spread_table
 
    !> Set up the lives of contacts from named numbers.
    subroutine make_contact_lives(self, parameters, error)
@@ -292,11 +304,11 @@ contains
       real(wp) :: threshold, density
 
       rates = 0.0_wp
-      if (life < self%sharp_shortest .or. life > self%sharp_longest) return
       if (self%coupling == coupling_table) then
-         rates = self%table%newborn_rates(life)
+         if (life > 0.0_wp) rates = self%table%newborn_rates(life)
          return
       end if
+      if (life < self%sharp_shortest .or. life > self%sharp_longest) return
       threshold = broken_threshold(self%coupling, self%back_force, life)
       density = self%law%density(threshold) &
          & * broken_threshold_slope(self%coupling, self%back_force, life)

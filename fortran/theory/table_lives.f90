@@ -2,6 +2,10 @@
 !>
 !> Dimensionless as in mesoslip_contacts_mechanics, for one contact. A newborn of stiffness k and
 !> life l bears k d + beta after the displacement d, and breaks at d = l.
+!>
+!> The density of breaks of a table is as rough as the gaps between its samples. To solve an integral
+!> equation each life is spread evenly over a window: rates and states are those of such contacts to
+!> rounding, so that none is lost, and differ from those of the table by the window squared.
 module mesoslip_theory_table_lives
    use mesoslip_contacts_life_moments, only: life_moments_type, new_life_moments
    use mesoslip_contacts_stretch_cells, only: stretch_cells_type
@@ -27,9 +31,13 @@ module mesoslip_theory_table_lives
       real(wp) :: first_shortest = 0.0_wp, first_longest = 0.0_wp
       !> Force at attaching, f_b/f_s
       real(wp), private :: back_force = 0.0_wp
+      !> Window over which a life is spread; 0 for none
+      real(wp), private :: window = 0.0_wp
       !> Moments of newborns, and of contacts that attached with no force
       type(life_moments_type), private :: newborn, unforced
    contains
+      !> Spread lives over a window
+      procedure, non_overridable :: spread
       !> Breaks of newborns over displacement, the force and the stiffness lost by them
       procedure, non_overridable :: newborn_rates
       !> Part of newborns that is pinned, its stiffness and force
@@ -74,18 +82,50 @@ contains
       self%mean_mass = all(k_squared) / mean_square
    end subroutine new_table_lives
 
-   !> Density of breaks, of the force released by them, and of the stiffness lost.
-   pure function break_rates(moments, force, life) result(rates)
-      type(life_moments_type), intent(in) :: moments
-      !> Force at attaching, and displacement since
-      real(wp), intent(in) :: force, life
-      real(wp) :: rates(3)
+   !> Spread lives over a window.
+   pure subroutine spread(self, window)
+      !> The lives
+      class(table_lives_type), intent(inout) :: self
+      !> Length of the window; that around a life does not begin before 0
+      real(wp), intent(in) :: window
 
-      ! By powers of the stiffness from -1 on.
-      associate (density => moments%density_at(life))
-         rates = [density(2), density(3) * life + density(2) * force, density(3)]
-      end associate
-   end function break_rates
+      self%window = window
+   end subroutine spread
+
+   !> What is left of contacts that attached together, and their breaks over displacement.
+   pure subroutine follow(moments, force, window, displacement, state, rates)
+      type(life_moments_type), intent(in) :: moments
+      !> Force at attaching, window of a life, displacement since
+      real(wp), intent(in) :: force, window, displacement
+      !> Part that is pinned, its stiffness and force; density of breaks, of the force released by
+      !> them, and of the stiffness lost
+      real(wp), intent(out) :: state(3), rates(3)
+
+      real(wp) :: half, low(moments%orders), high(moments%orders), pinned(2), broken(2)
+
+      half = 0.5_wp * min(window, 2.0_wp * displacement)
+      call moments%above(displacement - half, low)
+      if (half > 0.0_wp) then
+         call moments%above(displacement + half, high)
+         ! Means over the window of what is left, from integrals E[(l - x) k^a; l > x].
+         pinned = ((low([l, k_l]) - (displacement - half) * low([one, k])) &
+            & - (high([l, k_l]) - (displacement + half) * high([one, k]))) / (2.0_wp * half)
+         if (window < 2.0_wp * displacement) then
+            broken = (low([one, k]) - high([one, k])) / (2.0_wp * half)
+         else
+            ! The window grows with the displacement.
+            broken = (pinned - high([one, k])) / half
+         end if
+      else
+         pinned = low([one, k])
+         ! By powers of the stiffness from -1 on.
+         associate (density => moments%density_at(displacement))
+            broken = density(2:3)
+         end associate
+      end if
+      state = [pinned, force * pinned(1) + displacement * pinned(2)]
+      rates = [broken(1), force * broken(1) + displacement * broken(2), broken(2)]
+   end subroutine follow
 
    !> Breaks of newborns over displacement.
    pure function newborn_rates(self, life) result(rates)
@@ -96,7 +136,9 @@ contains
       !> Density of breaks, of the force released by them, and of the stiffness lost
       real(wp) :: rates(3)
 
-      rates = break_rates(self%newborn, self%back_force, life)
+      real(wp) :: state(3)
+
+      call follow(self%newborn, self%back_force, self%window, life, state, rates)
    end function newborn_rates
 
    !> What is left of newborns.
@@ -108,10 +150,9 @@ contains
       !> Part that is pinned, its stiffness and force
       real(wp) :: state(3)
 
-      real(wp) :: moment(k_squared)
+      real(wp) :: rates(3)
 
-      call self%newborn%above(life, moment)
-      state = [moment(one), moment(k), self%back_force * moment(one) + life * moment(k)]
+      call follow(self%newborn, self%back_force, self%window, life, state, rates)
    end function newborn_state
 
    !> Breaks of contacts that were relaxed.
@@ -123,7 +164,9 @@ contains
       !> As those of newborns
       real(wp) :: rates(3)
 
-      rates = break_rates(self%unforced, 0.0_wp, displacement)
+      real(wp) :: state(3)
+
+      call follow(self%unforced, 0.0_wp, self%window, displacement, state, rates)
    end function relaxed_rates
 
    !> What is left of contacts that were relaxed.
@@ -135,10 +178,9 @@ contains
       !> As that of newborns
       real(wp) :: state(3)
 
-      real(wp) :: moment(orders)
+      real(wp) :: rates(3)
 
-      call self%unforced%above(displacement, moment)
-      state = [moment(one), moment(k), displacement * moment(k)]
+      call follow(self%unforced, 0.0_wp, self%window, displacement, state, rates)
    end function relaxed_state
 
    !> Breaks of contacts of slow sliding: as many for each displacement since the attaching.

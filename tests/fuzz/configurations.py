@@ -28,6 +28,8 @@ MOST_IDLE = 30.0
 EXPONENTIAL = 0.3
 NEWBORN = 0.2
 TABLE = 0.2
+# Part of tables with stiffnesses.
+STIFFNESSES = 0.5
 # Largest force on a slider without a spring, over the static force.
 MOST_FORCE = 1.3
 
@@ -89,6 +91,7 @@ def draw(random: Random) -> Tables:
     tables["output"] = _output(random, tables, duration)
     if not interaction.get("strength") and random.random() < THERMAL:
         contacts["coupling"] = "equal"
+        contacts["threshold"].pop("stiffnesses", None)
         contacts["thermal"] = _thermal(random, contacts, speed / stretch, duration)
         if engine == "me" and contacts["initial"] == "uniform":
             contacts["initial"] = random.choice(["relaxed", "steady"])
@@ -164,6 +167,8 @@ def _contacts(random: Random, engine: str) -> tuple[Tables, Tables]:
         "back_force_ratio": random.choice([0.0, 0.1, round(random.uniform(0, 0.95), 2)]),
         "threshold": _threshold(random, engine),
     }
+    if "stiffnesses" in contacts["threshold"]:
+        contacts["coupling"] = "table"
     contacts["stiffness"] = contacts["static_force"] / decades(random, -10, -4)
     if random.random() < 0.1:
         contacts["reattach"] = False
@@ -180,6 +185,9 @@ def _threshold(random: Random, engine: str) -> Tables:
         if random.random() < 0.5:
             rest = [random.choice([0.0, 1.0, 3.5]) for _ in samples[2:]]
             threshold["weights"] = [1.0, 2.0, *rest]
+        if random.random() < STIFFNESSES:
+            # Neither of the first two rows, which have weights, is like the other.
+            threshold["stiffnesses"] = [decades(random, -0.7, 0.7) for _ in samples]
         return threshold
     law = random.choice(list(MAX_WIDTH))
     width = min(decades(random, -4, 0.3), MAX_WIDTH[law])

@@ -63,6 +63,15 @@ COARSE = ME | {"run__resolution": 0.5}
 RANDOM = {"contacts__delay_law": "exponential"}
 NEWBORN = {"contacts__newborn_width": 0.05}
 TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
+# Rows in another order by break stretch than by threshold, with back force and newborn width.
+STIFFNESSES = {
+    "contacts__threshold": {
+        "law": "table",
+        "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0],
+        "stiffnesses": [3.0, 2.0, 4.0, 2.5, 5.0, 1.5],
+    },
+    "contacts__coupling": "table",
+}
 
 KINDS: dict[str, dict[str, Any]] = {
     "rigid": {},
@@ -75,6 +84,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, newborn width, me": NEWBORN | COARSE,
     "rigid, table": TABLE,
     "rigid, table, me": TABLE | ME,
+    "rigid, stiffnesses": STIFFNESSES | NEWBORN,
+    "rigid, stiffnesses, me": STIFFNESSES | ME,
     "rigid, lattice": SNAPSHOTS,
     "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
     "rigid, me": ME,

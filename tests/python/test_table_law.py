@@ -170,7 +170,6 @@ def test_a_file_and_what_an_output_keeps(tmp_path):
         ("1\n2\n", "there is no header"),
         ("threshold,area\n1,1\n2,2\n", "remove one of them"),
         ("threshold,threshold\n1,1\n2,2\n", "two columns threshold"),
-        ("threshold,stiffness\n1,1\n2,2\n", "contacts.coupling gives the stiffness"),
         ("threshold\n1\nx\n", "line 3"),
         ("", "is empty"),
     ],

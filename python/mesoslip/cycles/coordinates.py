@@ -88,10 +88,10 @@ class Coordinates:
         self._mass, self._spring = mass_of(config), config.spring_stiffness
         self._count = contacts.count
         self._stretch = contacts.static_force / contacts.stiffness
-        spread = min(contacts.threshold.relative_width, MAX_SPREAD)
         power = 0.5 if contacts.coupling == "scaled" else 1.0
-        high = MAX_STRETCH + SPREADS * contacts.threshold.relative_width * power
-        cells = (high - MIN_STRETCH) / (CELL_PART * spread * power)
+        spread = min(contacts.stretch_width, power * MAX_SPREAD)
+        high = MAX_STRETCH + SPREADS * contacts.stretch_width
+        cells = (high - MIN_STRETCH) / (CELL_PART * spread)
         self._pinned = Hats(MIN_STRETCH, high, min(MAX_CELLS, math.ceil(cells)))
         self._detached = Hats(0.0, 1.0, DELAY_CELLS)
         self._velocity = math.sqrt(contacts.stiffness / self._mass) * self._stretch

@@ -34,6 +34,7 @@ INITIAL = {
 COUPLINGS = {
     "scaled": "the stiffness of a contact is proportional to the square root of its threshold",
     "equal": "all contacts have the same stiffness",
+    "table": "each has the stiffness that its table has beside it",
 }
 # Significant digits of parameters.
 DIGITS = 6

@@ -32,6 +32,7 @@ from mesoslip.simulation.kernel import checked
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.sliders import loading_rate
 from mesoslip.theory.steady_sliding import depends_on_velocity
+from mesoslip.theory.table_lives import TableLives, table_lives
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -286,10 +287,11 @@ class ForceCurve:
 
     def _first_panels(self, length: float) -> tuple[float, float]:
         """Start and width of the panels, with their edges where the density is discontinuous."""
-        threshold = self.config.contacts.threshold
-        spread = min(threshold.relative_width, 0.35)
-        if self.config.contacts.coupling == "scaled":
-            spread /= 2
+        threshold, is_scaled = (
+            self.config.contacts.threshold,
+            self.config.contacts.coupling == "scaled",
+        )
+        spread = min(self.config.contacts.stretch_width, 0.175 if is_scaled else 0.35)
         width = min(FIRST_WIDTH * spread, length)
         scales = self.scales
         # The first generation breaks between two displacements, the next ones after lives of at
@@ -500,9 +502,16 @@ class ForceCurve:
         density = self._newborn_density(law, x, moved)
         density += self._first_density(law, x, moved)
         atom = 0.0
-        if contacts.initial == "relaxed":
+        if contacts.initial == "relaxed" and self._table is not None:
+            atom = float(np.sum(self._table.above(np.array([moved]))))
+        elif contacts.initial == "relaxed":
             atom = float(law.survival(self._threshold_of(np.array(moved))))
         return density / unit, atom
+
+    @cached_property
+    def _table(self) -> TableLives | None:
+        """Contacts with the stiffnesses of a table; None for others."""
+        return table_lives(self.config)
 
     def _threshold_of(self, stretch: Array) -> Array:
         """Threshold of contacts that break at a stretch."""
@@ -540,7 +549,12 @@ class ForceCurve:
         total, acceptance = np.zeros_like(x), 0.0
         for shift, part in zip(width * node, weight, strict=True):
             gap = x - shift
-            if contacts.coupling == "equal":
+            if self._table is not None:
+                density = self._table.newborn_density(
+                    x, moved, shift, lambda at: np.nan_to_num(breaks(at))
+                )
+                acceptance += part * self._table.accepted(shift)
+            elif contacts.coupling == "equal":
                 age = gap - back
                 rate = np.where((age >= 0) & (age <= moved), breaks(moved - age), 0.0)
                 density = rate * law.survival(lowest)
@@ -566,6 +580,8 @@ class ForceCurve:
 
     def _first_density(self, law: ThresholdLaw, x: Array, moved: float) -> Array:
         contacts = self.config.contacts
+        if self._table is not None and contacts.initial != "relaxed":
+            return self._table.first_density(x, moved, contacts.initial, self.scales.mean_life)
         equal = contacts.coupling == "equal"
         back = contacts.back_force_ratio
         lowest = np.maximum(self._threshold_of(np.maximum(x, 0.0)), law.minimum)

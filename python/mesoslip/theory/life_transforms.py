@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.table import law_cells
+from mesoslip.theory.table_lives import TableLives, sums_of_panels, table_lives
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -91,10 +92,16 @@ class LifeTransforms:
     def _panels(self) -> tuple[Array, float, Array]:
         """Middles of the panels, half their width, and coefficients (panels, points, averages) of
         Legendre polynomials for density, stiffness, force at breaking and mass."""
-        first, last = self._life(self._law.quantile([1 - LEFT_OUT, LEFT_OUT]))
+        table = self._table
+        if table is None:
+            first, last = self._life(self._law.quantile([1 - LEFT_OUT, LEFT_OUT]))
+        else:
+            first, last = np.min(table.lives[0]), np.max(table.lives[1])
         edges = np.linspace(first, last, PANELS + 1)
         half = (edges[1] - edges[0]) / 2
         middle = (edges[1:] + edges[:-1]) / 2
+        if table is not None:
+            return middle, half, table.projected(edges, POINTS)
         if LAWS[self._law.law].is_sampled:
             return middle, half, self._projected(edges)
         point, weight = np.polynomial.legendre.leggauss(POINTS)
@@ -106,6 +113,13 @@ class LifeTransforms:
         order = (np.arange(POINTS) + 0.5)[:, None]
         coefficients = np.einsum("nj,pja->pna", order * legendre * weight, values)
         return middle, half, half * coefficients
+
+    @cached_property
+    def _table(self) -> TableLives | None:
+        """Contacts with the stiffnesses of a table; None for others, and with another width."""
+        if self.relative_width != self.config.contacts.threshold.relative_width:
+            return None
+        return table_lives(self.config)
 
     def _life(self, threshold: Array) -> Array:
         """Life x_s - x_b of contacts of a threshold."""
@@ -146,14 +160,7 @@ class LifeTransforms:
         share = density * half * weight
         share /= np.sum(share)
         panel = np.clip(np.searchsorted(edges, lives[:, 0], "right") - 1, 0, PANELS - 1)
-        width = edges[1] - edges[0]
-        place = 2 * (lives - edges[panel][:, None]) / width - 1
-        legendre = np.polynomial.legendre.legvander(place, POINTS - 1)
-        order = np.arange(POINTS) + 0.5
-        parts = np.einsum("pj,pjn,pja->pna", share, order * legendre, averaged)
-        coefficients = np.zeros((PANELS, *parts.shape[1:]))
-        np.add.at(coefficients, panel, parts)
-        return coefficients
+        return sums_of_panels(edges, panel, lives, share, averaged)
 
     @cached_property
     def averages(self) -> Lives:

@@ -64,10 +64,18 @@ class PopulationContacts(ContactKind):
                 "attaching, which the thresholds must blur",
                 width,
             )
-        if run.resolution * config.contacts.threshold.relative_width < MIN_STEP:
+        has_table = config.contacts.coupling == "table"
+        threshold = config.contacts.threshold
+        spread = config.contacts.stretch_width if has_table else threshold.relative_width
+        if run.resolution * spread < MIN_STEP:
+            name = (
+                "the spread of break stretches"
+                if has_table
+                else "contacts.threshold.relative_width"
+            )
             yield Complaint(
                 "run.resolution",
-                f"times contacts.threshold.relative_width must be at least {MIN_STEP:g}: with less "
-                "there are too many populations",
+                f"times {name} must be at least {MIN_STEP:g}: with less there are too many "
+                "populations",
                 run.resolution,
             )

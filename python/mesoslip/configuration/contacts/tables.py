@@ -93,8 +93,8 @@ class Threshold(Table):
     """Weights of the samples; by default they are equal."""
     stiffnesses: tuple[Number, ...] | None = None
     """Stiffnesses of the samples. Only their ratios matter: their mean is that of
-    `contacts.stiffness`, which is N k. Contacts have them with `contacts.coupling` "table", which is
-    the default then."""
+    `contacts.stiffness`, which is N k. Contacts have them with `contacts.coupling` "table", the
+    default then."""
 
     @model_validator(mode="before")
     @classmethod

@@ -115,6 +115,27 @@ def sample_problem(
             f"must have at least two different values with a weight (has {len(used)}); contacts of "
             "one threshold have a narrow law of another kind"
         )
+    if stiffnesses is not None:
+        return _stiffness_problem(samples, weights, stiffnesses)
+    return "", ""
+
+
+def _stiffness_problem(
+    samples: Sequence[float], weights: Sequence[float] | None, stiffnesses: Sequence[float]
+) -> tuple[str, str]:
+    """The same of stiffnesses, beside samples and weights without error."""
+    if len(stiffnesses) != len(samples):
+        return "stiffnesses", f"must have as many values as samples, {len(samples)}"
+    wrong = [one for one in stiffnesses if not one > 0]
+    if wrong:
+        return "stiffnesses", f"must be positive: one is {wrong[0]:g}"
+    used = np.ones(len(samples), bool) if weights is None else np.array(weights) > 0
+    stretch = np.array(samples)[used] / np.array(stiffnesses)[used]
+    if not np.max(stretch) > np.min(stretch) * (1 + len(stretch) * SAME_STRETCH):
+        return "stiffnesses", (
+            "must not all be proportional to the thresholds: all contacts would break at one "
+            "stretch, threshold over stiffness"
+        )
     return "", ""
 
 

@@ -14,6 +14,7 @@ from mesoslip.cycles.coordinates import SLIDER, Coordinates
 from mesoslip.cycles.cycle import master_equation
 from mesoslip.cycles.section import Motion
 from mesoslip.simulation.archive import Archive
+from mesoslip.theory.steady_sliding import SteadySliding
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
@@ -232,3 +233,49 @@ def test_interaction_is_left_out():
         ["interaction.strength=0.1", "interaction.columns=60", "interaction.rows=68"],
     )
     assert master_equation(config).interaction is None
+
+
+# A stiff spring and broad thresholds: an oscillation of steady sliding that grows or decays slowly.
+WEAKLY_DAMPED = (
+    "slider.mass=3.2 g",
+    "slider.damping_ratio=none",
+    "slider.damping=12",
+    "contacts.static_force=55 uN",
+    "contacts.stiffness=4 kN/m",
+    "contacts.delay=0.8 ms",
+    "contacts.threshold.relative_width=0.2",
+    "contacts.initial=steady",
+    "drive.velocity=0.8 um/s",
+)
+
+
+def test_slow_decay_at_the_rate_of_linear_theory():
+    """Near the linear boundary smooth sliding is found before the oscillation has decayed; the rate
+    is that of the roots of Z(λ) + Λ(λ), which share nothing with a run."""
+    config = master_equation(configuration(*WEAKLY_DAMPED, "slider.stiffness=38 kN/m"))
+    growth = SteadySliding(config).growth_rate
+    assert -6 < growth < 0
+    motion = Motion(config)
+    words, sizes, window = None, [], 0.1
+    for _ in range(6):
+        words, trace = motion.go_on(words, window)
+        sizes.append(np.std(trace["spring_force"]))
+    assert math.log(sizes[-1] / sizes[-2]) / window == pytest.approx(growth, rel=0.03)
+    found = mesoslip.cycle(config)
+    assert found.motion == "smooth"
+    # Less than a third of the passages until it is below a thousandth of the static force.
+    assert found.cycles < 30
+    unstable = master_equation(configuration(*WEAKLY_DAMPED, "slider.stiffness=30 kN/m"))
+    assert SteadySliding(unstable).growth_rate > 0
+    oscillating = mesoslip.cycle(unstable, find_multipliers=False, max_cycles=24)
+    assert oscillating.amplitude_ratio > 0.1
+
+
+def test_slow_decay_is_not_irregular_motion():
+    """An oscillation of 12 % of the static force that takes a second to decay, 500 periods of it:
+    the first passages change little from one to the next."""
+    changes = ("contacts.threshold.relative_width=0.1", "drive.velocity=0.4 um/s")
+    config = master_equation(configuration(*WEAKLY_DAMPED, *changes, "slider.stiffness=38 kN/m"))
+    found = mesoslip.cycle(config, max_cycles=24)
+    assert found.motion == "smooth"
+    assert found.smooth_stable

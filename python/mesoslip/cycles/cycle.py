@@ -12,7 +12,14 @@ import numpy as np
 
 from mesoslip.configuration.config import Config
 from mesoslip.cycles.section import Level, Motion, Passage, Trace
-from mesoslip.cycles.settling import MAX_CYCLES, TOLERANCE, Settled, multipliers, settle
+from mesoslip.cycles.settling import (
+    MAX_CYCLES,
+    MIN_AMPLITUDE,
+    TOLERANCE,
+    Settled,
+    multipliers,
+    settle,
+)
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.inputs import ConfigLike, OutputLike, as_config, open_output
 from mesoslip.simulation.kernel import Array, Words
@@ -188,6 +195,9 @@ class Cycle:
             None: "linear theory does not say whether smooth sliding is stable",
         }[self.smooth_stable]
         if self.motion == "smooth":
+            if self.smooth_stable is False:
+                limit = f"{100 * MIN_AMPLITUDE:g} % of F_s"
+                return f"from this start no oscillation above {limit} is found; {smooth}"
             return f"from this start the motion settles to smooth sliding; {smooth}"
         percent = f"{100 * self.amplitude_ratio:.3g} % of F_s"
         if self.motion == "irregular":
@@ -224,7 +234,8 @@ def cycle(
     tolerance
         Relative error of period and peaks at which a cycle is settled.
     max_cycles
-        Maximum number of passages before the motion is irregular.
+        Number of passages before one that does not settle is compared with itself some time later.
+        It is irregular if its mean amplitude stays.
     find_multipliers
         Whether to compute the leading multipliers too.
     progress
@@ -282,6 +293,7 @@ def settled_cycle(
         words,
         level,
         is_stable=is_stable,
+        root=None if sliding is None else sliding.leading_root,
         tolerance=tolerance,
         max_cycles=max_cycles,
         progress=progress,

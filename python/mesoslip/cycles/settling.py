@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.cycles.coordinates import Coordinates
+from mesoslip.cycles.decay import Amplitudes
 from mesoslip.cycles.section import Level, Motion, Passage, Trace
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Words
@@ -27,10 +28,8 @@ TOLERANCE, MAX_CYCLES = 1e-5, 80
 # same, and number of these passages: steps of the solver, or a fine structure, may keep it from
 # settling any further.
 MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
-# Ratio of mean amplitudes, in the last third of the passages and in the first, outside of which the
-# motion still drifts; passages of a third at least; and how many times the maximum number of
-# passages it may then take.
-DRIFT, MIN_THIRD, MAX_EXTENSION = 0.85, 8, 6
+# Part of the first batch of passages in each later one.
+BATCH_PART = 0.5
 # Ratio of successive changes below which they shrink.
 SHRINKING = 0.98
 # Ratio of spreads that are equal: the shorter cycle is taken.
@@ -41,8 +40,9 @@ MIN_AMPLITUDE = 1e-3
 LOADINGS, PERIODS = 2.0, 10.0
 # Times the run goes on before sections are sought again, where there are none.
 MAX_WINDOWS = 40
-# Factor by which changes must go on shrinking to be extrapolated, its variation, cycles between.
-SLOW, MAX_VARIATION, MIN_BETWEEN = 0.6, 0.15, 4
+# Factor by which changes must go on shrinking to be extrapolated, its variation, cycles between,
+# and maximum of the extrapolated changes of period, peak and low over period and amplitude.
+SLOW, MAX_VARIATION, MIN_BETWEEN, MAX_JUMP = 0.6, 0.15, 4, 0.3
 # Ratio of successive amplitudes, and part of the amplitude left in the end, of a decay to rest.
 DECAYED = 0.1
 
@@ -94,6 +94,7 @@ def settle(
     level: Level | None = None,
     *,
     is_stable: bool | None = None,
+    root: complex | None = None,
     tolerance: float = TOLERANCE,
     max_cycles: int = MAX_CYCLES,
     progress: Callable[[float], None] | None = None,
@@ -108,14 +109,16 @@ def settle(
         State to start from, and a section that may fit; the start of a run by default.
     is_stable
         Whether smooth sliding is linearly stable, if that is known.
+    root
+        The root of linear theory that decays most slowly or grows fastest [1/s], if it is known.
     tolerance
         Relative error of period and peaks.
     max_cycles
-        Maximum number of passages.
+        Number of passages before a motion that does not settle is compared with itself later.
     progress
         Called after each passage with the part of the maximum that is done.
     """
-    run = _Settling(motion, is_stable, tolerance)
+    run = _Settling(motion, is_stable, root, tolerance)
     if words is None or level is None:
         words, trace = motion.go_on(words, run.window)
         level = run.level_of(trace)
@@ -135,18 +138,23 @@ def settle(
 class _Settling:
     """Passages so far."""
 
-    def __init__(self, motion: Motion, is_stable: bool | None, tolerance: float) -> None:
+    def __init__(
+        self, motion: Motion, is_stable: bool | None, root: complex | None, tolerance: float
+    ) -> None:
         self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
+        self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
         self._coordinates = Coordinates(motion.config, motion.velocity)
         self._count = self._extrapolations = 0
+        self._limit = 0
         self._level: Level | None = None
         self._restart()
 
     def _restart(self) -> None:
         """Forget earlier passages: the section or the state is another one."""
         self._rows: list[Array] = []
+        self._amplitudes.restart()
         self._vectors: list[Array] = []
         self._recent: list[Passage] = []
 
@@ -167,9 +175,8 @@ class _Settling:
         """Iterate with one section: state, next section, and what the motion is if it is known."""
         self._restart()
         self._level = level
-        while self._count < max_cycles or (
-            self._drifts() and self._count < MAX_EXTENSION * max_cycles
-        ):
+        self._limit = self._limit or max_cycles
+        while self._count < self._limit:
             passage = self._motion.next_passage(words, level)
             self._count += 1
             if progress is not None:
@@ -192,18 +199,15 @@ class _Settling:
                     return words, self._new_level(multiple), ""
                 return words, level, "periodic"
             words = self._extrapolated(words, multiple)
-        return words, level, "periodic" if self._spread()[1] < MAX_SPREAD else "irregular"
-
-    def _drifts(self) -> bool:
-        """Whether the amplitude still grows or decays from the first part of the passages to the
-        last."""
-        rows = np.array(self._rows)
-        third = len(rows) // 3
-        if third < MIN_THIRD:
-            return True
-        sizes = rows[:, 1] - rows[:, 2]
-        early, late = float(np.mean(sizes[:third])), float(np.mean(sizes[-third:]))
-        return not DRIFT < late / early < 1 / DRIFT
+        self._amplitudes.end_batch()
+        if self._amplitudes.fall_between_batches():
+            return words, None, "smooth"
+        if self._amplitudes.stay():
+            return words, level, "periodic" if self._spread()[1] < MAX_SPREAD else "irregular"
+        self._limit = self._count + max(SPREAD_PASSAGES, int(BATCH_PART * max_cycles))
+        pause = self._amplitudes.pause(self._motion.loading_time)
+        words, trace = self._motion.go_on(words, pause)
+        return words, self.level_of(trace), ""
 
     def _spread(self) -> tuple[int, float]:
         """Passages of a cycle, and the relative spread of the last ones, the least of all."""
@@ -223,6 +227,7 @@ class _Settling:
     def _take(self, passage: Passage) -> None:
         self._recent = [*self._recent[1 - 2 * MAX_MULTIPLE :], passage]
         self._rows.append(np.array([passage.period, passage.peak, passage.low]))
+        self._amplitudes.take(passage)
         self._vectors.append(self._coordinates.of(passage.words))
 
     def _fits(self, multiple: int) -> bool:
@@ -274,6 +279,8 @@ class _Settling:
         rows = np.array(self._rows)
         if len(rows) < 6 or self._is_stable is False:
             return False
+        if self._amplitudes.decay_linearly():
+            return True
         sizes = rows[-5:, 1] - rows[-5:, 2]
         if sizes[-1] < MIN_AMPLITUDE * self._force:
             return bool(np.all(np.diff(sizes) < 0))
@@ -297,6 +304,8 @@ class _Settling:
         factors = np.sum(changes[:-1] * changes[1:], axis=1) / sizes[1:] ** 2
         factor = float(np.mean(factors))
         if not SLOW < abs(factor) < 1 or float(np.ptp(factors)) > MAX_VARIATION * (1 - abs(factor)):
+            return words
+        if abs(factor / (1 - factor)) * float(np.max(np.abs(changes[0]))) > MAX_JUMP:
             return words
         step = factor / (1 - factor) * (vectors[-1] - vectors[-1 - multiple])
         self._extrapolations += 1

@@ -1,0 +1,135 @@
+"""Does an oscillation of the master equation decay, or keep its amplitude?
+
+An oscillation may take hundreds of its periods to decay. Next to smooth sliding it does so at the
+rate of the leading root of linear theory; elsewhere only a longer time shows it. So passages come
+in batches, with pauses between them that double from one to the next.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mesoslip.cycles.section import Passage
+    from mesoslip.simulation.kernel import Array
+
+# First pause, in times of loading; maximum number of batches; relative difference and standard
+# errors of equal means; number of batches compared if smooth sliding is linearly unstable, and if
+# it may be stable.
+BATCH_LOADINGS, MAX_BATCHES = 5.0, 7
+EQUAL_MEANS, STANDARD_ERRORS = 0.03, 3.0
+MIN_BATCHES_UNSTABLE, MIN_BATCHES_STABLE = 2, 3
+# A decay by linear theory: minimum and maximum number of passages; maximum deviation of the
+# velocity from the drive's, over it, so that the slider does not stop; maximum relative deviations
+# of period and rate from those of the leading root; that of the rate over the frequency, which the
+# steps of the solver change; and minimum part of the variation of the logarithm of the amplitude
+# that the decay explains.
+MIN_LINEAR, MAX_LINEAR = 6, 24
+MAX_SWING, PERIOD_MARGIN, RATE_MARGIN = 0.6, 0.05, 0.25
+STEP_MARGIN, MIN_EXPLAINED = 1e-4, 0.95
+
+
+class Batch(NamedTuple):
+    """Time [s], mean amplitude and its standard error [N] of the later half of a batch, and whether
+    its oscillation is that of linear theory."""
+
+    time: float
+    mean: float
+    error: float
+    is_linear: bool
+
+
+class Amplitudes:
+    """Amplitudes of the passages so far.
+
+    Parameters
+    ----------
+    velocity
+        Velocity of the drive [m/s].
+    is_stable, root
+        Whether smooth sliding is linearly stable, and the leading root [1/s]; None if not known.
+    """
+
+    def __init__(self, velocity: float, is_stable: bool | None, root: complex | None) -> None:
+        self._velocity = velocity
+        self._root = root if root is not None and root.real < 0 < root.imag else None
+        self._needed = MIN_BATCHES_UNSTABLE if is_stable is False else MIN_BATCHES_STABLE
+        self._batches: list[Batch] = []
+        self._rows: list[tuple[float, float, bool]] = []
+        self._first = 0
+
+    def restart(self) -> None:
+        """The section or the state is another one: earlier passages are of another series."""
+        self._first = len(self._rows)
+
+    def take(self, passage: Passage) -> None:
+        """Record a passage."""
+        velocity = passage.trace["velocity"] / self._velocity
+        is_linear = self._root is not None and (
+            float(np.max(np.abs(velocity - 1))) < MAX_SWING
+            and abs(passage.period * self._root.imag / (2 * math.pi) - 1) < PERIOD_MARGIN
+        )
+        self._rows.append((passage.time, passage.peak - passage.low, is_linear))
+
+    def decay_linearly(self) -> bool:
+        """Whether the last passages decay as linear theory has it, and the slider does not stop.
+
+        The rate then differs from the root's by a term of the square of the amplitude, which is
+        smaller than the margin. So it stays negative while the amplitude falls: no cycle is below.
+        """
+        times, sizes, is_linear = self._columns(self._rows[self._first :][-MAX_LINEAR:])
+        count = len(times) if np.all(is_linear) else int(np.argmin(is_linear[::-1]))
+        if count < MIN_LINEAR:
+            return False
+        times, logarithms = times[-count:], np.log(sizes[-count:])
+        slope, offset = np.polyfit(times - times[0], logarithms, 1)
+        rest = float(np.var(logarithms - slope * (times - times[0]) - offset))
+        is_exponential = rest <= (1 - MIN_EXPLAINED) * float(np.var(logarithms))
+        return is_exponential and self._is_rate(float(slope))
+
+    def end_batch(self) -> None:
+        """Take the passages since the last batch as one."""
+        times, sizes, is_linear = self._columns(self._rows[len(self._rows) // 2 :])
+        error = float(np.std(sizes)) / math.sqrt(len(sizes))
+        self._batches.append(
+            Batch(float(np.mean(times)), float(np.mean(sizes)), error, bool(np.all(is_linear[1:])))
+        )
+        self._rows, self._first = [], 0
+
+    def fall_between_batches(self) -> bool:
+        """Whether the amplitude falls from batch to batch as linear theory has it."""
+        if len(self._batches) < 2 or not all(one.is_linear for one in self._batches[-2:]):
+            return False
+        early, late = self._batches[-2:]
+        fall = math.log(late.mean / early.mean)
+        error = math.hypot(early.error / early.mean, late.error / late.mean)
+        return -fall > STANDARD_ERRORS * error and self._is_rate(fall / (late.time - early.time))
+
+    def stay(self) -> bool:
+        """Whether the mean amplitude is that of the batches before, or there were many of them."""
+        if len(self._batches) == MAX_BATCHES:
+            return True
+        last, *before = self._batches[: -self._needed - 1 : -1]
+        return len(before) == self._needed - 1 and all(
+            abs(one.mean - last.mean)
+            < EQUAL_MEANS * last.mean + STANDARD_ERRORS * math.hypot(last.error, one.error)
+            for one in before
+        )
+
+    def pause(self, loading_time: float) -> float:
+        """Time until the next batch [s]."""
+        return BATCH_LOADINGS * loading_time * 2.0 ** (len(self._batches) - 1)
+
+    def _is_rate(self, rate: float) -> bool:
+        if self._root is None or rate >= 0:
+            return False
+        margin = RATE_MARGIN * abs(self._root.real) + STEP_MARGIN * self._root.imag
+        return abs(rate - self._root.real) < margin
+
+    @staticmethod
+    def _columns(rows: list[tuple[float, float, bool]]) -> tuple[Array, Array, np.ndarray]:
+        times, sizes, is_linear = np.array(rows).reshape(-1, 3).T
+        return times, sizes, is_linear.astype(bool)

@@ -2,10 +2,10 @@
 
 Runs from steady contacts until the first slip by more than a tenth of the static force, for an
 apparatus whose steady sliding is linearly stable (back force 0), or ends in an oscillation of 1 %
-(back force 0.1). Prints the mean waiting time for each N, and the fit of tau exp(N/N_0) in
-``docs/steady-sliding.md``; a quarter of an hour::
+(back force 0.1). Prints the mean waiting time for each N, with its error, and the fit of
+tau exp(N/N_0) with its chi square: ``docs/steady-sliding.md``; some five minutes::
 
-    .venv/bin/python tests/studies/noise_escape.py [back_force_ratio]
+    .venv/bin/python tests/studies/noise_escape.py [back_force_ratio] [KEY=VALUE ...]
 """
 
 from __future__ import annotations
@@ -31,45 +31,60 @@ APPARATUS = (
     "contacts.initial=steady",
     "drive.velocity=0.05 um/s",
     "output.slip_interval=0",
-    "output.interval=4 ms",
+    "output.interval=1 s",
 )
-COUNTS = (1000, 2000, 4000, 8000, 12000, 16000, 24000, 32000)
+# Numbers of contacts, and runs of each.
+RUNS = {
+    1000: 40,
+    2000: 40,
+    4000: 40,
+    8000: 40,
+    12000: 40,
+    16000: 40,
+    24000: 24,
+    32000: 16,
+    40000: 12,
+    50000: 6,
+}
 MIN_FIT_COUNT = 4000
-RUNS, DURATION = 12, 80.0
+# Time simulated in a run at most [s], and advances between two looks at its slips.
+DURATION, ADVANCES = 400.0, 20_000
 MIN_DROP = 0.1
 
 
-def waiting_times(count: int, back: str) -> list[float]:
-    """Times of the first large slip of each run [s]; infinite without one."""
-    found = []
-    for seed in range(100, 100 + RUNS):
-        changes = (
-            f"contacts.count={count}",
-            f"contacts.back_force_ratio={back}",
-            f"run.seed={seed}",
-            f"run.duration={DURATION}",
-        )
-        config = Config.load(KLEIN, [*APPARATUS, *changes])
-        slips = mesoslip.slips(mesoslip.run(config, executor=1))
-        is_large = slips["force_drop"].values > MIN_DROP * config.contacts.static_force
-        found.append(min(slips["start_time"].values[is_large], default=math.inf))
-    return found
+def waiting_time(config: Config) -> tuple[float, bool]:
+    """Time of the first large slip of a run [s], or of its end; and whether there was one."""
+    with mesoslip.Realization(config) as run:
+        while not run.finished:
+            run.advance(ADVANCES)
+            slips = run.table("slips")
+            drops = slips["force_before"] - slips["force_after"]
+            large = np.flatnonzero(drops > MIN_DROP * config.contacts.static_force)
+            if large.size:
+                return float(slips["start_time"][large[0]]), True
+    return DURATION, False
 
 
 def main() -> None:
     back = sys.argv[1] if len(sys.argv) > 1 else "0"
     rows = []
-    for count in COUNTS:
-        times = np.array(waiting_times(count, back))
-        started = int(np.isfinite(times).sum())
-        mean = float(np.minimum(times, DURATION).sum()) / max(started, 1)
-        print(f"N = {count}: {started} of {RUNS}, mean waiting time {mean:.3g} s", flush=True)
+    for count, runs in RUNS.items():
+        changes = [f"contacts.count={count}", f"contacts.back_force_ratio={back}", *sys.argv[2:]]
+        base = Config.load(KLEIN, [*APPARATUS, f"run.duration={DURATION}", *changes])
+        found = [waiting_time(base.replace({"run.seed": 100 + seed})) for seed in range(runs)]
+        started = sum(is_large for _, is_large in found)
+        # Maximum likelihood of an exponential law, with the runs that ended before.
+        mean = math.fsum(time for time, _ in found) / max(started, 1)
+        error = mean / math.sqrt(max(started, 1))
+        print(f"N = {count}: {started} of {runs}, {mean:.3g} +- {error:.2g} s", flush=True)
         if count >= MIN_FIT_COUNT and started:
             rows.append((count, math.log(mean), math.sqrt(started)))
     number, logarithm, weight = np.array(rows).T
     (slope, offset), covariance = np.polyfit(number, logarithm, 1, w=weight, cov="unscaled")
+    rest = float(np.sum(((logarithm - offset - slope * number) * weight) ** 2))
     error = math.sqrt(covariance[0, 0]) / slope**2
     print(f"{math.exp(offset):.2g} s exp(N/N_0), N_0 = {1 / slope:.0f} +- {error:.0f}")
+    print(f"chi square {rest:.1f} of {len(rows) - 2}")
 
 
 if __name__ == "__main__":

@@ -125,14 +125,15 @@ contains
       real(wp), intent(in) :: lower, upper
       real(wp) :: integral
 
-      integral = upper - lower
       select case (power)
       case (-1)
          integral = log(upper / lower)
       case (1)
-         integral = 0.5_wp * integral * (upper + lower)
+         integral = 0.5_wp * (upper - lower) * (upper + lower)
       case (2)
-         integral = integral * (upper**2 + upper * lower + lower**2) / 3.0_wp
+         integral = (upper - lower) * (upper**2 + upper * lower + lower**2) / 3.0_wp
+      case default
+         integral = upper - lower
       end select
    end function power_integral
 

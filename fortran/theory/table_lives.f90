@@ -3,9 +3,10 @@
 !> Dimensionless as in mesoslip_contacts_mechanics, for one contact. A newborn of stiffness k and
 !> life l bears k d + beta after the displacement d, and breaks at d = l.
 !>
-!> The density of breaks of a table is as rough as the gaps between its samples. To solve an integral
-!> equation each life is spread evenly over a window: rates and states are those of such contacts to
-!> rounding, so that none is lost, and differ from those of the table by the window squared.
+!> The density of breaks of a table is as rough as the gaps between its samples. To solve an
+!> integral equation each life is spread evenly over a window: rates and states are those of such
+!> contacts to rounding, so that none is lost, and averages differ from those of the table by the
+!> window squared.
 module mesoslip_theory_table_lives
    use mesoslip_contacts_life_moments, only: life_moments_type, new_life_moments
    use mesoslip_contacts_stretch_cells, only: stretch_cells_type
@@ -42,7 +43,7 @@ module mesoslip_theory_table_lives
       procedure, non_overridable :: newborn_rates
       !> Part of newborns that is pinned, its stiffness and force
       procedure, non_overridable :: newborn_state
-      !> The same of a first generation that was relaxed, as in slow sliding, or of uniform stretches
+      !> The same of a first generation: relaxed, as in slow sliding, or of uniform stretches
       procedure, non_overridable :: relaxed_rates
       procedure, non_overridable :: relaxed_state
       procedure, non_overridable :: steady_rates

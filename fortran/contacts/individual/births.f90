@@ -2,8 +2,8 @@
 !>
 !> Thresholds of the next births are drawn some at a time, which takes less time and gives the same
 !> numbers: each draw has a key of its own. So are delays and forces at attaching, if they differ
-!> between contacts. Where contacts have the stiffnesses of a table their break stretches are drawn in
-!> the place of thresholds.
+!> between contacts. Where contacts have the stiffnesses of a table their break stretches are drawn
+!> in the place of thresholds.
 module mesoslip_contacts_individual_births
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law

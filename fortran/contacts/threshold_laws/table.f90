@@ -104,7 +104,8 @@ contains
       call parameters%take("threshold_stiffnesses", stiffness, error)
       if (allocated(error)) return
       if (size(stiffness) /= self%cells) then
-         call raise(error, status_invalid, "a table of thresholds needs a stiffness for each weight")
+         call raise(error, status_invalid, "a table of thresholds needs as many stiffnesses as " &
+            & // "weights")
          return
       end if
       mean_threshold = 0.5_wp * sum(weight * stiffness &

@@ -196,7 +196,7 @@ def stretch_cells(
     if len(stretch) > MAX_CELLS:
         is_new = (np.diff(stretch) > SAME_STRETCH * stretch[1:]) | (np.diff(stiffness) != 0)
         place = np.concatenate([[0], np.cumsum(is_new)])
-        group = _groups(np.bincount(place, weight))[place]
+        group = _groups(np.bincount(place, weight).astype(np.float64))[place]
         total = np.bincount(group, weight)
         stretch = np.bincount(group, weight * stretch) / total
         stiffness = np.bincount(group, weight * stiffness) / total

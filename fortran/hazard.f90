@@ -47,6 +47,8 @@ module mesoslip_hazard
       !> Exponent of the factor between a deviate and what the clock goes on by, and the key
       procedure, non_overridable :: life_exponent
       procedure, non_overridable :: key
+      !> What is left of the deviate of a contact
+      procedure, non_overridable :: left
    end type hazard_type
 
 contains
@@ -175,5 +177,22 @@ contains
       key = never
       if (exponent <= max_key_exponent) key = self%reading(number) + left * exp(exponent)
    end function key
+
+   !> What is left of the deviate of a contact now.
+   pure function left(self, number, key, deviate, limit, origin)
+      !> The clocks
+      class(hazard_type), intent(in) :: self
+      !> Number of the contact's clock
+      integer, intent(in) :: number
+      !> Reading at which it breaks [s], and what was left when that was found
+      real(wp), intent(in) :: key, deviate
+      !> Stretch at the threshold, and displacement at which the stretch is zero [m]
+      real(wp), intent(in) :: limit, origin
+      real(wp) :: left
+
+      left = deviate
+      if (key < never) left = max(0.0_wp, key - self%reading(number)) &
+         & * exp(-self%life_exponent(number, limit, origin))
+   end function left
 
 end module mesoslip_hazard

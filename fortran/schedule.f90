@@ -74,11 +74,20 @@ module mesoslip_schedule
       integer :: clock_breaks = 0, clock_broken = 0
       !> Of each its reading [s], and origin [m]
       real(wp) :: clock_key(max_events) = 0.0_wp, clock_origin(max_events) = 0.0_wp
-      !> Entries of the two lists that end the schedule without a break, 0 for none
-      integer :: break_stop = 0, clock_stop = 0
+      !> Entry of the clock's list that ends the schedule without a break, 0 for none
+      integer :: clock_stop = 0
       !> Of each entry the same contact in the other list, or 0, and whether it is gone
       integer :: break_twin(max_events) = 0, clock_twin(max_events) = 0
       logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
+      !> Of each entry by coordinates whether the contact does not break there, but its force gets
+      !> the sign of the motion; its stretch at breaking [m], what is left of its deviate, and its
+      !> reading: by the other clock until then, and by this one after that [s]
+      logical :: break_turns(max_events) = .false.
+      real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
+         & turn_key(max_events) = 0.0_wp
+      !> Those that came; contacts that go by the other clock, and the entry of the first of them to
+      !> break, 0 if it is not listed
+      integer :: turned = 0, others = 0, other_first = 0
       !> Breaks in all, and the entry of each, negative if it is one of the clock
       integer :: came_count = 0, came(2 * max_events) = 0
       !> Whether contacts broke in the last moment
@@ -98,7 +107,7 @@ module mesoslip_schedule
       procedure, non_overridable, private :: break_due, attach_due, &
          & insert_attachments, insert_attachment
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
-         & skip_gone
+         & change_sign, cut_lists, skip_gone
    end type schedule_type
 
 contains
@@ -289,6 +298,7 @@ contains
       integer :: earlier, other
 
       earlier = self%came_count
+      other = clocks + 1 - self%number
       do while (self%clock_broken < self%clock_breaks)
          associate (event => self%clock_broken + 1)
             if (event == self%clock_stop &
@@ -302,12 +312,17 @@ contains
       do while (self%broken < self%breaks)
          associate (event => self%broken + 1)
             if (self%break_coordinate(event) > self%direction * displacement) exit
-            if (event == self%break_stop) then
-               self%is_over = .true.
-               exit
+            if (self%break_turns(event)) then
+               ! Contacts of the other clock break before that.
+               if (self%hazard%reading(other) >= self%hazard%next(other)) then
+                  self%is_over = .true.
+                  exit
+               end if
+               call self%change_sign(event)
+            else
+               call self%break_with_clocks(time, displacement, event, self%break_origin(event))
+               if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
             end if
-            call self%break_with_clocks(time, displacement, event, self%break_origin(event))
-            if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
          end associate
          self%broken = self%broken + 1
          call self%skip_gone()
@@ -315,7 +330,6 @@ contains
       self%breaks_now = self%came_count > earlier
       if (self%breaks_now) self%moments = self%moments + 1
 
-      other = clocks + 1 - self%number
       call self%hazard%is_far(self%number, displacement, far(self%number))
       far(other) = .false.
       if (self%hazard%is_used(other)) then
@@ -383,7 +397,7 @@ contains
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
 
-      real(wp) :: origin, ahead, key
+      real(wp) :: origin
       integer :: event
 
       do event = self%attached + 1, self%attachments
@@ -396,21 +410,52 @@ contains
          if (self%detached == 0) self%drag = accumulator_type()
          call self%stiffness%add(self%attach_stiffness(event))
          call self%offset%add(self%attach_stiffness(event) * origin)
-         self%behind = max(self%behind, self%direction * origin - self%tiny_stretch)
-         ahead = self%direction * origin + self%attach_limit(event)
-         do while (self%breaks > self%broken)
-            if (self%break_coordinate(self%breaks) < ahead) exit
-            self%breaks = self%breaks - 1
-         end do
-         key = self%hazard%key(self%number, self%attach_left(event), self%attach_limit(event), &
-            & origin)
-         self%attach_key(event) = key
-         do while (self%clock_breaks > self%clock_broken)
-            if (self%clock_key(self%clock_breaks) < key) exit
-            self%clock_breaks = self%clock_breaks - 1
-         end do
+         self%attach_key(event) = self%hazard%key(self%number, self%attach_left(event), &
+            & self%attach_limit(event), origin)
+         call self%cut_lists(origin, self%attach_limit(event), self%attach_key(event))
       end do
       self%attached = event - 1
    end subroutine attach_with_clocks
+
+   !> The force of a contact gets the sign of the motion: it goes by the other clock from now on.
+   subroutine change_sign(self, event)
+      class(schedule_type), intent(inout) :: self
+      !> Entry of the list by coordinates
+      integer, intent(in) :: event
+
+      associate (origin => self%break_origin(event), limit => self%turn_limit(event), &
+         & left => self%turn_left(event), key => self%turn_key(event))
+         left = self%hazard%left(clocks + 1 - self%number, key, left, limit, origin)
+         key = self%hazard%key(self%number, left, limit, origin)
+         self%turned = self%turned + 1
+         self%others = self%others - 1
+         ! Which contact is the next one of the other clock is not known then.
+         if (event == self%other_first .or. self%others == 0) self%is_over = .true.
+         ! Its own entry stays, as it is passed after that.
+         self%broken = event
+         call self%cut_lists(origin, limit, key)
+         self%broken = event - 1
+      end associate
+   end subroutine change_sign
+
+   !> Cut lists short before the entries of a contact that is new in them.
+   subroutine cut_lists(self, origin, limit, key)
+      class(schedule_type), intent(inout) :: self
+      !> Origin of the contact, its stretch at breaking [m], and the reading at which it breaks [s]
+      real(wp), intent(in) :: origin, limit, key
+
+      real(wp) :: ahead
+
+      self%behind = max(self%behind, self%direction * origin - self%tiny_stretch)
+      ahead = self%direction * origin + limit
+      do while (self%breaks > self%broken)
+         if (self%break_coordinate(self%breaks) < ahead) exit
+         self%breaks = self%breaks - 1
+      end do
+      do while (self%clock_breaks > self%clock_broken)
+         if (self%clock_key(self%clock_breaks) < key) exit
+         self%clock_breaks = self%clock_breaks - 1
+      end do
+   end subroutine cut_lists
 
 end module mesoslip_schedule

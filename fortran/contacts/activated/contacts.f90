@@ -13,7 +13,8 @@ module mesoslip_contacts_activated_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
    use mesoslip_contacts_individual_births, only: drag_of
-   use mesoslip_contacts_individual_record, only: row_origin, row_renewal, row_stiffness
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, &
+      & row_stiffness
    use mesoslip_contacts_mechanics, only: delay_fixed
    use mesoslip_hazard, only: force_sign, never
    use mesoslip_interface_law, only: clocks, interface_law_type, pose_type, window_type
@@ -59,7 +60,7 @@ module mesoslip_contacts_activated_contacts
       !> A contact breaks
       procedure, non_overridable :: break_contact
       procedure, non_overridable, private :: respond_here, pass_ahead, break_activated, &
-         & draw_deviates, list_breaks, detach_came, attach_came
+         & draw_deviates, list_breaks, detach_came, turn_came, attach_came
    end type contact_activated_type
 
 contains
@@ -310,35 +311,43 @@ contains
       schedule%is_over = .false.
    end subroutine plan
 
-   !> List the next breaks at thresholds and by the clock. A list ends where a force changes its
-   !> sign, or at a key that is not known.
+   !> List the next breaks at thresholds, those whose forces get the sign of the motion with them,
+   !> and breaks by the clock. That list ends at a key that is not known.
    subroutine list_breaks(self, limit, schedule)
       class(contact_activated_type), intent(inout) :: self
       !> Maximum length of each list
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
 
-      integer :: event
+      integer :: event, other, first
 
       call self%order(self%ahead)%preview(limit, self%listed, &
          & schedule%break_coordinate, schedule%breaks)
       call self%order(motions + schedule%number)%preview(limit, self%clock_listed, &
          & schedule%clock_key, schedule%clock_breaks)
-      schedule%break_stop = 0
       schedule%clock_stop = 0
+      schedule%turned = 0
+      other = clocks + 1 - schedule%number
+      schedule%others = self%members(other)
+      schedule%other_first = 0
+      first = 0
+      if (schedule%others > 0) call self%order(motions + other)%due(never, first)
       schedule%broken = 0
       schedule%clock_broken = 0
       schedule%came_count = 0
       schedule%moments = 0
       do event = 1, schedule%breaks
          associate (contact => self%listed(event))
-            if (int(self%life(life_clock, contact)) /= schedule%number) then
-               schedule%break_stop = event
-               schedule%breaks = event
-               exit
-            end if
             schedule%break_origin(event) = self%record(row_origin, contact)
-            self%entry(contact) = event
+            schedule%break_turns(event) = int(self%life(life_clock, contact)) /= schedule%number
+            if (schedule%break_turns(event)) then
+               schedule%turn_limit(event) = self%record(row_limit, contact)
+               schedule%turn_left(event) = self%life(life_left, contact)
+               schedule%turn_key(event) = self%life(life_key, contact)
+               if (contact == first) schedule%other_first = event
+            else
+               self%entry(contact) = event
+            end if
          end associate
       end do
       schedule%break_twin(:schedule%breaks) = 0
@@ -378,9 +387,10 @@ contains
       integer :: number
 
       self%max_length = min(max_events, max(min_length, &
-         & 2 * max(schedule%came_count, schedule%attached)))
+         & 2 * max(schedule%came_count + schedule%turned, schedule%attached)))
       self%hazard = schedule%hazard
       call self%detach_came(schedule)
+      call self%turn_came(schedule)
       call self%attach_came(schedule)
       self%behind = schedule%behind
       if (schedule%is_over) then
@@ -423,6 +433,25 @@ contains
       self%offset = schedule%offset
       self%drag = schedule%drag
    end subroutine detach_came
+
+   !> Keep the books of the contacts of a schedule whose forces changed their signs.
+   subroutine turn_came(self, schedule)
+      class(contact_activated_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event
+
+      if (schedule%turned == 0) return
+      do event = 1, schedule%broken
+         if (.not. schedule%break_turns(event)) cycle
+         associate (contact => self%listed(event))
+            call self%take_out(contact)
+            self%life(:, contact) = [real(schedule%number, wp), schedule%turn_left(event), &
+               & schedule%turn_key(event)]
+            call self%place(contact)
+         end associate
+      end do
+   end subroutine turn_came
 
    !> Keep the books of the contacts of a schedule that attached.
    subroutine attach_came(self, schedule)

@@ -236,13 +236,9 @@ contains
       class(activated_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
-      integer :: number
-
-      if (.not. self%life(life_key, contact) < never) return
-      number = int(self%life(life_clock, contact))
-      self%life(life_left, contact) = max(0.0_wp, self%life(life_key, contact) &
-         & - self%hazard%reading(number)) * exp(-self%hazard%life_exponent(number, &
-         & self%record(row_limit, contact), self%record(row_origin, contact)))
+      self%life(life_left, contact) = self%hazard%left(int(self%life(life_clock, contact)), &
+         & self%life(life_key, contact), self%life(life_left, contact), &
+         & self%record(row_limit, contact), self%record(row_origin, contact))
    end subroutine settle_deviate
 
    !> Move the reference of a clock to the slider, if that is far from it or no contact goes by it.

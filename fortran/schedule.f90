@@ -61,10 +61,12 @@ module mesoslip_schedule
       !> Where it came [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
       !> Whether contacts that break may attach here, and of each break the delay until then [s],
-      !> the stiffness [N/m], and the stretches at first and at breaking [m] of the next life
+      !> the stiffness [N/m], and the stretches at first and at breaking [m] of the next life, and
+      !> the deviate of that; those of breaks by a clock come after the others
       logical :: has_births = .false.
-      real(wp) :: birth_delay(max_events) = 0.0_wp, birth_stiffness(max_events) = 0.0_wp, &
-         & birth_stretch(max_events) = 0.0_wp, birth_limit(max_events) = 0.0_wp
+      real(wp) :: birth_delay(2 * max_events) = 0.0_wp, birth_stiffness(2 * max_events) = 0.0_wp, &
+         & birth_stretch(2 * max_events) = 0.0_wp, birth_limit(2 * max_events) = 0.0_wp, &
+         & birth_left(2 * max_events) = 0.0_wp
 
       !> Whether there are clocks, which they are, and the one by which contacts break here
       logical :: has_clocks = .false.
@@ -219,17 +221,17 @@ contains
       integer :: event
 
       do event = self%broken + 1, last
-         call self%insert_attachment(event, time)
+         call self%insert_attachment(event, time, self%break_drag(event))
       end do
    end subroutine insert_attachments
 
    !> Insert the attachment of a contact that breaks now, unless it comes after those listed.
-   subroutine insert_attachment(self, event, time)
+   subroutine insert_attachment(self, event, time, drag)
       class(schedule_type), intent(inout) :: self
-      !> Number of its break
+      !> Number of its break, or of its birth
       integer, intent(in) :: event
-      !> Time [s]
-      real(wp), intent(in) :: time
+      !> Time [s], and drag of the contact until it attaches [N s/m]
+      real(wp), intent(in) :: time, drag
 
       real(wp) :: due
       integer :: place
@@ -241,6 +243,15 @@ contains
          self%attachments = max(self%attached, max_events - 1)
       end if
       if (due >= self%attach_time(self%attachments + 1)) return
+      if (self%has_clocks .and. self%direction * self%birth_stretch(event) < 0.0_wp) then
+         ! It goes by the other clock, which ends the schedule.
+         do while (self%attachments > self%attached)
+            if (self%attach_time(self%attachments) <= due) exit
+            self%attachments = self%attachments - 1
+         end do
+         self%attach_time(self%attachments + 1) = due
+         return
+      end if
       place = self%attachments + 1
       self%attach_time(place + 1) = self%attach_time(place)
       do while (place > self%attached + 1)
@@ -250,13 +261,15 @@ contains
          self%attach_stretch(place) = self%attach_stretch(place - 1)
          self%attach_limit(place) = self%attach_limit(place - 1)
          self%attach_drag(place) = self%attach_drag(place - 1)
+         self%attach_left(place) = self%attach_left(place - 1)
          place = place - 1
       end do
       self%attach_time(place) = due
       self%attach_stiffness(place) = self%birth_stiffness(event)
       self%attach_stretch(place) = self%birth_stretch(event)
       self%attach_limit(place) = self%birth_limit(event)
-      self%attach_drag(place) = self%break_drag(event)
+      self%attach_drag(place) = drag
+      self%attach_left(place) = self%birth_left(event)
       self%attachments = self%attachments + 1
    end subroutine insert_attachment
 
@@ -338,7 +351,8 @@ contains
       end if
       self%is_over = self%is_over .or. any(far) .or. time >= self%end_time &
          & .or. abs(displacement) * self%mean_stiffness >= self%max_force &
-         & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks
+         & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
+         & .or. self%pinned == self%others
       if (self%is_over) return
       if (self%attach_time(self%attached + 1) <= time) then
          call self%attach_with_clocks(time, displacement)
@@ -365,8 +379,11 @@ contains
       call self%stiffness%add(-self%break_stiffness(1))
       call self%offset%add(-self%break_stiffness(1) * origin)
       if (self%break_drag(1) > 0.0_wp) call self%drag%add(self%break_drag(1))
-      ! Those that break now come after all that wait to attach.
-      if (self%came_count == 1) then
+      if (self%has_births) then
+         call self%insert_attachment(merge(entry, max_events - entry, entry > 0), time, &
+            & self%break_drag(1))
+      else if (self%came_count == 1) then
+         ! Those that break now come after all that wait to attach.
          self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
             & time + self%delay)
       end if

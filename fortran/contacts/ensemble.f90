@@ -159,7 +159,7 @@ contains
       schedule%behind = self%behind
       call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule, &
          & contact)
-      call self%list_births(self%listed(:number), pose%direction, schedule)
+      call self%list_births(self%listed(:number), 0, pose%direction, schedule)
       schedule%is_over = .false.
    end subroutine plan
 

@@ -67,6 +67,8 @@ program test_simulation
    call runs_ahead("activated", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("activated", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("activated", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("activated scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("activated scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call is_bounded()
    call refuses()
    call holds()
@@ -428,7 +430,7 @@ contains
       if (slider == "quasistatic") delay = 0.0_wp
       ! Scattered delays, and forces with which contacts attach.
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
-         & 0.1_wp, 1.0_wp, width, merge(0.05_wp, 0.0_wp, contacts == "scattered")]
+         & 0.1_wp, 1.0_wp, width, merge(0.05_wp, 0.0_wp, index(contacts, "scattered") > 0)]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &
@@ -443,7 +445,7 @@ contains
       case ("activated populations")
          call new_parameters(parameters, [character(len=name_length) :: common, activation(3:), &
             & "resolution"], [values, bell(3:), 0.5_wp])
-      case ("activated")
+      case ("activated", "activated scattered")
          call new_parameters(parameters, [character(len=name_length) :: common, activation], &
             & [values, bell])
       case ("activated ageing")
@@ -459,15 +461,15 @@ contains
       call parameters%add_word("threshold_law", law)
       kind = contacts
       law_of_delay = "fixed"
-      if (contacts == "scattered") then
-         kind = "ensemble"
+      if (index(contacts, "scattered") > 0) then
+         kind = merge("activated", "ensemble ", contacts(:1) == "a")
          law_of_delay = "exponential"
       end if
       call parameters%add_word("delay_law", law_of_delay)
       call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
          & contacts(:1) == "a"))))
       if (index(contacts, "ageing") > 0) call parameters%add_word("ageing", "relax")
-      call make_contacts(simulation%contacts, kind, parameters, 1_i8, 0_i8, error)
+      call make_contacts(simulation%contacts, trim(kind), parameters, 1_i8, 0_i8, error)
       call check(.not. allocated(error), "contacts: " // contacts)
 
       recorder = recorder_parameters_type(interval=1.0e-4_wp, duration=0.15_wp)

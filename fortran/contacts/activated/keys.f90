@@ -19,18 +19,18 @@ module mesoslip_contacts_activated_keys
    private
 
    public :: activated_keys_type, set_up_activated, exchange_activated
-   public :: life_clock, life_left, life_key, motions
+   public :: life_clock, life_left, life_key, life_next, motions
 
    !> Stretch over the mean breaking stretch beyond zero at which the sign of a force changes: less
    !> than matters, and more than rounding
    real(wp), parameter :: tiny_stretch = 1.0e-12_wp
    !> Maximum change of the exponents by which keys are rescaled, rather than found anew
    real(wp), parameter :: max_rescaling = 310.0_wp
-   !> Numbers of the life of a contact: the clock it goes by, what was left of its deviate when its
-   !> key was made, and the key. While it is detached the clock is none, and the deviate that of its
-   !> next life, if it has been drawn, or 0
-   integer, parameter :: life_length = 3
-   integer, parameter :: life_clock = 1, life_left = 2, life_key = 3
+   !> Numbers of the life of a contact: the clock it goes by, none while it is detached, what was
+   !> left of its deviate when its key was made, the key, and the deviate of its next life, or 0 if
+   !> that has not been drawn
+   integer, parameter :: life_length = 4
+   integer, parameter :: life_clock = 1, life_left = 2, life_key = 3, life_next = 4
 
    !> Directions of motion, the orders of which come before those of the clocks
    integer, parameter :: motions = 2

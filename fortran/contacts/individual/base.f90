@@ -301,11 +301,11 @@ contains
    end subroutine list_attachments
 
    !> List the next births of the contacts that break in a schedule, if they may attach in it.
-   subroutine list_births(self, contact, direction, schedule)
+   subroutine list_births(self, contact, before, direction, schedule)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Numbers of those that are listed to break
-      integer, intent(in) :: contact(:)
+      !> Numbers of those that are listed to break, and of births listed before
+      integer, intent(in) :: contact(:), before
       !> Sign of the velocity at which they attach
       real(wp), intent(in) :: direction
       !> The schedule
@@ -316,12 +316,12 @@ contains
       schedule%has_births = self%parameters%reattach .and. (allocated(self%births%delay) &
          & .or. .not. self%parameters%delay > 0.0_wp)
       if (.not. schedule%has_births) return
-      call self%list_lives(contact, direction, schedule%birth_stiffness, schedule%birth_limit, &
-         & schedule%birth_stretch)
-      schedule%birth_delay(:size(contact)) = self%parameters%delay
+      call self%list_lives(contact, direction, schedule%birth_stiffness(before + 1:), &
+         & schedule%birth_limit(before + 1:), schedule%birth_stretch(before + 1:))
+      schedule%birth_delay(before + 1:before + size(contact)) = self%parameters%delay
       if (.not. allocated(self%births%delay)) return
       do event = 1, size(contact)
-         schedule%birth_delay(event) = self%births%delay(contact(event))
+         schedule%birth_delay(before + event) = self%births%delay(contact(event))
       end do
    end subroutine list_births
 

@@ -19,8 +19,11 @@ module mesoslip_contacts_individual_scan_order
    real(wp), parameter :: none = huge(1.0_wp)
    !> Contacts in a scan: so many at first, then twice as many each time, up to this part of all
    integer, parameter :: part = 8, min_scan = 64
-   !> Room for contacts that come late, before the sorted ones
-   integer, parameter :: slack = 64
+   !> Room for contacts that come late, before the sorted ones, and the maximum number of those that
+   !> move to make room again
+   integer, parameter :: slack = 64, max_moved = 4096
+   !> Part of all contacts above which those that came late are worth a scan
+   integer, parameter :: late_part = 16
    !> Bins in which contacts are sorted: their number, contacts in one, and the maximum
    integer, parameter :: max_bins = 4096, bin_load = 4, max_load = 64
    !> Keys that are drawn to find a horizon
@@ -389,9 +392,12 @@ contains
       real(wp) :: key
       logical :: is_late
 
+      if (self%late_count > max(slack, size(self%key) / late_part)) call self%rest()
       do
          call self%find_next(is_late)
-         if (self%late_count == 0 .or. self%next == 1) return
+         if (self%late_count == 0) return
+         if (self%next == 1) call make_room(self)
+         if (self%next == 1) return
          key = self%late_key(1)
          contact = self%late_contact(1)
          if (self%next <= self%last) then
@@ -416,6 +422,17 @@ contains
          self%next = self%next - 1
       end do
    end subroutine absorb
+
+   !> Make room before the sorted contacts, if they are few enough.
+   pure subroutine make_room(self)
+      class(scan_order_type), intent(inout) :: self
+
+      if (self%last > max_moved .or. self%last + slack > size(self%near_key)) return
+      self%near_key(slack + 1:slack + self%last) = self%near_key(:self%last)
+      self%near_contact(slack + 1:slack + self%last) = self%near_contact(:self%last)
+      self%next = slack + 1
+      self%last = slack + self%last
+   end subroutine make_room
 
    !> The first contacts in their order: no other contact has the key of one of them.
    pure subroutine preview(self, limit, contact, key, number)

@@ -1,0 +1,322 @@
+!> Schedules of contacts that break by thermal activation: which of them are listed, and the books
+!> of those that came.
+module mesoslip_contacts_activated_lists
+   use mesoslip_contacts_activated_keys, only: activated_keys_type, life_clock, life_key, &
+      & life_left, life_next, motions, set_up_activated
+   use mesoslip_contacts_individual_births, only: drag_of
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_hazard, only: never
+   use mesoslip_interface_law, only: clocks, pose_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_numerics_random, only: uniform_pairs
+   use mesoslip_schedule, only: max_events, schedule_type
+   implicit none
+   private
+
+   public :: activated_lists_type, set_up_lists
+
+   !> Minimum length of a schedule
+   integer, parameter :: min_length = 4
+
+   !> Contacts that break by thermal activation, and write schedules.
+   type, abstract, extends(activated_keys_type) :: activated_lists_type
+      !> Contacts of the schedule, by coordinate and by clock, and those that attach in it
+      integer, private :: listed(max_events) = 0, clock_listed(max_events) = 0, &
+         & attaching(max_events) = 0
+      !> Length of the next schedule, by how far the slider came in the last one
+      integer, private :: max_length = max_events
+      !> Entry of each contact in the list by coordinate, 0 but while lists are written
+      integer, allocatable, private :: entry(:)
+   contains
+      procedure :: plan
+      !> Find where the clocks come to their next keys
+      procedure, non_overridable :: set_next
+      !> Draw the deviates of the next lives of contacts
+      procedure, non_overridable :: draw_deviates
+      !> Keep the books of the contacts of a schedule
+      procedure, non_overridable :: settle_lists
+      procedure, non_overridable, private :: list_attaching, list_breaks, detach_came, turn_came, &
+         & attach_came
+   end type activated_lists_type
+
+contains
+
+   !> Set up contacts that write schedules.
+   subroutine set_up_lists(self, parameters, error)
+      !> The contacts, of which is known what is common to all kinds
+      class(activated_lists_type), intent(inout) :: self
+      !> The other numbers: columns and rows, rate and force of activation
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
+
+      call set_up_activated(self, parameters, error)
+      allocate (self%entry(self%parameters%count), source=0, stat=stat)
+      if (stat /= 0) call raise(error, status_memory, "not enough memory for lists of contacts")
+   end subroutine set_up_lists
+
+   !> Find where the clocks come to their next keys.
+   subroutine set_next(self)
+      class(activated_lists_type), intent(inout) :: self
+
+      integer :: number
+
+      self%hazard%is_used = self%members > 0
+      do number = 1, clocks
+         if (self%members(number) > 0) then
+            call self%order(motions + number)%first(self%hazard%next(number))
+         end if
+      end do
+   end subroutine set_next
+
+   !> Draw the deviates of the next lives of contacts that have none yet.
+   subroutine draw_deviates(self, contact, later)
+      class(activated_lists_type), intent(inout) :: self
+      !> Their numbers, at most max_events
+      integer, intent(in) :: contact(:)
+      !> Renewals until those lives: 1 for pinned contacts
+      integer(i8), intent(in) :: later
+
+      integer :: number, position, drawn(max_events)
+      integer(i8) :: key(max_events), renewal(max_events)
+      real(wp) :: first(max_events), second(max_events)
+
+      number = 0
+      do position = 1, size(contact)
+         if (self%life(life_next, contact(position)) > 0.0_wp) cycle
+         number = number + 1
+         drawn(number) = contact(position)
+         key(number) = int(contact(position) - 1, i8)
+         renewal(number) = int(self%record(row_renewal, contact(position)), i8) + later
+      end do
+      if (number == 0) return
+      call uniform_pairs(self%parameters%seed, self%parameters%realization, key(:number), &
+         & renewal(:number), 1_i8, first(:number), second(:number))
+      do position = 1, number
+         self%life(life_next, drawn(position)) = -log(first(position))
+      end do
+   end subroutine draw_deviates
+
+   !> Write a schedule of what comes next: breaks at thresholds and by the clock of those whose
+   !> force has the sign of the motion, and attachments.
+   subroutine plan(self, pose, limit, schedule)
+      !> The contacts
+      class(activated_lists_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
+      !> The schedule; at its end if there is none
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: length, number
+
+      schedule%is_over = .true.
+      if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
+      schedule%number = merge(1, 2, self%direction > 0.0_wp)
+      if (self%members(schedule%number) == 0) return
+      length = min(limit, self%max_length)
+      call self%list_breaks(length, schedule)
+      if (schedule%breaks == 0 .or. schedule%clock_breaks == 0) return
+      schedule%has_clocks = .true.
+      call self%set_next()
+      schedule%hazard = self%hazard
+      schedule%hazard%next(schedule%number) = schedule%clock_key(1)
+      schedule%direction = self%direction
+      schedule%behind = self%behind
+      schedule%tiny_stretch = self%distance_behind(schedule%number, 0.0_wp)
+      schedule%break_stiffness(1) = self%parameters%stiffness
+      schedule%break_drag(1) = drag_of(self%parameters, self%parameters%stiffness)
+      call self%list_attaching(length, pose%direction, schedule)
+      schedule%is_over = .false.
+   end subroutine plan
+
+   !> List the next attachments, and the births of those that may attach in the schedule.
+   subroutine list_attaching(self, limit, direction, schedule)
+      class(activated_lists_type), intent(inout) :: self
+      !> Maximum number of attachments
+      integer, intent(in) :: limit
+      !> Sign of the velocity at which they attach
+      real(wp), intent(in) :: direction
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: event
+
+      call self%list_attachments(limit, direction, schedule, self%attaching)
+      do event = 1, schedule%attachments
+         ! One that goes by the other clock ends the schedule.
+         if (direction * schedule%attach_stretch(event) < 0.0_wp) exit
+      end do
+      schedule%attachments = event - 1
+      associate (attaching => self%attaching(:schedule%attachments))
+         call self%draw_deviates(attaching, 0_i8)
+         do event = 1, schedule%attachments
+            schedule%attach_left(event) = self%life(life_next, attaching(event))
+         end do
+      end associate
+      associate (listed => self%listed(:schedule%breaks), &
+         & clock_listed => self%clock_listed(:merge(0, schedule%clock_breaks, &
+         & schedule%clock_stop > 0)))
+         call self%list_births(listed, 0, direction, schedule)
+         if (.not. schedule%has_births) return
+         call self%list_births(clock_listed, max_events, direction, schedule)
+         call self%draw_deviates(listed, 1_i8)
+         call self%draw_deviates(clock_listed, 1_i8)
+         do event = 1, size(listed)
+            schedule%birth_left(event) = self%life(life_next, listed(event))
+         end do
+         do event = 1, size(clock_listed)
+            schedule%birth_left(max_events + event) = self%life(life_next, clock_listed(event))
+         end do
+      end associate
+   end subroutine list_attaching
+
+   !> List the next breaks at thresholds, those whose forces get the sign of the motion with them,
+   !> and breaks by the clock. That list ends at a key that is not known.
+   subroutine list_breaks(self, limit, schedule)
+      class(activated_lists_type), intent(inout) :: self
+      !> Maximum length of each list
+      integer, intent(in) :: limit
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: event, other, first
+
+      call self%order(self%ahead)%preview(limit, self%listed, &
+         & schedule%break_coordinate, schedule%breaks)
+      call self%order(motions + schedule%number)%preview(limit, self%clock_listed, &
+         & schedule%clock_key, schedule%clock_breaks)
+      schedule%clock_stop = 0
+      schedule%turned = 0
+      other = clocks + 1 - schedule%number
+      schedule%others = self%members(other)
+      schedule%other_first = 0
+      first = 0
+      if (schedule%others > 0) call self%order(motions + other)%due(never, first)
+      schedule%broken = 0
+      schedule%clock_broken = 0
+      schedule%came_count = 0
+      schedule%moments = 0
+      do event = 1, schedule%breaks
+         associate (contact => self%listed(event))
+            schedule%break_origin(event) = self%record(row_origin, contact)
+            schedule%break_turns(event) = int(self%life(life_clock, contact)) /= schedule%number
+            if (schedule%break_turns(event)) then
+               schedule%turn_limit(event) = self%record(row_limit, contact)
+               schedule%turn_left(event) = self%life(life_left, contact)
+               schedule%turn_key(event) = self%life(life_key, contact)
+               if (contact == first) schedule%other_first = event
+            else
+               self%entry(contact) = event
+            end if
+         end associate
+      end do
+      schedule%break_twin(:schedule%breaks) = 0
+      schedule%break_gone(:schedule%breaks) = .false.
+      do event = 1, schedule%clock_breaks
+         associate (contact => self%clock_listed(event))
+            schedule%clock_origin(event) = self%record(row_origin, contact)
+            schedule%clock_twin(event) = self%entry(contact)
+            if (self%entry(contact) > 0) schedule%break_twin(self%entry(contact)) = event
+         end associate
+      end do
+      schedule%clock_gone(:schedule%clock_breaks) = .false.
+      do event = 1, schedule%breaks
+         self%entry(self%listed(event)) = 0
+      end do
+      if (schedule%clock_breaks == 0) then
+         call self%order(motions + schedule%number)%first(schedule%clock_key(1))
+         if (.not. schedule%clock_key(1) < never) then
+            schedule%clock_breaks = 1
+            schedule%clock_stop = 1
+            schedule%clock_twin(1) = 0
+            schedule%clock_gone(1) = .false.
+         end if
+      end if
+   end subroutine list_breaks
+
+   !> Keep the books of the contacts of a schedule.
+   subroutine settle_lists(self, schedule)
+      !> The contacts
+      class(activated_lists_type), intent(inout) :: self
+      !> The schedule, as far as the slider came
+      type(schedule_type), intent(in) :: schedule
+
+      self%max_length = min(max_events, max(min_length, &
+         & 2 * max(schedule%came_count + schedule%turned, schedule%attached)))
+      self%hazard = schedule%hazard
+      call self%detach_came(schedule)
+      call self%turn_came(schedule)
+      call self%attach_came(schedule)
+      self%behind = schedule%behind
+   end subroutine settle_lists
+
+   !> Keep the books of the contacts of a schedule that broke.
+   subroutine detach_came(self, schedule)
+      class(activated_lists_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+
+      real(wp) :: delay
+      integer :: event, contact
+
+      delay = self%parameters%delay
+      do event = 1, schedule%came_count
+         if (schedule%came(event) > 0) then
+            contact = self%listed(schedule%came(event))
+         else
+            contact = self%clock_listed(-schedule%came(event))
+         end if
+         call self%take_out(contact)
+         self%life(:life_key, contact) = 0.0_wp
+         if (allocated(self%births%delay)) delay = self%births%delay(contact)
+         self%record(row_stiffness, contact) = 0.0_wp
+         self%record(row_renewal, contact) = self%record(row_renewal, contact) + 1.0_wp
+         call self%break_loss%add(0.5_wp * schedule%break_stiffness(1) &
+            & * (schedule%break_displacement(event) - self%record(row_origin, contact))**2)
+         call self%detached%push(contact, schedule%break_time(event) + delay, &
+            & schedule%break_drag(1))
+      end do
+      self%breaks = self%breaks + schedule%came_count
+      self%stiffness = schedule%stiffness
+      self%offset = schedule%offset
+      self%drag = schedule%drag
+   end subroutine detach_came
+
+   !> Keep the books of the contacts of a schedule whose forces changed their signs.
+   subroutine turn_came(self, schedule)
+      class(activated_lists_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event
+
+      if (schedule%turned == 0) return
+      do event = 1, schedule%broken
+         if (.not. schedule%break_turns(event)) cycle
+         associate (contact => self%listed(event))
+            call self%take_out(contact)
+            self%life(:life_key, contact) = [real(schedule%number, wp), &
+               & schedule%turn_left(event), schedule%turn_key(event)]
+            call self%place(contact)
+         end associate
+      end do
+   end subroutine turn_came
+
+   !> Keep the books of the contacts of a schedule that attached.
+   subroutine attach_came(self, schedule)
+      class(activated_lists_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event, contact(max_events)
+
+      call self%attach_listed(schedule, contact)
+      do event = 1, schedule%attached
+         self%life(:, contact(event)) = [real(schedule%number, wp), schedule%attach_left(event), &
+            & schedule%attach_key(event), 0.0_wp]
+         call self%place(contact(event))
+      end do
+   end subroutine attach_came
+
+end module mesoslip_contacts_activated_lists

@@ -261,7 +261,7 @@ contains
          self%attach_stretch(place) = self%attach_stretch(place - 1)
          self%attach_limit(place) = self%attach_limit(place - 1)
          self%attach_drag(place) = self%attach_drag(place - 1)
-         self%attach_left(place) = self%attach_left(place - 1)
+         if (self%has_clocks) self%attach_left(place) = self%attach_left(place - 1)
          place = place - 1
       end do
       self%attach_time(place) = due
@@ -269,7 +269,7 @@ contains
       self%attach_stretch(place) = self%birth_stretch(event)
       self%attach_limit(place) = self%birth_limit(event)
       self%attach_drag(place) = drag
-      self%attach_left(place) = self%birth_left(event)
+      if (self%has_clocks) self%attach_left(place) = self%birth_left(event)
       self%attachments = self%attachments + 1
    end subroutine insert_attachment
 

@@ -132,15 +132,17 @@ def test_commands_import_what_they_need(short, tmp_path, command):
     )
     commands = [
         ["info", str(short)],
+        ["run", str(short), "-o", str(tmp_path / "again.nc"), "--quiet"],
+        ["slips", str(output), "--json"],
         ["slips", str(output)],
-        ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
         ["regime", str(output)],
+        ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
         ["plot", str(output), "-o", str(tmp_path / "short.png")],
     ]
     code = f"""
 import json, sys
 from mesoslip.command_line.main import main
-large = ["dask", "matplotlib", "netCDF4", "pandas", "pint"]
+large = ["dask", "matplotlib", "netCDF4", "pandas", "pint", "xarray"]
 large += [f"scipy.{{one}}" for one in ("interpolate", "linalg", "optimize", "special", "stats")]
 stdout, found = sys.stdout, []
 for arguments in {commands}:
@@ -155,7 +157,15 @@ import dask.array, pint
 json.dump(found, stdout)
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-    assert json.loads(done.stdout) == [[], ["netCDF4", "pandas"], [], [], ["matplotlib"]]
+    assert json.loads(done.stdout) == [
+        [],
+        ["netCDF4"],
+        [],
+        [],
+        [],
+        ["pandas", "xarray"],
+        ["matplotlib"],
+    ]
 
 
 @pytest.mark.parametrize(

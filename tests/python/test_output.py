@@ -16,6 +16,7 @@ import xarray as xr
 from conftest import ROOT, klein_tables
 from kinds import configuration
 from mesoslip.output import files, filling, targets, writing
+from mesoslip.output.arrays import Arrays
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import run_realizations
@@ -96,6 +97,28 @@ def assert_same(one: xr.DataTree, other: xr.DataTree) -> None:
             assert variable.values.tobytes() == twin.values.tobytes(), name
 
 
+def assert_same_arrays(path):
+    """Whether an output that is read without xarray is the one that is read with it."""
+    whole = mesoslip.open_output(path)
+    with files.opened_arrays(path) as tree:
+        assert isinstance(tree, Arrays)
+        assert tree.attrs == whole.attrs
+        assert tree.children.keys() == whole.children.keys()
+        assert tree.coords.keys() == whole.coords.keys()
+        assert tree.data_vars.keys() == whole.data_vars.keys()
+        for name in ("", *tree.children):
+            group = tree.children[name] if name else tree
+            data = (whole[name] if name else whole).to_dataset(inherit=False)
+            assert group.keys() == data.variables.keys()
+            assert {one: data.sizes[one] for one in group.sizes} == group.sizes
+            for key, variable in group.items():
+                assert variable.dims == data[key].dims
+                assert variable.dtype == data[key].dtype
+                assert variable.attrs["units"] == data[key].attrs["units"]
+                np.testing.assert_array_equal(variable.values, data[key].values)
+                np.testing.assert_array_equal(variable[:1].values, data[key][:1].values)
+
+
 def test_both_ways_to_write_give_the_same(results, tmp_path):
     """Block by block or as a tree: the same values to the bit, attributes, types and encodings."""
     tree = build_tree(results)
@@ -114,6 +137,7 @@ def test_both_ways_to_write_give_the_same(results, tmp_path):
                     mine, others = (set((one or "").split()) for one in (mine, others))
                 np.testing.assert_equal(mine, others, err_msg=f"{node.path} {name} {key}")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["built.nc", "streamed.nc"]
+    assert_same_arrays(tmp_path / "streamed.nc")
 
 
 def test_rows_of_the_kernel_become_variables(results):
@@ -302,6 +326,7 @@ def test_files_of_earlier_versions_are_read():
     assert "slips" in tree._repr_html_()
     assert tree.isel(realization=0).sel(time=slice(0, 1)).sizes["time"] > 0
     assert len(mesoslip.slips(tree)["waiting_time"]) == len(numbers)
+    assert_same_arrays(path)
 
 
 def test_extremes_of_stages_in_earlier_files_have_the_names_of_today(klein, tmp_path):
@@ -316,6 +341,14 @@ def test_extremes_of_stages_in_earlier_files_have_the_names_of_today(klein, tmp_
     stages = mesoslip.open_output(path)["stages"]
     np.testing.assert_array_equal(stages["max_force_time"].values, expected)
     assert not [name for name in stages.data_vars if name.startswith(("greatest", "least"))]
+    assert_same_arrays(path)
+    # Values that another program has packed are decoded.
+    with netCDF4.Dataset(path, "a") as file:
+        force = file["spring_force"]
+        doubled = 2 * force[:]
+        force.scale_factor = 2.0
+    with files.opened_arrays(path) as tree:
+        np.testing.assert_array_equal(tree["spring_force"].values, doubled)
 
 
 def test_what_a_killed_process_left_behind_is_removed(tmp_path):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import tomllib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.access import group_of, is_measured
-
-if TYPE_CHECKING:
-    import xarray as xr
+from mesoslip.output.arrays import Tree
 
 # Variables that hold the force of an output, the first that is there, and their units.
 FORCES = {"spring_force": "N", "friction_coefficient": "1"}
@@ -65,7 +63,7 @@ class Apparatus:
         return -1.0 if self.velocity < 0 else 1.0
 
 
-def apparatus_of(tree: xr.DataTree, name: str = "the output") -> Apparatus:
+def apparatus_of(tree: Tree, name: str = "the output") -> Apparatus:
     """What an output says about its apparatus.
 
     Parameters
@@ -105,7 +103,7 @@ def apparatus_of(tree: xr.DataTree, name: str = "the output") -> Apparatus:
     return Apparatus(force, unit, stiffness, period, velocity, None)
 
 
-def _config(tree: xr.DataTree, name: str) -> Config | None:
+def _config(tree: Tree, name: str) -> Config | None:
     """The whole configuration; None for a measured trace with a part of it."""
     try:
         return Config.from_toml(tree.attrs["configuration"])
@@ -123,7 +121,7 @@ def _known(tables: dict[str, Any], key: tuple[str, str], unit: str, example: str
     return float(value) if isinstance(value, int | float) else to_si(value, unit, example)
 
 
-def _driven_velocity(tree: xr.DataTree) -> float:
+def _driven_velocity(tree: Tree) -> float:
     """First velocity of the recorded stages that is not 0, or the mean one of the load point."""
     if "stages" in tree.children:
         data = group_of(tree, "stages")

@@ -8,9 +8,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import apparatus_of
@@ -18,6 +18,10 @@ from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of, is_measured
+from mesoslip.output.arrays import Arrays, Tree
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -152,7 +156,7 @@ class Experiment:
         If it has no force, its drive is unknown, or a force acts on a slider without mass.
     """
 
-    def __init__(self, tree: xr.DataTree, name: str = "the output") -> None:
+    def __init__(self, tree: Tree, name: str = "the output") -> None:
         self.apparatus = apparatus_of(tree, name)
         self.config = self.apparatus.config
         self.is_forced = self.config is not None and self.config.drive.is_force
@@ -178,7 +182,7 @@ class Experiment:
         )
         self.stages = self._stages()
 
-    def _drive(self, root: xr.Dataset) -> Array:
+    def _drive(self, root: xr.Dataset | Arrays) -> Array:
         """Displacement of the load point [m]; of a measured trace without one that of a constant
         velocity."""
         if "drive_displacement" in root:
@@ -194,7 +198,7 @@ class Experiment:
         elapsed: Array = time - time[0]
         return self.apparatus.velocity * elapsed
 
-    def _displacement(self, root: xr.Dataset, count: int) -> Array:
+    def _displacement(self, root: xr.Dataset | Arrays, count: int) -> Array:
         """Displacement of the slider [m]: recorded, or the load point less the stretch of the
         spring, or that of the load point if the stiffness is unknown."""
         if "displacement" in root:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.stick_phases import stick_phases
 from mesoslip.output.access import group_of
+from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.tables import write_table
 
@@ -39,8 +41,11 @@ COLUMNS = (
 )
 
 
-# Further columns of the catalogue, and units of those that do not hang on that of the force.
+# What the columns are that the group of an output does not have, and units of those that do not
+# hang on that of the force.
 MEANINGS = {
+    "duration": "duration of the slip",
+    "waiting_time": "time since the start of the slip before",
     "stick_duration": "time since the end of the slip before",
     "loading_rate": "rate of the force while the slider sticks",
     "loading_stiffness": "growth of the force over the displacement of the drive",
@@ -48,7 +53,15 @@ MEANINGS = {
     "creep_share": "its share of the displacement of the drive",
     "peak_fall_rate": "maximum rate at which the force fell in the slip",
 }
-UNITS = {"stick_duration": "s", "creep_displacement": "m", "creep_share": "1"}
+UNITS = {
+    "duration": "s",
+    "waiting_time": "s",
+    "stick_duration": "s",
+    "creep_displacement": "m",
+    "creep_share": "1",
+}
+# Those of them that need the trace.
+STICK_COLUMNS = tuple(MEANINGS)[2:]
 
 
 # Units of forces where the trace is a friction coefficient.
@@ -68,6 +81,102 @@ def as_recorded(head: str, unit: str, force_unit: str) -> tuple[str, str]:
     if force_unit != "1":
         return head, unit
     return head.replace("force", "friction"), COEFFICIENT_UNITS.get(unit, unit)
+
+
+class Column(NamedTuple):
+    """A column of a catalogue: values of shape (slips,) in SI, their unit, and what they are."""
+
+    values: NDArray[Any]
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """The catalogue of slips of an output.
+
+    Attributes
+    ----------
+    columns
+        The columns `COLUMNS` by name, see `slips`.
+    force_unit
+        Unit of the force, "N", or "1" of a friction coefficient.
+    """
+
+    columns: Mapping[str, Column]
+    force_unit: str
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A dictionary for each slip; None for unknown values."""
+        columns = [self.columns[name].values.tolist() for name in COLUMNS]
+        return [
+            {
+                name: None if value != value else value
+                for name, value in zip(COLUMNS, row, strict=True)
+            }
+            for row in zip(*columns, strict=True)
+        ]
+
+    @property
+    def statistics(self) -> dict[str, dict[str, float]]:
+        """Number of slips; mean, standard deviation, minimum and maximum of each column, in SI.
+
+        The first slip of a run counts too.
+        """
+        count = float(len(self.columns["start_time"].values))
+        result: dict[str, dict[str, float]] = {"slips": {"count": count}}
+        for name in COLUMNS[3:]:
+            values = self.columns[name].values
+            values = values[np.isfinite(values)]
+            if values.size:
+                result[name] = {
+                    "mean": float(np.mean(values)),
+                    "standard_deviation": float(np.std(values)),
+                    "minimum": float(np.min(values)),
+                    "maximum": float(np.max(values)),
+                }
+        return result
+
+    def write_csv(self, path: Path) -> None:
+        """Write the catalogue as a table with the units in its header.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        write_table(self.rows, {name: self.columns[name].unit for name in COLUMNS}, path)
+
+
+def catalogue_of(tree: Tree) -> Catalogue:
+    """The catalogue of slips of an output of a run or a measured trace."""
+    data = group_of(tree, "slips")
+    start, owners = data["start_time"].values, data["realization_index"].values
+    waiting = np.diff(start, prepend=np.nan)
+    if start.size:
+        waiting[np.diff(owners, prepend=-1) != 0] = np.nan
+    apparatus = apparatus_of(tree)
+    unit = apparatus.force_unit
+    units = dict.fromkeys(("force_before", "force_after", "force_drop"), unit) | {
+        "loading_rate": _over(unit, "s"),
+        "loading_stiffness": _over(unit, "m"),
+        "peak_fall_rate": _over(unit, "s"),
+    }
+    duration = data["end_time"].values - start
+    added = dict(
+        zip(MEANINGS, (duration, waiting, *_stick_columns(tree, data, apparatus)), strict=True)
+    )
+    columns = {}
+    for name in COLUMNS:
+        if name in added:
+            given = units.get(name, UNITS.get(name, "1"))
+            columns[name] = Column(added[name], given, MEANINGS[name])
+        else:
+            attributes = data[name].attrs
+            given = units.get(name, attributes.get("units", "1"))
+            columns[name] = Column(data[name].values, given, attributes.get("long_name", name))
+    return Catalogue(columns, unit)
 
 
 def slips(output: OutputLike) -> xr.Dataset:
@@ -91,35 +200,17 @@ def slips(output: OutputLike) -> xr.Dataset:
     import xarray as xr
 
     tree = as_run(output)
-    data = group_of(tree, "slips").set_coords("realization_index")
-    duration = data["end_time"] - data["start_time"]
-    waiting = np.diff(data["start_time"].values, prepend=np.nan)
-    if data.sizes["slip"]:
-        waiting[np.diff(data["realization_index"].values, prepend=-1) != 0] = np.nan
-    apparatus = apparatus_of(tree)
-    unit = apparatus.force_unit
-    units = {
-        "loading_rate": _over(unit, "s"),
-        "loading_stiffness": _over(unit, "m"),
-        "peak_fall_rate": _over(unit, "s"),
-    }
-    further: dict[str, Any] = {
-        name: xr.Variable(
-            "slip", values, {"units": units.get(name, UNITS.get(name)), "long_name": meaning}
-        )
-        for (name, meaning), values in zip(
-            MEANINGS.items(), _stick_columns(tree, data, apparatus), strict=True
-        )
-    }
-    found = data.assign(
-        duration=duration.assign_attrs(units="s", long_name="duration of the slip"),
-        waiting_time=xr.Variable(
-            "slip", waiting, {"units": "s", "long_name": "time since the start of the slip before"}
-        ),
-        **further,
+    columns = catalogue_of(tree).columns
+    found = group_of(tree, "slips").set_coords("realization_index")
+    found = found.assign(
+        {
+            name: xr.Variable("slip", values, {"units": unit, "long_name": meaning})
+            for name, (values, unit, meaning) in columns.items()
+            if name in MEANINGS
+        }
     )
     for name in ("force_before", "force_after", "force_drop"):
-        found[name].attrs["units"] = unit
+        found[name].attrs["units"] = columns[name].unit
     return found
 
 
@@ -129,15 +220,15 @@ def _over(unit: str, base: str) -> str:
 
 
 def _stick_columns(
-    tree: xr.DataTree, data: xr.Dataset, apparatus: Apparatus
+    tree: Tree, data: xr.Dataset | Arrays, apparatus: Apparatus
 ) -> Iterable[NDArray[np.float64]]:
-    """Columns of the stick phases, and the peak rate of fall, in the order of `MEANINGS`."""
+    """Columns of the stick phases, and the peak rate of fall, in the order of `COLUMNS`."""
     root = tree.to_dataset()
     owners = data["realization_index"].values
     time = root["time"].values
     # The catalogue of an elastic slider is that of its mean force.
     name = "elastic_force" if "elastic_force" in root else apparatus.force_name
-    columns = {one: np.full(len(owners), np.nan) for one in MEANINGS}
+    columns = {one: np.full(len(owners), np.nan) for one in STICK_COLUMNS}
     is_good = np.ones(len(time), dtype=bool)
     if "noise" in tree.children:
         is_good = ~np.isin(time, group_of(tree, "noise")["impulse_time"].values)
@@ -171,36 +262,7 @@ def _stick_columns(
     return columns.values()
 
 
-def statistics(tree: xr.DataTree) -> dict[str, dict[str, float]]:
-    """Number of slips; mean, standard deviation, minimum and maximum of each column, in SI.
-
-    The first slip of a run counts too.
-    """
-    data = slips(tree)
-    result: dict[str, dict[str, float]] = {"slips": {"count": float(data.sizes["slip"])}}
-    for name in COLUMNS[3:]:
-        values = data[name].values[np.isfinite(data[name].values)]
-        if values.size:
-            result[name] = {
-                "mean": float(np.mean(values)),
-                "standard_deviation": float(np.std(values)),
-                "minimum": float(np.min(values)),
-                "maximum": float(np.max(values)),
-            }
-    return result
-
-
-def rows(tree: xr.DataTree) -> list[dict[str, Any]]:
-    """The catalogue, a dictionary for each slip; None for unknown values."""
-    data = slips(tree)
-    columns = [data[name].values.tolist() for name in COLUMNS]
-    return [
-        {name: None if value != value else value for name, value in zip(COLUMNS, row, strict=True)}
-        for row in zip(*columns, strict=True)
-    ]
-
-
-def counts(tree: xr.DataTree) -> dict[str, Any] | None:
+def counts(tree: Tree) -> dict[str, Any] | None:
     """Numbers of slips of a measured trace by minimum fall; None for runs.
 
     ``used`` is the minimum fall of the catalogue, ``plateau`` the range in which the number hardly
@@ -216,16 +278,3 @@ def counts(tree: xr.DataTree) -> dict[str, Any] | None:
         "used": float(data.attrs["used"]),
         "plateau": None if plateau is None else [float(one) for one in plateau],
     }
-
-
-def write_csv(tree: xr.DataTree, path: Path) -> None:
-    """Write the catalogue as a table with the units in its header.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
-    data = slips(tree)
-    units = {name: data[name].attrs.get("units", "1") for name in COLUMNS}
-    write_table(rows(tree), units, path)

@@ -52,29 +52,29 @@ def slips(
     as_json: JsonOption = False,
 ) -> None:
     """Print the catalogue of slips, with statistics."""
-    from mesoslip.analysis import slips as catalogue
-    from mesoslip.analysis.apparatus import apparatus_of
+    from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
     from mesoslip.output.tables import PrintedTable, is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
-    tree = files.read_run(output)
+    with files.opened_arrays(output) as tree:
+        catalogue, counts = catalogues.catalogue_of(tree), catalogues.counts(tree)
+        has_several = tree.sizes["realization"] > 1
     if table is not None and not is_printed(table):
-        catalogue.write_csv(tree, table)
-    rows, statistics = catalogue.rows(tree), catalogue.statistics(tree)
-    counts = catalogue.counts(tree)
+        catalogue.write_csv(table)
+    rows, statistics = catalogue.rows, catalogue.statistics
     # Columns of which nothing is known, as breaks of a measured trace, are left out.
     shown = [name for name in COLUMNS if not rows or any(row[name] is not None for row in rows)]
-    force_unit = apparatus_of(tree).force_unit
+    force_unit = catalogue.force_unit
     heads, columns = {}, {}
     for name in shown:
-        heads[name], unit = catalogue.as_recorded(*COLUMNS[name], force_unit)
+        heads[name], unit = catalogues.as_recorded(*COLUMNS[name], force_unit)
         columns[name] = column([row[name] for row in rows], unit, 5)
     in_table = [name for name in shown if name not in STATISTICS_ONLY]
     table_rows = [[columns[name].head(heads[name]) for name in in_table]]
     table_rows += [[columns[name].text(row[name]) for name in in_table] for row in rows]
-    if tree.sizes["realization"] > 1:
+    if has_several:
         owners = ["realization", *(str(row["realization_index"]) for row in rows)]
         table_rows = [[owner, *row] for owner, row in zip(owners, table_rows, strict=True)]
     if table is not None and is_printed(table):
@@ -205,33 +205,33 @@ def avalanches(
 
 def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
     """Print the regime of motion: smooth, stick-slip, irregular or transient."""
-    from mesoslip.analysis import regime as regimes
-    from mesoslip.analysis.regime import NAMES, REGIME, results_of, summary
+    from mesoslip.analysis.regime import NAMES, REGIME, judge, summary
+    from mesoslip.output import files
 
-    data = regimes.regime(output)
-    results = results_of(data)
+    with files.opened_arrays(output) as tree:
+        results, motion = judge(tree, str(output))
+        realizations = tree.to_dataset()["realization"].values.tolist()
     if as_json:
-        names = [NAMES[one.regime] for one in results]
-        columns = {str(name): data[name].values.tolist() for name in data.variables}
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        print_json([{**row, "regime": name} for row, name in zip(rows, names, strict=True)])
+        rows = [
+            {**one.row, "realization": number, "regime": NAMES[one.regime]}
+            for number, one in zip(realizations, results, strict=True)
+        ]
+        print_json(rows)
         return
-    if "motion" in data.attrs:
-        typer.echo(
-            f"a slider under a force has no cycles; in its last stage it {data.attrs['motion']}"
-        )
+    if motion is not None:
+        typer.echo(f"a slider under a force has no cycles; in its last stage it {motion}")
         typer.echo(
             "Under a force there are no cycles: mesoslip response prints creep and static friction."
         )
         return
-    for index, one in zip(data["realization"].values.tolist(), results, strict=True):
+    for index, one in zip(realizations, results, strict=True):
         if len(results) > 1:
             typer.echo(f"realization {index}")
         for name, meaning in REGIME.items():
             if name == "regime" or name.endswith("_error"):
                 continue
             error = getattr(one, f"{name}_error", None)
-            show(name, getattr(one, name), meaning.units, meaning.long_name, error)
+            show(name, one.row[name], meaning.units, meaning.long_name, error)
         typer.echo(one.summary)
     if len(results) > 1:
         typer.echo(summary(results))

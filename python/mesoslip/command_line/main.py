@@ -64,6 +64,8 @@ WITHOUT_XARRAY = {
     mean_field.mean_field,
     explore.explore,
     example.example,
+    catalogues.slips,
+    catalogues.regime,
 }
 
 # How to install the libraries that the kernels are linked to.

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis import slips
 from mesoslip.analysis.regime import regimes, results_of
+from mesoslip.analysis.slips import catalogue_of
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, MesoslipError
 from mesoslip.output.access import group_of
@@ -97,7 +97,7 @@ class Measured:
                 "the trace has friction coefficients, and the model forces: give the "
                 "normal_force in the table [trace] of mesoslip trace"
             )
-        self.means = slips.statistics(self.tree)
+        self.means = catalogue_of(self.tree).statistics
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ def _forces(
 
 def _comparison(tree: xr.DataTree, measured: Measured) -> list[tuple[str, str]]:
     """Means over the slips of a run, and of a measured trace."""
-    means = slips.statistics(tree)
+    means = catalogue_of(tree).statistics
     found = []
     for name, unit in COMPARED.items():
         both = (one[name]["mean"] if name in one else None for one in (means, measured.means))

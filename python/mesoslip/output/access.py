@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError
+from mesoslip.output.arrays import Arrays, Tree
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def is_measured(tree: xr.DataTree) -> bool:
+def is_measured(tree: Tree) -> bool:
     """Whether an output is a measured trace, and no run."""
     return bool(tree.attrs.get("origin") == "measured")
 
@@ -33,12 +34,22 @@ def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
         ) from None
 
 
-def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
+@overload
+def group_of(tree: xr.DataTree, name: str) -> xr.Dataset: ...
+
+
+@overload
+def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays: ...
+
+
+def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays:
     """A group of an output alone, without the coordinates of the root that it does not use.
 
     So that `xarray.Dataset.to_dataframe` has a row for each row of the group, not for each pair of
     it and a time of the trace.
     """
+    if isinstance(tree, Arrays):
+        return tree.children[name]
     data = tree.children[name].to_dataset()
     return data[list(data.data_vars)]
 

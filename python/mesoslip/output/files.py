@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import netCDF4
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError
+from mesoslip.output.arrays import Tree, arrays_of
 from mesoslip.output.file_locks import lock_held
 from mesoslip.output.hdf5 import LOCK, check_links
 from mesoslip.output.old_names import renamed
@@ -20,6 +21,9 @@ from mesoslip.output.variables import has_force
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# What is built of a file.
+T = TypeVar("T", bound=Tree)
 
 # Memory for chunks of each variable that is read; the library's own is 64 MB.
 CHUNK_CACHE = 2**22
@@ -46,8 +50,24 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
         If there is no such file, it is not an output of mesoslip, it is damaged, or it refers to
         other files.
     """
-    import xarray as xr
+    with _opened(path, _tree) as tree:
+        yield tree
 
+
+@contextmanager
+def opened_arrays(path: str | Path) -> Iterator[Tree]:
+    """An output of ``mesoslip run`` without xarray, for what `Arrays` has; see `opened`.
+
+    A file whose values must be decoded is read by xarray.
+    """
+    with _opened(path, lambda file: arrays_of(file) or _tree(file)) as tree:
+        check_run(tree, path)
+        yield tree
+
+
+@contextmanager
+def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator[T]:
+    """What is built of the groups of a file; see `opened`."""
     path = Path(path)
     if is_directory(path):
         raise FileError(f"{path}: is a directory, not an output file")
@@ -55,10 +75,7 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
     with ExitStack() as stack:
         try:
             check_links(path)
-            groups = _groups(path, stack)
-            tree = xr.DataTree.from_dict(
-                {name: renamed(name.strip("/"), data) for name, data in groups.items()}
-            )
+            tree = _built(path, stack, build)
             check_layout(tree, path)
         except DAMAGES as error:
             raise FileError(f"{path}: {lock_held(path) or 'a damaged netCDF-4 file'}") from error
@@ -71,28 +88,33 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
             raise
 
 
-def _groups(path: Path, stack: ExitStack) -> dict[str, xr.Dataset]:
-    """The groups of a file, with small chunk caches, closed with a stack."""
-    import xarray as xr
-    from xarray.backends import NetCDF4DataStore
-
-    store: Any = NetCDF4DataStore
-    groups = {}
+def _built(path: Path, stack: ExitStack, build: Callable[[netCDF4.Dataset], T]) -> T:
+    """What is built of a file, which has small chunk caches and is closed with a stack."""
     with LOCK:
         before = netCDF4.get_chunk_cache()
         netCDF4.set_chunk_cache(CHUNK_CACHE)
         try:
             file = netCDF4.Dataset(path)
             stack.callback(_close, file)
-            found = [file]
-            while found:
-                group = found.pop(0)
-                found += group.groups.values()
-                # Data are read later with this lock too.
-                groups[group.path] = xr.open_dataset(store(group, lock=LOCK))
+            return build(file)
         finally:
             netCDF4.set_chunk_cache(*before)
-    return groups
+
+
+def _tree(file: netCDF4.Dataset) -> xr.DataTree:
+    """All groups of a file, with the names of today."""
+    import xarray as xr
+    from xarray.backends import NetCDF4DataStore
+
+    store: Any = NetCDF4DataStore
+    groups, found = {}, [file]
+    while found:
+        group = found.pop(0)
+        found += group.groups.values()
+        # Data are read later with this lock too.
+        data = xr.open_dataset(store(group, lock=LOCK))
+        groups[group.path] = renamed(group.path.strip("/"), data)
+    return xr.DataTree.from_dict(groups)
 
 
 def _close(file: netCDF4.Dataset) -> None:
@@ -124,7 +146,7 @@ def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
         yield tree
 
 
-def check_run(tree: xr.DataTree, path: str | Path) -> None:
+def check_run(tree: Tree, path: str | Path) -> None:
     """Make sure that an output is of ``mesoslip run``.
 
     Raises

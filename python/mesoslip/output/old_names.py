@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
 
 from mesoslip.output import variables
 
@@ -33,18 +34,30 @@ GROUPS = {
 }
 
 
+def present_names(
+    group: str, variables: Collection[Any], dimensions: Collection[Any]
+) -> dict[str, str]:
+    """The present names of variables of a file that had others, by those in the file."""
+    return {
+        before: now
+        for before, now in OLD_NAMES.get(group, {}).items()
+        if before in variables and before not in dimensions
+    }
+
+
+def attributes_of(group: str, name: str) -> dict[str, str]:
+    """Attributes of a variable that had another name, by its present one."""
+    return GROUPS[group][name].attributes
+
+
 def renamed(name: str, data: xr.Dataset) -> xr.Dataset:
     """A group of a file with the names of today."""
-    old = {
-        before: now
-        for before, now in OLD_NAMES.get(name, {}).items()
-        if before in data.variables and before not in data.dims
-    }
+    old = present_names(name, data.variables, data.dims)
     if not old:
         return data
     data = data.rename(old).reset_coords(
         [now for now in old.values() if now in {"realization_index", "start_time"}]
     )
     for now in old.values():
-        data[now].attrs = GROUPS[name][now].attributes
+        data[now].attrs = attributes_of(name, now)
     return data

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mesoslip.errors import FileError
 from mesoslip.output import variables
 from mesoslip.output.access import is_measured
+from mesoslip.output.arrays import Tree
 from mesoslip.output.provenance import version
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Dimensions and variables that commands need of an output of a run: of its root, and of groups that
 # it may have.
@@ -59,7 +56,7 @@ def _is_table(path: Path) -> bool:
     return path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
 
 
-def check_layout(tree: xr.DataTree, path: Path) -> None:
+def check_layout(tree: Tree, path: Path) -> None:
     """Check that an output has the variables that commands use, as numbers with their dimensions.
 
     Raises

@@ -5,7 +5,7 @@ which the drive moves; the first half counts as transient. ``docs/regimes.md`` e
 and reports their validation.
 """
 
-from mesoslip.analysis.regime.outputs import regime, regimes, regimes_of_results
+from mesoslip.analysis.regime.outputs import judge, regime, regimes, regimes_of_results
 from mesoslip.analysis.regime.result import (
     IRREGULAR,
     NAMES,
@@ -30,6 +30,7 @@ __all__ = [
     "RegimeResult",
     "Scales",
     "classify",
+    "judge",
     "regime",
     "regimes",
     "regimes_of_results",

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.cycles import MIN_CYCLES
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
-from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.noise import noise_level, without_impulses
 from mesoslip.analysis.regime.events import NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
-from mesoslip.analysis.response.forces import motion_under_force
 from mesoslip.output.access import group_of
+from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.results import RunResults
 from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
@@ -56,20 +55,7 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     """
     import xarray as xr
 
-    root = tree.to_dataset()
-    apparatus = apparatus_of(tree, name)
-    owner, slips = _slips(tree)
-    results = []
-    for number in range(root.sizes["realization"]):
-        mine = owner == number
-        own = Slips(slips.start[mine], slips.before[mine], slips.drop[mine])
-        window = _window(root.isel(realization=number), apparatus, tree)
-        results.append(classify(*window, own))
-    motion = None
-    config = apparatus.config
-    if config is not None and config.drive.is_force and not config.slider.jumps:
-        motion, is_creep = motion_under_force(Experiment(tree, name))
-        results = [RegimeResult(SMOOTH if is_creep else TRANSIENT)] * len(results)
+    results, motion = judge(tree, name)
     variables = {
         name: REGIME.variable(
             name,
@@ -80,10 +66,35 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
     }
     variables["regime"].attrs["flag_values"] = np.arange(len(NAMES), dtype=np.int8)
     attributes = {} if motion is None else {"motion": motion}
-    return xr.Dataset(variables, {"realization": root["realization"]}, attributes)
+    return xr.Dataset(variables, {"realization": tree["realization"]}, attributes)
 
 
-def _slips(tree: xr.DataTree) -> tuple[Array, Slips]:
+def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str | None]:
+    """The regime of each realization of an output, and the motion of a slider under a force.
+
+    See `regimes`.
+    """
+    root = tree.to_dataset()
+    apparatus = apparatus_of(tree, name)
+    owner, slips = _slips(tree)
+    results = []
+    for number in range(root.sizes["realization"]):
+        mine = owner == number
+        own = Slips(slips.start[mine], slips.before[mine], slips.drop[mine])
+        window = _window(tree, number, apparatus)
+        results.append(classify(*window, own))
+    config = apparatus.config
+    if config is None or not config.drive.is_force or config.slider.jumps:
+        return results, None
+    # With xarray.
+    from mesoslip.analysis.experiment import Experiment
+    from mesoslip.analysis.response.forces import motion_under_force
+
+    motion, is_creep = motion_under_force(Experiment(tree, name))
+    return [RegimeResult(SMOOTH if is_creep else TRANSIENT)] * len(results), motion
+
+
+def _slips(tree: Tree) -> tuple[Array, Slips]:
     """Realization of each slip, and all slips; none without a catalogue."""
     if "slips" not in tree.children:
         return np.empty(0), NO_SLIPS
@@ -92,13 +103,12 @@ def _slips(tree: xr.DataTree) -> tuple[Array, Slips]:
     return data["realization_index"].values, Slips(*columns)
 
 
-def _window(
-    one: xr.Dataset, apparatus: Apparatus, tree: xr.DataTree
-) -> tuple[Scales, Array, Array, Array]:
+def _window(tree: Tree, number: int, apparatus: Apparatus) -> tuple[Scales, Array, Array, Array]:
     """What a realization is compared with; time, force and velocity in its evaluated window."""
+    root = tree.to_dataset()
     # The catalogue of an elastic slider is that of its mean force.
-    name = "elastic_force" if "elastic_force" in one else apparatus.force_name
-    time, force = one["time"].values, one[name].values
+    name = "elastic_force" if "elastic_force" in root else apparatus.force_name
+    time, force = root["time"].values, root[name][number].values
     # Samples after the end of an interrupted run are missing.
     reached = int(np.sum(np.isfinite(force)))
     last_time = float(time[reached - 1]) if reached else 0.0
@@ -108,8 +118,8 @@ def _window(
     last = int(np.searchsorted(time[:reached], stage.end, side="right"))
     inside = slice(first, last, _step(last - first))
     velocity = np.full(len(time[inside]), np.nan)
-    if "velocity" in one:
-        velocity = one["velocity"][inside].values
+    if "velocity" in root:
+        velocity = root["velocity"][number, inside].values
     time, force = time[inside], force[inside]
     if config is not None:
         return Scales.of_config(config, last_time), time, force, velocity

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -117,6 +117,14 @@ class RegimeResult:
         if self.are_slips:
             return f"{text}, a slip every {period} ({self.cycles} times)"
         return f"{text}, {self.cycles} oscillations of {period}"
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The values by name, with the types that they have in an output."""
+        return {
+            name: np.dtype(meaning.dtype).type(getattr(self, name)).item()
+            for name, meaning in REGIME.items()
+        }
 
 
 def results_of(data: xr.Dataset) -> list[RegimeResult]:

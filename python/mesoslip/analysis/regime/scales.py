@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import Apparatus
 from mesoslip.configuration.config import Config
 from mesoslip.output.access import group_of
-
-if TYPE_CHECKING:
-    import xarray as xr
+from mesoslip.output.arrays import Tree
 
 Array = NDArray[np.float64]
 
@@ -146,7 +143,7 @@ def stage_of(config: Config, reached: float) -> Stage:
     return found
 
 
-def measured_stage(tree: xr.DataTree, apparatus: Apparatus, reached: float) -> Stage:
+def measured_stage(tree: Tree, apparatus: Apparatus, reached: float) -> Stage:
     """The last stage of a measured trace in which the drive moves; the whole trace without one."""
     start = float(tree.to_dataset()["time"].values[0])
     found = Stage(start, reached, apparatus.velocity)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.analysis.experiment import Experiment, Stage
 from mesoslip.analysis.response.columns import CREEP, RAMPS, empty_row
@@ -14,6 +13,9 @@ from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.scatter import scatter
 from mesoslip.analysis.steady_force import steady_mean
 from mesoslip.quantities import with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Minimum share of the static force by which contacts bear less than the force on a sliding slider.
 MIN_DEFICIT = 0.02

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mesoslip.analysis import slips as catalogue
-from mesoslip.analysis.apparatus import apparatus_of
+from mesoslip.analysis.slips import Catalogue, as_recorded, catalogue_of
 from mesoslip.output.access import group_of
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.style import curve_color
@@ -54,24 +53,25 @@ def slips(subjects: Sequence[Subject]) -> Section | None:
     if not with_slips:
         return None
     blocks: list[Block] = []
-    for subject in with_slips:
-        blocks += _statistics(subjects, subject)
+    found = [catalogue_of(one.tree) for one in with_slips]
+    for subject, catalogue in zip(with_slips, found, strict=True):
+        blocks += _statistics(subjects, subject, catalogue)
     if any(group_of(one.tree, "slips").sizes["slip"] > 1 for one in with_slips):
-        blocks.append(drawn("Distributions of the slips", lambda: _histograms(with_slips)))
+        blocks.append(drawn("Distributions of the slips", lambda: _histograms(with_slips, found)))
     if len(subjects) == 1:
-        blocks += _rows(with_slips[0])
+        blocks += _rows(found[0])
     return Section("Slips", tuple(blocks))
 
 
-def _statistics(subjects: Sequence[Subject], subject: Subject) -> list[Block]:
+def _statistics(subjects: Sequence[Subject], subject: Subject, catalogue: Catalogue) -> list[Block]:
     """Statistics of each column of a catalogue."""
-    statistics = catalogue.statistics(subject.tree)
+    statistics = catalogue.statistics
     count = int(statistics["slips"]["count"])
     if count == 0:
         return [Text(named(subjects, subject, "There is no slip."))]
     rows = tuple(
         row_in_one_unit(header, [statistics[name][one] for one in STATISTICS], unit)
-        for name, (header, unit) in _columns(subject).items()
+        for name, (header, unit) in _columns(catalogue).items()
         if name in statistics
     )
     head = (f"{count} slip{'s' if count > 1 else ''}", *STATISTICS.values())
@@ -80,15 +80,14 @@ def _statistics(subjects: Sequence[Subject], subject: Subject) -> list[Block]:
     return [*name, Table(head, rows, note)]
 
 
-def _columns(subject: Subject) -> dict[str, tuple[str, str]]:
+def _columns(catalogue: Catalogue) -> dict[str, tuple[str, str]]:
     """Header and unit of each column of an output."""
-    unit = apparatus_of(subject.tree).force_unit
-    return {name: catalogue.as_recorded(*one, unit) for name, one in COLUMNS.items()}
+    return {name: as_recorded(*one, catalogue.force_unit) for name, one in COLUMNS.items()}
 
 
-def _rows(subject: Subject) -> list[Block]:
+def _rows(catalogue: Catalogue) -> list[Block]:
     """The first rows of a catalogue."""
-    rows = catalogue.rows(subject.tree)
+    rows = catalogue.rows
     if not rows:
         return []
     shown = rows[:MAX_ROWS]
@@ -97,21 +96,20 @@ def _rows(subject: Subject) -> list[Block]:
     # A measured trace has no breaks.
     columns += [
         (header, [row[name] for row in shown], unit, 4)
-        for name, (header, unit) in _columns(subject).items()
+        for name, (header, unit) in _columns(catalogue).items()
         if any(row[name] is not None for row in shown)
     ]
     note = f"The first {MAX_ROWS} of {len(rows)} slips." if len(rows) > MAX_ROWS else ""
     return [Table(*columns_in_one_unit(columns), note)]
 
 
-def _histograms(subjects: Sequence[Subject]) -> Figure:
+def _histograms(subjects: Sequence[Subject], catalogues: Sequence[Catalogue]) -> Figure:
     """Force drops, durations and waiting times of slips, each output in a colour."""
     figure = Figure(figsize=(7.5, 2.5))
     panels = figure.subplots(1, len(DISTRIBUTIONS))
-    catalogues = [catalogue.slips(one.tree) for one in subjects]
     for axes, name in zip(panels, DISTRIBUTIONS, strict=True):
-        header, unit = _columns(subjects[0])[name]
-        all_values = [one[name].values for one in catalogues]
+        header, unit = _columns(catalogues[0])[name]
+        all_values = [one.columns[name].values for one in catalogues]
         all_values = [values[np.isfinite(values)] for values in all_values]
         scale = scale_for(max_size(*all_values), unit)
         together = np.concatenate(all_values) / scale.size

@@ -1,0 +1,137 @@
+"""Outputs as plain arrays: what commands for small files need of xarray, which is slow to import.
+
+Groups and variables here have the names that xarray's have for the same, as far as they go.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.output.hdf5 import LOCK
+from mesoslip.output.old_names import attributes_of, present_names
+
+if TYPE_CHECKING:
+    import netCDF4
+    import xarray as xr
+
+Array = NDArray[Any]
+
+# Attributes of variables whose values are not what is stored.
+ENCODINGS = {"missing_value", "scale_factor", "add_offset", "_Unsigned"}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable in a file, whose values are read when they are needed, or a part of one."""
+
+    stored: netCDF4.Variable[Any]
+    attrs: Mapping[str, Any]
+    part: Any = ...
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of its dimensions."""
+        dimensions: tuple[str, ...] = self.stored.dimensions
+        return dimensions
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of its values."""
+        found: np.dtype[Any] = self.stored.dtype
+        return found
+
+    @cached_property
+    def values(self) -> Array:
+        """Its values."""
+        with LOCK:
+            return np.asarray(self.stored[self.part])
+
+    def __getitem__(self, part: Any) -> Variable:
+        """A part of a whole variable, as NumPy indexes it."""
+        return Variable(self.stored, self.attrs, part)
+
+
+@dataclass(frozen=True)
+class Arrays(Mapping[str, Variable]):
+    """A group of an output: its variables by name, its attributes, and the groups in it."""
+
+    variables: Mapping[str, Variable]
+    sizes: Mapping[str, int]
+    attrs: Mapping[str, Any]
+    children: dict[str, Arrays] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Variable:
+        return self.variables[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.variables)
+
+    def __len__(self) -> int:
+        return len(self.variables)
+
+    @property
+    def coords(self) -> Mapping[str, Variable]:
+        """The variables that are named as a dimension."""
+        return {name: one for name, one in self.variables.items() if name in self.sizes}
+
+    @property
+    def data_vars(self) -> Mapping[str, Variable]:
+        """The other variables."""
+        return {name: one for name, one in self.variables.items() if name not in self.sizes}
+
+    def to_dataset(self) -> Arrays:
+        """The group itself."""
+        return self
+
+
+# An output of which no more is used than both have.
+Tree: TypeAlias = "Arrays | xr.DataTree"
+
+
+def arrays_of(group: netCDF4.Dataset) -> Arrays | None:
+    """A group of a file and all groups in it; None if one has values that must be decoded.
+
+    Outputs have none, but files that other programs have made of them may.
+    """
+    name = group.path.strip("/")
+    if not all(map(_is_plain, group.variables.values())):
+        return None
+    now = present_names(name, group.variables, group.dimensions)
+    variables = {}
+    for before, stored in group.variables.items():
+        stored.set_auto_maskandscale(False)
+        attributes = attributes_of(name, now[before]) if before in now else _attributes(stored)
+        variables[now.get(before, before)] = Variable(stored, attributes)
+    children = {}
+    for below in group.groups.values():
+        found = arrays_of(below)
+        if found is None:
+            return None
+        children[below.name] = found
+    sizes = {one: len(dimension) for one, dimension in group.dimensions.items()}
+    return Arrays(variables, sizes, _attributes(group), children)
+
+
+def _attributes(owner: netCDF4.Dataset | netCDF4.Variable[Any]) -> dict[str, Any]:
+    return {name: owner.getncattr(name) for name in owner.ncattrs()}
+
+
+def _is_plain(variable: netCDF4.Variable[Any]) -> bool:
+    """Whether the values of a variable are the stored ones."""
+    names = set(variable.ncattrs())
+    kind = getattr(variable.dtype, "kind", "")
+    if kind not in "fiu" or kind == "" or names & ENCODINGS:
+        return False
+    if "_FillValue" in names and not (
+        kind == "f" and math.isnan(float(variable.getncattr("_FillValue")))
+    ):
+        return False
+    # Times since a date.
+    return "units" not in names or "since" not in str(variable.getncattr("units"))

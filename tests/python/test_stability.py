@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 from mesoslip import Config, SteadySliding
+from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.theory import steady_curve
 from mesoslip.theory.activated_sliding import ActivatedSliding, RateAndState
@@ -88,6 +89,35 @@ def test_the_critical_spring_of_rate_and_state_is_that_of_rice_and_ruina():
         assert found[0] == pytest.approx(law.critical_stiffness(velocity, mass), rel=1e-4)
         frequency = math.sqrt((law.b - law.a) / law.a) * velocity / law.slip_distance
         assert found[1] == pytest.approx(frequency, rel=1e-4)
+        # One layer is a rigid slider; light layers are one spring, heavy ones need a stiffer one.
+        for layers in (1, 4):
+            chain = LayeredSlider(kind="layered", mass=mass, stiffness=97.0, layers=layers)
+            same = critical_spring(chain, response, np.geomspace(1e-2, 1e4, 40))
+            assert same is not None
+            assert same[1] == pytest.approx(frequency, rel=1e-4)
+            if layers == 1 or mass < 1e-8:
+                assert same[0] == pytest.approx(found[0], rel=1e-4)
+
+
+@pytest.mark.parametrize(("layers", "damping"), [(2, 300.0), (8, 500.0)])
+def test_the_critical_spring_of_layers_is_where_stability_ends(klein, layers, damping):
+    """By counting roots; with much stiffer springs as well."""
+    changes = {
+        "contacts__delay": 0.0,
+        "contacts__coupling": "equal",
+        "contacts__ageing": LOG | {"growth": 0.05},
+        "contacts__threshold__relative_width": 0.2,
+        "drive__velocity": 3e-6,
+    }
+    slider = {"kind": "layered", "mass": 1.47e-3, "layers": layers, "layer_damping": damping}
+    config = klein(slider=slider | {"stiffness": 97.0}, **changes)
+    found = sliding_of(config).critical_stiffness
+    assert found is not None
+    for factor, is_stable in ((0.97, False), (1.03, True), (10.0, True)):
+        other = config.replace({"slider.stiffness": factor * found[0]})
+        assert sliding_of(other).is_stable == is_stable
+    on_base = slider | {"stiffness": 97.0, "base": {"mass": 1.0, "stiffness": 1e5}}
+    assert not sliding_of(klein(slider=on_base, **changes)).has_critical_stiffness
 
 
 @pytest.mark.parametrize(("growth", "ratio"), [(0.05, 0.01), (0.02, 0.01)])

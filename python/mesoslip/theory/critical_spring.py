@@ -1,4 +1,4 @@
-"""The spring at which steady sliding of a rigid slider turns linearly unstable.
+"""The spring at which steady sliding of a rigid or layered slider turns linearly unstable.
 
 There K + Z(iω) + Λ(iω) = 0 at a frequency, Z being the dynamic stiffness of the slider without its
 spring. A damping that is given relative to the frequency of the setup grows with the spring.
@@ -15,31 +15,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.sliders.base import SliderTable
+from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
+from mesoslip.theory.sliders import chain_stiffness
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Rounds of the search for a critical frequency, and points of each.
 ROUNDS, POINTS_A_ROUND = 3, 12
+# Doublings and halvings of an interval in which the stiffness of a chain is sought.
+MAX_DOUBLINGS, HALVINGS = 8, 50
 
 
 @singledispatch
-def is_on_one_spring(slider: SliderTable) -> bool:  # noqa: ARG001
-    """Whether a slider is a mass on one spring, of which a critical one is known."""
+def has_critical_spring(slider: SliderTable) -> bool:  # noqa: ARG001
+    """Whether a slider has a spring of which the critical one is known."""
     return False
 
 
-@is_on_one_spring.register
-def _is_rigid(slider: RigidSlider) -> bool:  # noqa: ARG001
+@has_critical_spring.register
+def _rigid_has_one(slider: RigidSlider) -> bool:  # noqa: ARG001
     return True
 
 
-@singledispatch
+@has_critical_spring.register
+def _layered_has_one(slider: LayeredSlider) -> bool:
+    # On a base sliding may be unstable however stiff the springs are.
+    return slider.base is None
+
+
 def critical_spring(
-    slider: SliderTable,  # noqa: ARG001
-    response: Callable[[Array], Complex],  # noqa: ARG001
-    path: Array,  # noqa: ARG001
+    slider: SliderTable, response: Callable[[Array], Complex], path: Array
 ) -> tuple[float, float] | None:
     """Largest stiffness of the spring at which a perturbation neither grows nor decays.
 
@@ -55,26 +62,21 @@ def critical_spring(
     Returns
     -------
     tuple of float, or None
-        The stiffness [N/m] and the angular frequency of the perturbation [1/s]; None also for a
-        slider that is not on one spring.
+        The static stiffness [N/m] and the angular frequency of the perturbation [1/s]; None also
+        for a slider of which no critical spring is known.
     """
-    return None
-
-
-@critical_spring.register
-def _of_rigid_slider(
-    slider: RigidSlider, response: Callable[[Array], Complex], path: Array
-) -> tuple[float, float] | None:
-    stiffness, excess = _spring(slider, path, response(path))
+    if not has_critical_spring(slider):
+        return None
+    stiffness, excess = balancing_spring(slider, path, response(path))
     found = None
-    for at in np.flatnonzero(np.diff(np.sign(excess)) != 0):
+    for at in _changes_of_sign(excess):
         if max(stiffness[at], stiffness[at + 1]) <= 0:
             continue
         low, high = path[at : at + 2]
         for _ in range(ROUNDS):
             points = np.geomspace(low, high, POINTS_A_ROUND)
-            springs, left = _spring(slider, points, response(points))
-            first = int(np.flatnonzero(np.diff(np.sign(left)) != 0)[0])
+            springs, left = balancing_spring(slider, points, response(points))
+            first = _changes_of_sign(left)[0]
             low, high = points[first : first + 2]
         share = left[first] / (left[first] - left[first + 1])
         spring = float(springs[first] + share * (springs[first + 1] - springs[first]))
@@ -83,9 +85,29 @@ def _of_rigid_slider(
     return found
 
 
-def _spring(slider: RigidSlider, frequency: Array, response: Complex) -> tuple[Array, Array]:
+def _changes_of_sign(values: Array) -> list[int]:
+    """Places before which and behind which values have different signs; NaN has none."""
+    change = np.diff(np.sign(values))
+    return [int(at) for at in np.flatnonzero(np.isfinite(change) & (change != 0))]
+
+
+@singledispatch
+def balancing_spring(
+    slider: SliderTable,  # noqa: ARG001
+    frequency: Array,
+    response: Complex,  # noqa: ARG001
+) -> tuple[Array, Array]:
     """Stiffness with which the real part of the characteristic function is zero, and its imaginary
-    part then [N/m]; the damping is that of the slider with this spring."""
+    part then [N/m]; the largest one if there are several, NaN if there is none."""
+    unknown = np.full_like(frequency, math.nan)
+    return unknown, unknown
+
+
+@balancing_spring.register
+def _of_rigid_slider(
+    slider: RigidSlider, frequency: Array, response: Complex
+) -> tuple[Array, Array]:
+    """The damping is that of the slider with this spring."""
     inertia = slider.mass * frequency**2
     needed = inertia - response.real
     if slider.damping is not None:
@@ -107,3 +129,39 @@ def _spring(slider: RigidSlider, frequency: Array, response: Complex) -> tuple[A
         rate = math.sqrt(square / slider.mass) * np.sqrt(np.maximum(stiffness, 0.0))
     damping = slider.mass * rate * frequency**3 / (rate**2 + frequency**2)
     return stiffness, response.imag + damping
+
+
+@balancing_spring.register
+def _of_layered_slider(
+    slider: LayeredSlider, frequency: Array, response: Complex
+) -> tuple[Array, Array]:
+    """The static stiffness of the chain, all springs of which go with it.
+
+    Without damping the dynamic stiffness of the chain grows with that of its springs, from -∞ at
+    the stiffness with which the layers above the first one resonate. Layers resonate at the largest
+    root with softer springs only.
+    """
+    rate = 1j * frequency
+
+    def lack(stiffness: Array) -> Array:
+        numerator, denominator = chain_stiffness(slider, rate, stiffness)
+        return np.real(numerator / denominator) + response.real
+
+    resonant = np.zeros_like(frequency)
+    if slider.layers > 1:
+        mass, sine = slider.mass / slider.layers, math.sin(math.pi / (2 * slider.layers))
+        resonant = mass * frequency**2 / (4 * slider.layers * sine**2)
+    # All of the mass at the contacts needs no stiffer spring, but for the layers' own motion.
+    high = 2 * (resonant + slider.mass * frequency**2 + np.abs(response))
+    for _ in range(MAX_DOUBLINGS):
+        high = np.where(lack(high) > 0, high, 2 * high)
+    low = resonant.copy()
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        is_low = lack(middle) < 0
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+    numerator, denominator = chain_stiffness(slider, rate, high)
+    excess = np.imag(numerator / denominator) + response.imag
+    # With strong damping of the layers, or a single one, there may be no such spring.
+    has_root = low > resonant
+    return np.where(has_root, high, math.nan), np.where(has_root, excess, math.nan)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
-from mesoslip.theory.critical_spring import critical_spring, is_on_one_spring
+from mesoslip.theory.critical_spring import critical_spring, has_critical_spring
 from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
@@ -381,9 +381,10 @@ class LinearStability(abc.ABC):
         """Stiffness of the spring above which steady sliding is linearly stable [N/m], and the
         angular frequency of the oscillation there [1/s].
 
-        None if it is stable with any spring, or the slider is not a mass on one spring.
+        None if it is stable with any spring, or none is known, as for a slider on a base.
 
-        The damping is that of the configuration, which grows with the spring where it is a ratio.
+        Of a layered slider it is the static stiffness, with which all its springs go. The damping
+        is that of the configuration, which grows with the spring where it is a ratio.
         """
         if self.is_passive or not self.has_critical_stiffness:
             return None
@@ -451,8 +452,8 @@ class LinearStability(abc.ABC):
 
     @property
     def has_critical_stiffness(self) -> bool:
-        """Whether the slider is a mass on one spring."""
-        return is_on_one_spring(self.config.slider)
+        """Whether the slider has a spring of which the critical one is known."""
+        return has_critical_spring(self.config.slider)
 
     @property
     def limit(self) -> str | None:

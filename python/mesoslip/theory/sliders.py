@@ -67,8 +67,22 @@ def _rigid_stiffness(slider: RigidSlider, rate: Any) -> DynamicStiffness:
 @dynamic_stiffness.register
 def _layered_stiffness(slider: LayeredSlider, rate: Any) -> DynamicStiffness:
     """The chain from the drive's spring down to layer 1; with a base, moved against it."""
+    numerator, denominator = chain_stiffness(slider, rate, slider.stiffness)
+    degree = 2 * slider.layers
+    if slider.base is not None:
+        ground = slider.base.mass * rate * (rate + slider.base.damping) + slider.base.stiffness
+        numerator, denominator = numerator * ground, numerator + denominator * ground
+        degree += 2
+    return DynamicStiffness(numerator, denominator, degree)
+
+
+def chain_stiffness(slider: LayeredSlider, rate: Any, stiffness: Any) -> tuple[Complex, Complex]:
+    """Numerator and denominator of the dynamic stiffness of a chain from the drive's spring down.
+
+    The static stiffness of all its springs may differ from that of the slider, and between rates.
+    """
     mass = slider.mass / slider.layers
-    spring = slider.layers * slider.stiffness
+    spring = slider.layers * stiffness
     inertia = mass * rate**2
     joint = spring + slider.layer_damping * mass * rate
     numerator, denominator = inertia + spring, rate**0
@@ -79,12 +93,7 @@ def _layered_stiffness(slider: LayeredSlider, rate: Any) -> DynamicStiffness:
         # Products of very many layers would overflow; only the ratio matters.
         size = abs(denominator)
         numerator, denominator = numerator / size, denominator / size
-    degree = 2 * slider.layers
-    if slider.base is not None:
-        ground = slider.base.mass * rate * (rate + slider.base.damping) + slider.base.stiffness
-        numerator, denominator = numerator * ground, numerator + denominator * ground
-        degree += 2
-    return DynamicStiffness(numerator, denominator, degree)
+    return numerator, denominator
 
 
 @singledispatch

@@ -97,7 +97,12 @@ class Browser:
         self.driver.set_script_timeout(PATIENCE)
 
     def open(self, address: str) -> None:
-        """Open a page, and wait for its first picture."""
+        """Open a page, and wait for its first picture.
+
+        Errors of pages before it are dropped: one whose program was ended goes on asking for it.
+        """
+        self.driver.get("about:blank")
+        self.driver.get_log("browser")
         self.driver.get(address)
         self.wait("return window.Bokeh && Bokeh.documents.length > 0")
         self.wait("return Bokeh.documents[0].get_model_by_name('status').tags.length > 1")
@@ -148,7 +153,7 @@ class Browser:
         return found
 
     def errors(self) -> list[str]:
-        """What the browser complained of."""
+        """What the browser complained of since the page was opened, or since the last time."""
         return [
             entry["message"]
             for entry in self.driver.get_log("browser")

@@ -141,7 +141,6 @@ def test_a_program_that_has_ended_is_reported(browser):
     assert not browser.driver.find_element(By.CLASS_NAME, "lost-only").is_displayed()
     server.stop()
     assert eventually(browser.driver.find_element(By.CLASS_NAME, "lost-only").is_displayed)
-    browser.driver.get_log("browser")
 
 
 # Keys that no choice brings: only a file that has them.
@@ -460,7 +459,6 @@ def test_another_page_cannot_reach_it(server, browser):
         server.address,
     )
     assert outcome == "refused"
-    browser.driver.get_log("browser")
 
 
 def test_only_this_machine_is_listened_to(server):

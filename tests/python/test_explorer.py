@@ -752,6 +752,29 @@ def test_a_refused_change_leaves_the_run_as_it_was():
         page.close()
 
 
+def test_a_slider_goes_back_from_what_is_refused(session):
+    """One of a key that applies, and one that a hand moves as its key ceases to apply."""
+    pytest.importorskip("bokeh")
+    from mesoslip.explorer.controls import BY_KEY
+    from mesoslip.explorer.knobs import ControlView
+
+    knob = ControlView(BY_KEY["slider.stiffness"], session, session.change)
+    assert knob._slider.value == STEPS / 2
+    knob._slider.value = 148
+    assert session.change("slider.kind", "layered")
+    knob.show()
+    assert knob._slider.value == 148
+    assert session.change("slider.kind", "prescribed")
+    knob.show()
+    knob._slider.value = 20
+    knob.show()
+    assert session.problems
+    assert knob._slider.value == 148
+    assert session.reset()
+    knob.show()
+    assert knob._slider.value == STEPS / 2
+
+
 def test_a_page_is_built_beside_the_pages_that_are_open(monkeypatch):
     """On another thread: the server's own goes on."""
     document = pytest.importorskip("bokeh.document").Document()

@@ -122,11 +122,12 @@ class ControlView:
         set_changed(self.layout, styles=REFUSED if key in session.problems else style)
         value = _number(session, key)
         if self._slider is not None and self._scale is not None:
-            self._position = self._slider.value
-            # A slider stays where the user moved it: the text is rounded, and may lag behind.
-            is_there = self.control.text(self._scale.value(self._position)) == self._text
-            if isinstance(value, int | float) and not is_there:
-                self._position = self._scale.position(float(value))
+            if isinstance(value, int | float):
+                # A slider stays where the user moved it: the text is rounded, and may lag behind.
+                moved = self._slider.value
+                is_there = self.control.text(self._scale.value(moved)) == self._text
+                self._position = moved if is_there else self._scale.position(float(value))
+            # Without a value, as the key no longer applies, it goes back to where it was.
             set_changed(self._slider, value=self._position)
         problem = session.problems.get(key, "")
         message = problem or session.notes.get(key, "")

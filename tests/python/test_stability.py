@@ -118,6 +118,8 @@ def test_the_critical_spring_of_layers_is_where_stability_ends(klein, layers, da
         assert sliding_of(other).is_stable == is_stable
     on_base = slider | {"stiffness": 97.0, "base": {"mass": 1.0, "stiffness": 1e5}}
     assert not sliding_of(klein(slider=on_base, **changes)).has_critical_stiffness
+    delayed = config.replace({"contacts.delay": 1e-4})
+    assert not sliding_of(delayed).has_critical_stiffness
 
 
 @pytest.mark.parametrize(("growth", "ratio"), [(0.05, 0.01), (0.02, 0.01)])

@@ -29,20 +29,22 @@ MAX_DOUBLINGS, HALVINGS = 8, 50
 
 
 @singledispatch
-def has_critical_spring(slider: SliderTable) -> bool:  # noqa: ARG001
-    """Whether a slider has a spring of which the critical one is known."""
+def has_critical_spring(slider: SliderTable, delay: float) -> bool:  # noqa: ARG001
+    """Whether a slider has a spring of which the critical one is known, with a delay of contacts
+    [s]."""
     return False
 
 
 @has_critical_spring.register
-def _rigid_has_one(slider: RigidSlider) -> bool:  # noqa: ARG001
+def _rigid_has_one(slider: RigidSlider, delay: float) -> bool:  # noqa: ARG001
     return True
 
 
 @has_critical_spring.register
-def _layered_has_one(slider: LayeredSlider) -> bool:
-    # On a base sliding may be unstable however stiff the springs are.
-    return slider.base is None
+def _layered_has_one(slider: LayeredSlider, delay: float) -> bool:
+    # On a base sliding may be unstable however stiff the springs are. A delay may feed layers at
+    # frequencies that grow with their springs, beyond any path.
+    return slider.base is None and delay == 0
 
 
 def critical_spring(
@@ -65,8 +67,6 @@ def critical_spring(
         The static stiffness [N/m] and the angular frequency of the perturbation [1/s]; None also
         for a slider of which no critical spring is known.
     """
-    if not has_critical_spring(slider):
-        return None
     stiffness, excess = balancing_spring(slider, path, response(path))
     found = None
     for at in _changes_of_sign(excess):

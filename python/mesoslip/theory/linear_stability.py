@@ -381,7 +381,8 @@ class LinearStability(abc.ABC):
         """Stiffness of the spring above which steady sliding is linearly stable [N/m], and the
         angular frequency of the oscillation there [1/s].
 
-        None if it is stable with any spring, or none is known, as for a slider on a base.
+        None if it is stable with any spring, or none is known, as for layers on a base or with a
+        delay of the contacts.
 
         Of a layered slider it is the static stiffness, with which all its springs go. The damping
         is that of the configuration, which grows with the spring where it is a ratio.
@@ -453,7 +454,7 @@ class LinearStability(abc.ABC):
     @property
     def has_critical_stiffness(self) -> bool:
         """Whether the slider has a spring of which the critical one is known."""
-        return has_critical_spring(self.config.slider)
+        return has_critical_spring(self.config.slider, self.delay)
 
     @property
     def limit(self) -> str | None:

@@ -65,7 +65,7 @@ class SteadyCurve:
     @cached_property
     def critical_stiffness(self) -> Array:
         """Stiffness above which sliding is linearly stable [N/m]; 0 if it is with any spring, NaN
-        if none is known, as for a slider on a base."""
+        if none is known, as for layers on a base or with a delay of the contacts."""
         return np.array([_critical(one) for one in self._sliding])
 
     @cached_property
@@ -94,7 +94,9 @@ class SteadyCurve:
         if not 0 < spring < math.inf:
             return "without a spring there is no stability to state"
         if np.any(np.isnan(self.critical_stiffness)):
-            return "no critical stiffness is known for a slider on a base"
+            return (
+                "no critical stiffness is known for layers on a base, or with a delay of contacts"
+            )
         ends = [self.velocity[0], *self.boundaries, self.velocity[-1]]
         is_unstable = bool(self.critical_stiffness[0] > spring)
         parts = []

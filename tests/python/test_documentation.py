@@ -373,6 +373,15 @@ def test_metadata_agree():
     assert f"\nversion: {project['version']}\n" in citation
     assert f"\nlicense: {project['license']}\n" in citation
     assert codemeta["version"] == project["version"]
+    recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
+    assert f'\n  version: "{project["version"]}"\n' in recipe
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    (date,) = re.findall(rf"^## {re.escape(project['version'])} - ([\d-]+)$", changes, re.M)
+    assert f'\ndate-released: "{date}"\n' in citation
+    locked = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))["package"]
+    assert [one["version"] for one in locked if one["name"] == project["name"]] == [
+        project["version"]
+    ]
     assert codemeta["license"].endswith(project["license"])
     assert codemeta["description"] == project["description"]
     assert codemeta["keywords"] == project["keywords"]

@@ -72,7 +72,7 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 def _critical_stiffness_ratio(config: Config) -> float:
     from mesoslip.theory.force_curve import ForceCurve
 
-    spring = config.spring_stiffness
+    spring = config.series_stiffness
     contacts = config.contacts
     depends_on_time = contacts.ageing is not None or contacts.thermal is not None
     if not 0 < spring < math.inf or depends_on_time:

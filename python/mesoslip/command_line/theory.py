@@ -194,7 +194,7 @@ def _digits(name: str, curve: ForceCurve) -> int:
 def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     """Print the stiffnesses of the spring above which sliding is stable, in each sense."""
     from mesoslip.quantities import percent, with_unit
-    from mesoslip.theory.linear_stability import OUT_OF_STEP, SHOWN_BY
+    from mesoslip.theory.linear_stability import OUT_OF_STEP, shown_by
     from mesoslip.theory.steady_sliding import stiffness_limits
 
     limits = stiffness_limits(config, MAX_WORK)
@@ -202,7 +202,7 @@ def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
         return
     speed = with_unit(limits.velocity, "m/s", 3)
     rows = [
-        (K_star, "slow sliding from this start has no instability (K*)"),
+        (K_star, "slow sliding from this start without delay has no instability (K*)"),
         (limits.in_step, f"steady sliding at {speed} is linearly stable, with delay"),
         (
             limits.out_of_step,
@@ -215,8 +215,8 @@ def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
         if stiffness is not None:
             typer.echo(f"{with_unit(stiffness, 'N/m', 3):>{width}}  {meaning}")
     typer.echo(
-        "linear limits: above them a large oscillation may be possible too, below them a small "
-        f"one: {SHOWN_BY}"
+        "linear limits: a large oscillation may be possible above them too, and no more than a "
+        f"small one below them: {shown_by(config)}"
     )
 
 

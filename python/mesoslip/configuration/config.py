@@ -201,6 +201,11 @@ class Config(Table):
         return self.slider.spring_stiffness
 
     @property
+    def series_stiffness(self) -> float:
+        """K, in series with the spring of a base [N/m]: what decides against K*."""
+        return self.slider.series_stiffness
+
+    @property
     def has_avalanches(self) -> bool:
         """Whether avalanches are recorded: a break may trigger others at once."""
         return self.interaction is not None or self.slider.jumps

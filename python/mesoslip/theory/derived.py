@@ -10,7 +10,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing, Thermal
 from mesoslip.errors import ConfigError
 from mesoslip.output.inputs import ConfigLike, as_config
-from mesoslip.theory.linear_stability import SHOWN_BY, LinearStability
+from mesoslip.theory.linear_stability import LinearStability, shown_by
 from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import quantities
 from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
@@ -97,21 +97,25 @@ def _stability(sliding: LinearStability | None) -> Iterator[tuple[str, float, st
 
 def _verdict_of_stiffness(config: Config) -> str | None:
     """The spring against the estimate of K*; None without a spring."""
-    spring = config.spring_stiffness
+    spring = config.series_stiffness
     if not 0 < spring < math.inf or depends_on_velocity(config):
         return None
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
-    if spring >= estimate:
-        return (
-            "K is above the estimate of K*, which depends on the threshold law: mesoslip curve "
-            "computes K*. Above K* slow sliding from relaxed contacts has no instability; with "
-            f"delay or ageing there may be stick-slip nevertheless: {SHOWN_BY}"
-        )
-    return (
-        "K is below the estimate of K*, which depends on the threshold law: mesoslip curve "
-        "computes K*. Below K* slow sliding from relaxed contacts has a first slip; delay and "
-        f"ageing decide whether slips continue or decay: {SHOWN_BY}"
-    )
+    name = "K" if spring == config.spring_stiffness else "K in series with the base"
+    side = "above" if spring >= estimate else "below"
+    sentences = [
+        f"{name} is {side} the estimate of K*, which depends on the threshold law: mesoslip curve "
+        "computes K*"
+    ]
+    if side == "above":
+        sentences.append("Above K* slow sliding from relaxed contacts without delay is stable")
+        after = "with a delay there may be stick-slip nevertheless"
+    else:
+        sentences.append("Below K* slow sliding from relaxed contacts has a first slip")
+        after = "delay and inertia decide whether slips continue or decay"
+    if config.contacts.reattach:
+        sentences[-1] += f"; {after}: {shown_by(config)}"
+    return ". ".join(sentences)
 
 
 def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
@@ -143,8 +147,9 @@ def _contacts(config: Config) -> Iterator[tuple[str, float, str, str]]:
         "K_star_estimate",
         contacts.stiffness * (1 - contacts.back_force_ratio) / width,
         "N/m",
-        "estimate of K*, above which slow sliding is smooth, Nk (f_s - f_b)/Delta f_s (S48); "
-        "mesoslip curve computes K*, which may be smaller",
+        "estimate of K*, above which slow sliding without delay is stable, "
+        "Nk (f_s - f_b)/Delta f_s (S48); mesoslip curve computes K*, which depends on the "
+        "threshold law",
     )
     if config.interaction is not None:
         bond = config.bond_stiffness

@@ -62,12 +62,15 @@ MAX_PANELS = 4_000_000
 SUMMARY = {
     "K_star": (
         "N/m",
-        "K* = max(-F'(X)): slow sliding is smooth with a stiffer spring, and may be with a "
-        "softer one; 0 if the force does not fall",
+        "K* = max(-F'(X)): without delay, slow sliding from this start has no instability with a "
+        "stiffer spring; 0 if the force does not fall",
     ),
     "K_star_displacement": ("m", "displacement at K*"),
     "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
-    "stable": ("1", "whether K >= K*, so that slow sliding has no instability"),
+    "stable": (
+        "1",
+        "whether K >= K*, so that without delay slow sliding from this start has no instability",
+    ),
     "X_c": ("m", "displacement at which the slider becomes unstable, smallest X with F'(X) = -K"),
     "F_c": ("N", "force at X_c"),
     "F_peak": ("N", "maximum force; none if the force does not fall"),
@@ -354,8 +357,9 @@ class ForceCurve:
 
     @property
     def _spring(self) -> float:
-        """K [N/m]; infinite for a prescribed slider, 0 for one that is driven by force."""
-        return self.config.spring_stiffness
+        """K, in series with the spring of a base [N/m]; infinite for a prescribed slider, 0 for one
+        that is driven by force."""
+        return self.config.series_stiffness
 
     @cached_property
     def samples(self) -> Array:
@@ -433,16 +437,39 @@ class ForceCurve:
             sentences.append("the slider follows the drive, so it has no instability")
         elif self.stable:
             sentences.append(
-                "K >= K*: slow sliding from this start has no instability. Delay and ageing are "
-                "not part of the curve: with them there may be stick-slip nevertheless"
+                f"{self._name} >= K*: without delay slow sliding from this start has no "
+                f"instability{self._with_delay}"
             )
         else:
             sentences.append(
-                "K < K*: slow sliding from this start becomes unstable at X_c, where the first "
-                "slip starts. Delay and ageing, which are not part of the curve, decide whether "
-                "slips continue or decay into smooth sliding"
+                f"{self._name} < K*: slow sliding from this start becomes unstable at X_c, where "
+                f"the first slip starts{self._after_slip}"
             )
         return "; ".join(sentences)
+
+    @property
+    def _name(self) -> str:
+        """The stiffness that is compared with K*, in words."""
+        if self._spring == self.config.spring_stiffness:
+            return "K"
+        from mesoslip.quantities import with_unit
+
+        return f"K in series with the base, {with_unit(self._spring, 'N/m', 3)},"
+
+    @property
+    def _with_delay(self) -> str:
+        if not self.config.contacts.reattach:
+            return ""
+        return ". The delay is not part of the curve: with it there may be stick-slip nevertheless"
+
+    @property
+    def _after_slip(self) -> str:
+        if not self.config.contacts.reattach:
+            return ""
+        return (
+            ". The delay, which is not part of the curve, and inertia decide whether slips "
+            "continue or decay into smooth sliding"
+        )
 
     @property
     def _ends_early(self) -> bool:

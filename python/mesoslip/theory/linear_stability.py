@@ -53,9 +53,8 @@ MAX_LAYERS = 16
 # Relative width of thresholds with which contacts do not break in step.
 OUT_OF_STEP = 0.5
 # What linear theory leaves open, of a stable and of an unstable motion.
-SHOWN_BY = "only a run or mesoslip cycle shows it"
-OTHER_MOTION = f"A large oscillation may be possible too: {SHOWN_BY}"
-NO_AMPLITUDE = f"Linear theory gives no amplitude: {SHOWN_BY}"
+OTHER_MOTION = "A large oscillation may be possible too"
+NO_AMPLITUDE = "Linear theory gives no amplitude"
 
 WITHOUT_NEWBORN_WIDTH = (
     "has no linear stability theory here: contacts must attach with one force; `mesoslip curve` "
@@ -431,24 +430,25 @@ class LinearStability(abc.ABC):
         """What linear theory states, and what it leaves open; None for a slider without inertia."""
         if not self._has_motion:
             return None
+        other = f"{OTHER_MOTION}: {shown_by(self.config)}"
         where = f"steady sliding at {with_unit(self.velocity, 'm/s', 3)}"
         if self.is_passive:
             return (
                 f"{where} is linearly stable, as there is no delay: the force of steady contacts "
-                f"does not depend on the motion of the slider. {OTHER_MOTION}"
+                f"does not depend on the motion of the slider. {other}"
             )
         if self.is_stable:
             decay = with_unit(-self.growth_rate, "1/s", 3)
             return (
                 f"{where} is linearly stable, with {self._ingredients}: small perturbations decay "
-                f"at {decay}. {OTHER_MOTION}"
+                f"at {decay}. {other}"
             )
-        other = "but not" if self.is_stable_out_of_step else "also"
+        also = "but not" if self.is_stable_out_of_step else "also"
         growth = with_unit(self.growth_rate, "1/s", 3)
         return (
             f"{where} is linearly unstable, with {self._ingredients}: {self._perturbation} grows "
-            f"at {growth}, {other} for contacts out of step (thresholds of "
-            f"{percent(OUT_OF_STEP)}). {NO_AMPLITUDE}"
+            f"at {growth}, {also} for contacts out of step (thresholds of "
+            f"{percent(OUT_OF_STEP)}). {NO_AMPLITUDE}: {shown_by(self.config)}"
         )
 
     @property
@@ -477,6 +477,17 @@ class LinearStability(abc.ABC):
         if not self.frequency > 0:
             return "a perturbation"
         return f"an oscillation of {with_unit(self.frequency / (2 * math.pi), 'Hz', 3)}"
+
+
+def shown_by(config: Config) -> str:
+    """What shows the motion of a configuration: `mesoslip cycle` has no layers, no interaction,
+    no changes of the drive, and no contacts that do not attach again."""
+    part = config.drive_parts[-1]
+    is_constant = len(config.drive_parts) == 1 and part.start_velocity == part.end_velocity != 0
+    has_cycle = config.slider.oscillator is not None and is_constant
+    if has_cycle and config.contacts.reattach and config.interaction is None:
+        return "only a run or mesoslip cycle shows it"
+    return "only a run shows it"
 
 
 def _spaced(low: float, high: float, step: float) -> Array:

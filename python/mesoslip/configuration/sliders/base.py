@@ -83,6 +83,11 @@ class SliderTable(Table):
         """K [N/m]; infinite for a prescribed slider, 0 for one driven by a force."""
 
     @property
+    def series_stiffness(self) -> float:
+        """Stiffness of all springs that the contacts are in series with [N/m]."""
+        return self.spring_stiffness
+
+    @property
     def quiet_time(self) -> float:
         """Time without fast motion after which a slip is over [s]."""
         return 1.0

@@ -158,6 +158,13 @@ class LayeredSlider(InertialSlider):
         )
 
     @property
+    def series_stiffness(self) -> float:
+        """K, in series with the spring of the base [N/m]."""
+        if self.base is None:
+            return self.stiffness
+        return 1 / (1 / self.stiffness + 1 / self.base.stiffness)
+
+    @property
     def quiet_time(self) -> float:
         """Half a period of the setup [s], or of slider and base together where that is longer."""
         setup = super().quiet_time

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
     """Force and slope of the master equation over displacement, with the point of instability."""
-    spring = config_of(tree).spring_stiffness
+    spring = config_of(tree).series_stiffness
     x, _ = _units([tree])
     data = tree.to_dataset()
     values: Array = data["slope"].values

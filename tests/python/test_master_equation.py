@@ -500,6 +500,40 @@ def test_turning_points_do_not_stall(klein, law, width, delay, coupling, initial
     assert abs(realization.energy_residual) < 0.01
 
 
+@pytest.mark.parametrize("resolution", [0.25, 0.5, 1.0])
+@pytest.mark.parametrize(
+    ("law", "width", "coupling", "initial", "velocity"),
+    [
+        ("uniform", 0.577, "equal", "uniform", -6.89e-4),
+        ("uniform", 0.577, "equal", "uniform", 6.89e-4),
+        ("uniform", 0.05, "equal", "steady", 6.89e-4),
+        ("weibull", 0.3, "equal", "steady", 6.89e-4),
+    ],
+)
+def test_a_start_at_rest_does_not_stall(klein, law, width, coupling, initial, velocity, resolution):
+    """Contacts at their thresholds break at once, under a force that is 0 up to rounding."""
+    config = klein(
+        run__engine="me",
+        run__resolution=resolution,
+        run__duration=5e-6,
+        drive__velocity=velocity,
+        slider__mass=0.00605,
+        slider__stiffness=22371839080.45977,
+        contacts__count=147,
+        contacts__static_force=13.4,
+        contacts__stiffness=38505747126.43678,
+        contacts__delay=2e-7,
+        contacts__coupling=coupling,
+        contacts__initial=initial,
+        output__interval=1e-7,
+        **dispersion(width, law),
+    )
+    realization = Realization(config, 0, estimates_errors=False)
+    realization.advance(4000)
+    assert realization.finished
+    assert abs(realization.energy_residual) < 1e-6
+
+
 def test_the_mass_of_detached_contacts_is_that_of_those_which_broke(klein):
     """Strong drag and a law whose mean threshold is not 1, as small ones cannot attach."""
     changes = {

@@ -27,6 +27,10 @@ module mesoslip_contacts_populations_offer
    real(wp), parameter :: settling_time = 8.0_wp
    !> Part of a step's length by which a slider that hardly oscillates may go back
    real(wp), parameter :: back_part = 0.1_wp
+   !> Part of the force that drives a slider by which a chord may lie above the true force
+   real(wp), parameter :: driving_part = 0.5_wp
+   !> Forces that differ by this part are equal up to rounding
+   real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
    !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates, per
    !> radian
    real(wp), parameter :: rate_part = 1.0_wp
@@ -44,7 +48,7 @@ contains
       type(window_type), intent(out) :: window
 
       real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack, growing
-      logical :: breaks, moves, is_quiet
+      logical :: breaks, moves, is_quiet, rests
       type(expected_births_type) :: births
       type(pose_type) :: expected
 
@@ -64,6 +68,8 @@ contains
       else
          breaks = pose%displacement - self%pinned%behind <= slack
       end if
+      rests = is_in_balance(self, pose, slack)
+      breaks = breaks .and. .not. rests
       call self%pinned%forget_trial()
 
       span = time_to_move(expected, direction, self%pinned%step)
@@ -111,19 +117,11 @@ contains
          ! the slider turns round.
          reach = min(limit, max(reach, patience * distance))
          if (.not. distance > 0.0_wp) reach = limit
-         if (direction > 0.0_wp) then
-            reach = pose%displacement + reach
-            if (breaks) window%upper = reach
-            window%upper = min(window%upper, reach)
-            window%lower = pose%displacement
-            if (is_quiet .or. .not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
-         else
-            reach = pose%displacement - reach
-            if (breaks) window%lower = reach
-            window%lower = max(window%lower, reach)
-            window%upper = pose%displacement
-            if (is_quiet .or. .not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
-         end if
+         call end_at_reach(pose, direction, reach, slack, breaks, is_quiet, window)
+      end if
+      if (rests) then
+         window%upper = max(window%upper, pose%displacement + slack)
+         window%lower = min(window%lower, pose%displacement - slack)
       end if
 
       law = self%law()
@@ -133,6 +131,31 @@ contains
       self%offered = law
       self%offers = .true.
    end subroutine offer_step
+
+   !> Let a window end where a step does, ahead and where the slider turns round.
+   pure subroutine end_at_reach(pose, direction, reach, slack, breaks, is_quiet, window)
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The direction in which it goes, the largest displacement of the step, and by how much a
+      !> slider that rests or hardly oscillates may go back [m]
+      real(wp), intent(in) :: direction, reach, slack
+      !> Whether contacts break in the step, and whether the slider hardly oscillates
+      logical, intent(in) :: breaks, is_quiet
+      !> The window
+      type(window_type), intent(inout) :: window
+
+      if (direction > 0.0_wp) then
+         if (breaks) window%upper = pose%displacement + reach
+         window%upper = min(window%upper, pose%displacement + reach)
+         window%lower = pose%displacement
+         if (is_quiet .or. .not. pose%velocity > 0.0_wp) window%lower = window%lower - slack
+      else
+         if (breaks) window%lower = pose%displacement - reach
+         window%lower = max(window%lower, pose%displacement - reach)
+         window%upper = pose%displacement
+         if (is_quiet .or. .not. pose%velocity < 0.0_wp) window%upper = window%upper + slack
+      end if
+   end subroutine end_at_reach
 
    !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
    subroutine look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
@@ -241,6 +264,7 @@ contains
             & / 8.0_wp
          if (births%own > 0.0_wp) slope = slope + births%own * parameters%static_force &
             & * self%pinned%newborn_force / distance
+         middle = min(middle, max_shift(pose, direction, distance))
          if (span > 0.0_wp .and. span < max_time) then
             velocity = max(0.0_wp, direction * (pose%velocity + span * pose%acceleration))
             rate = (births%number * parameters%static_force * self%pinned%newborn_force &
@@ -252,6 +276,45 @@ contains
          self%detached_count = max(0.0_wp, self%detached_count + 0.5_wp * number)
       end associate
    end subroutine add_changes
+
+   !> Whether a slider is at rest and in balance but for rounding errors: they do not decide in
+   !> which direction contacts break.
+   pure function is_in_balance(self, pose, slack) result(is_balanced)
+      class(population_state_type), intent(in) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Distance in which it may come to rest [m]
+      real(wp), intent(in) :: slack
+      logical :: is_balanced
+
+      real(wp) :: noise
+
+      is_balanced = .false.
+      if (self%pinned%is_activated .or. self%pinned%some_fall) return
+      noise = rounding * pose%inverse_mass * (abs(self%pinned%offset%total()) &
+         & + abs(self%pinned%stiffness%total() * pose%displacement))
+      is_balanced = noise > 0.0_wp .and. abs(pose%acceleration) <= noise &
+         & .and. pose%velocity**2 <= 2.0_wp * noise * slack
+   end function is_in_balance
+
+   !> By how much a chord may lie above the true force at its start [N]: a slider that begins to
+   !> move goes on, or it would turn round at once, again and again.
+   pure function max_shift(pose, direction, distance) result(force)
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> In which direction it goes, and how far in the step [m]
+      real(wp), intent(in) :: direction, distance
+      !> The force
+      real(wp) :: force
+
+      real(wp) :: driving
+
+      force = huge(1.0_wp)
+      driving = direction * pose%acceleration
+      if (.not. (driving > 0.0_wp .and. pose%inverse_mass > 0.0_wp)) return
+      if (pose%velocity**2 >= 2.0_wp * driving * distance) return
+      force = driving_part * driving / pose%inverse_mass
+   end function max_shift
 
    !> How long a step may last while thresholds fall, so that contacts let go in time that do so at
    !> rest; while the slider moves its steps are short enough.

@@ -19,6 +19,10 @@ module mesoslip_loop_simulation
 
    !> Advances in a row that leave both time and displacement as they were.
    integer, parameter :: max_idle_advances = 1000000
+   !> Part of the time until the end of a part of the drive that is as good as none for them all
+   real(wp), parameter :: tiny_part = 1.0e-20_wp
+   !> Time at which nothing happens
+   real(wp), parameter :: never = huge(1.0_wp)
 
    !> A run.
    type, extends(state_type) :: simulation_type
@@ -106,7 +110,6 @@ contains
 
       type(segment_type) :: segment
       integer(i8) :: advances
-      real(wp) :: time, displacement, origin
 
       segment = new_segment(self%advances, self%contacts%breaks, max_advances, max_work)
       do while (self%ending == ending_none)
@@ -114,9 +117,6 @@ contains
             if (segment%is_over(self%advances, self%contacts%breaks) .or. self%is_full()) exit
          end if
          advances = self%advances
-         time = self%slider%time
-         displacement = self%slider%displacement
-         origin = self%slider%origin
          call self%advance(segment)
          call segment%add(self%advances - advances, self%slider%cost + self%contacts%cost)
          if (allocated(self%slider%failure)) then
@@ -124,10 +124,7 @@ contains
          else if (allocated(self%contacts%failure)) then
             error = self%contacts%failure
          else
-            ! The origin moves by what has no rounding error: that is no progress.
-            call self%check_progress(self%advances - advances, self%slider%time > time .or. &
-               & abs((self%slider%origin - origin) + (self%slider%displacement - displacement)) &
-               & > 0.0_wp, error)
+            call self%check_progress(self%advances - advances, error)
          end if
          if (allocated(error)) exit
       end do
@@ -156,19 +153,35 @@ contains
       is_full = self%recorder%is_full() .or. self%avalanches%is_full() .or. self%stages%is_full()
    end function is_full
 
-   !> Whether advances change anything.
-   subroutine check_progress(self, advances, has_moved, error)
+   !> Whether advances change anything. Steps that become shorter without end do not either.
+   subroutine check_progress(self, advances, error)
       class(simulation_type), intent(inout) :: self
-      !> Number of the last ones, and whether time or displacement is another after them
+      !> Number of the last ones
       integer(i8), intent(in) :: advances
-      logical, intent(in) :: has_moved
       !> Set if very many have not
       type(error_type), allocatable, intent(out) :: error
 
+      real(wp) :: no_time, no_distance
+
+      associate (slider => self%slider, contacts => self%contacts%parameters)
+         no_time = epsilon(1.0_wp) * slider%time
+         if (slider%drive%end_of_part() < never) then
+            no_time = max(no_time, tiny_part * slider%drive%end_of_part())
+         end if
+         no_distance = epsilon(1.0_wp) * contacts%static_force / contacts%stiffness
+         ! The origin moves by what has no rounding error: that is no progress.
+         if (slider%time - self%idle_since(1) > no_time .or. abs((slider%origin &
+            & - self%idle_since(2)) + (slider%displacement - self%idle_since(3))) &
+            & > no_distance) then
+            self%idle = 0
+            self%idle_since = [slider%time, slider%origin, slider%displacement]
+            return
+         end if
+      end associate
       self%idle = self%idle + int(min(max(1_i8, advances), int(max_idle_advances, i8)))
-      if (has_moved) self%idle = 0
       if (self%idle > max_idle_advances) call raise(error, status_stalled, "the motion makes " &
-         & // "no progress: contacts break and attach again without end at one displacement")
+         & // "no progress: very many steps change neither time nor displacement, as where " &
+         & // "contacts break and attach again without end")
    end subroutine check_progress
 
 end module mesoslip_loop_simulation

@@ -54,8 +54,9 @@ module mesoslip_loop_state
       integer :: max_schedule = max_events
       !> What comes next; between two segments it is over
       type(schedule_type) :: schedule
-      !> Advances since time or displacement changed
+      !> Advances since time or displacement changed; time [s], origin and displacement [m] then
       integer :: idle = 0
+      real(wp) :: idle_since(3) = 0.0_wp
       !> Energy of slider and contacts at the start [J]
       real(wp) :: start_energy = 0.0_wp
 
@@ -214,6 +215,9 @@ contains
 
       call archive%section("simulation")
       call archive%exchange("idle", self%idle)
+      call archive%exchange("idle_since_time", self%idle_since(1))
+      call archive%exchange("idle_since_origin", self%idle_since(2))
+      call archive%exchange("idle_since_displacement", self%idle_since(3))
       call archive%exchange("start_energy", self%start_energy)
       call archive%exchange("advances", self%advances)
       call archive%exchange("ending", self%ending)

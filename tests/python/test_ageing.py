@@ -485,3 +485,22 @@ def test_few_contacts_are_visited_before_any_breaks(klein):
         assert realization.breaks == 0
         realization.advance(work=5000.0)
         assert realization.finished
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_few_contacts_break_very_often(count):
+    """The energy closes over hundreds of lives of each contact, in one steady motion."""
+    run = Realization(
+        configuration(
+            "prescribed, ageing",
+            contacts__count=count,
+            drive={"velocity": 1e-5},
+            run__duration=1.0,
+            output__interval=0.5,
+        ),
+        0,
+    )
+    while not run.finished:
+        run.advance()
+    assert run.breaks > 400 * count
+    assert abs(run.energy_residual) < 1e-12

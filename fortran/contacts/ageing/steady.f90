@@ -148,7 +148,8 @@ contains
             end if
          end associate
       end do
-      self%unsolved_count = left
+      ! Of few contacts the same ones are there again and again: those left out are solved at birth.
+      self%unsolved_count = min(left, solved_together / 2)
       call meet_newborn(self%ageing, configured(:number), self%stretch, stretch, self%speed, &
          & limit(:number))
       do position = 1, number

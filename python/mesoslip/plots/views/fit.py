@@ -16,7 +16,7 @@ from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.names import symbol_or_name
 from mesoslip.plots.printing import UNLETTERED, current, is_narrow
-from mesoslip.plots.style import BLUE, Canvas, canvas, plain, styled
+from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above, plain, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
 
@@ -131,10 +131,13 @@ def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
         observed["time"], observed / scale.size, color=MEASURED, linewidth=0.6, label="measured"
     )
     axes.set_xlim(times[0], times[-1])
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.35 * (high - low))
     axes.set_xlabel("time (s)")
     axes.set_ylabel(scale.label("spring force"))
+    if is_narrow(axes.figure):
+        legend_above(axes, columns=1)
+        return
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.35 * (high - low))
     axes.legend(loc="upper right", ncols=3)
 
 
@@ -167,7 +170,9 @@ def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str)
                     )
         axes.set_yticks([])
         axes.set_xlabel(scale.label(quantity))
-        if column == 0 and both.size:
+        if column == 0 and both.size and is_narrow(figure):
+            legend_above(axes, columns=2)
+        elif column == 0 and both.size:
             axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
             axes.legend(loc="upper left", ncols=2)
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, plain, styled
+from mesoslip.plots.printing import is_narrow
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, plain, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -23,7 +24,7 @@ LISTED = 14
 MAX_SCORE = 30.0
 # Mean times between slips of an excerpt.
 CYCLES = 5
-# Characters in a line of the title.
+# Characters in a line of the title of a wide figure.
 WIDTH = 115
 
 
@@ -31,25 +32,31 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None = None) -> Canvas:
     """Excerpts of measured and predicted traces, the shapes of slips, and the worst summaries."""
     suffixes = trace_suffixes(tree)
     with styled():
-        heights = [*(1.9 for _ in suffixes), 3.0]
-        figure = canvas(figure, (7.0, 0.6 + sum(heights)))
+        is_stacked = is_narrow(figure)
+        heights = [*(4.0 if is_stacked else 1.9 for _ in suffixes), 3.4 if is_stacked else 3.0]
+        figure = canvas(figure, (3.4 if is_stacked else 7.0, 0.6 + sum(heights)))
         rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         for number, after in enumerate(suffixes):
-            pair = rows[number].subgridspec(1, 2, width_ratios=[1.7, 1])
+            pair = (
+                rows[number].subgridspec(2, 1)
+                if is_stacked
+                else rows[number].subgridspec(1, 2, width_ratios=[1.7, 1])
+            )
             _excerpt(figure.add_subplot(pair[0]), tree, after, named=len(suffixes) > 1)
             _shape(figure.add_subplot(pair[1]), tree, number)
         draw_scores(figure.add_subplot(rows[len(suffixes)]), tree, Options())
-        figure.suptitle(_title(tree), x=0.01, ha="left", fontsize=8)
+        characters = 55 if is_stacked else WIDTH
+        figure.suptitle(_title(tree, characters), x=0.01, ha="left", fontsize=8)
     return figure
 
 
-def _title(tree: xr.DataTree) -> str:
+def _title(tree: xr.DataTree, characters: int) -> str:
     probability = float(tree.attrs["agreement_probability"])
     groups = ", ".join(str(tree.attrs["disagreeing"]).split("\n"))
     text = f"Agreement of model and trace: p = {probability:.2g}"
     if groups:
         text += f"; the model does not describe: {groups}"
-    return "\n".join(textwrap.wrap(plain(text), WIDTH))
+    return "\n".join(textwrap.wrap(plain(text), characters))
 
 
 def _excerpt(axes: Axes, tree: xr.DataTree, after: str, *, named: bool) -> None:
@@ -81,9 +88,12 @@ def _excerpt(axes: Axes, tree: xr.DataTree, after: str, *, named: bool) -> None:
         )
     axes.set_xlabel(unit.label("time from half a cycle before a slip"))
     axes.set_ylabel(scale.label("spring force"))
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.3 * (high - low))
-    axes.legend(loc="upper right", ncols=2)
+    if is_narrow(axes.figure):
+        legend_above(axes, columns=1)
+    else:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.3 * (high - low))
+        axes.legend(loc="upper right", ncols=2)
     if named:
         title = tree[f"observed_data{after}"].attrs["title"]
         axes.set_title(plain(str(title)), loc="left")
@@ -106,7 +116,8 @@ def _shape(axes: Axes, tree: xr.DataTree, number: int) -> None:
     at = np.array([float(names[index].rpartition("_")[2]) for index in chosen])
     part = data.isel(summary=chosen)
     factor = part["factor"].values
-    scale = scale_for(max_size(part["observed"].values * factor), "N")
+    ends = (part["observed"].values, part["predicted_95"].values)
+    scale = scale_for(max_size(*(one * factor for one in ends)), "N")
     low, middle, high = (
         part[f"predicted_{one}"].values * factor / scale.size for one in ("05", "50", "95")
     )
@@ -140,7 +151,8 @@ def draw_scores(axes: Axes, tree: xr.DataTree, _: Options) -> None:
         spread = (one["observed"].item() - middle) / size[index]
         ends = [(one[f"predicted_{end}"].item() - middle) / spread for end in ("05", "95")]
         color = WORST if str(one["group"].item()) in bad else MEASURED
-        axes.plot(ends, [row, row], color=PREDICTED, linewidth=4, alpha=0.4)
+        # Solid: print has dashes from the fifth curve on.
+        axes.plot(ends, [row, row], "-", color=PREDICTED, linewidth=4, alpha=0.4)
         shown = float(np.clip(size[index], -MAX_SCORE, MAX_SCORE))
         axes.plot(shown, row, "o", color=color, markersize=4)
     axes.set_yticks(
@@ -153,10 +165,14 @@ def draw_scores(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     axes.axvline(0, color="0.6", linewidth=0.6)
     axes.set_xscale("symlog", linthresh=3)
     axes.set_xlim(-1.1 * MAX_SCORE, 1.1 * MAX_SCORE)
-    ticks = (-30, -10, -3, 0, 3, 10, 30)
+    is_small = is_narrow(axes.figure)
+    ticks = (-30, 0, 30) if is_small else (-30, -10, -3, 0, 3, 10, 30)
+    if is_small:
+        axes.tick_params(axis="y", labelsize="x-small")
+        axes.minorticks_off()
     axes.set_xticks(ticks, [str(one) for one in ticks])
     axes.set_xlabel(
-        "measured - predicted (spreads)\nblue: 90 % of predictions\norange: groups that disagree"
+        "measured - predicted (spreads)\nblue: 90 % of predictions\nred: groups that disagree"
     )
 
 

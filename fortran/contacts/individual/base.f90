@@ -10,9 +10,9 @@ module mesoslip_contacts_individual_base
       & extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
       & new_avalanche_track, row_generation
-   use mesoslip_contacts_individual_births, only: bear, births_type, drag_of
+   use mesoslip_contacts_individual_births, only: bear, bear_by_rule, births_type, drag_of
    use mesoslip_contacts_individual_detached, only: detached_contacts_type, new_detached_contacts
-   use mesoslip_contacts_mechanics, only: delay_fixed
+   use mesoslip_contacts_mechanics, only: coupling_table, delay_fixed
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
       & row_origin, row_renewal, row_stiffness, behind_coordinate
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
@@ -344,10 +344,17 @@ contains
       do event = 1, size(contact)
          threshold(event) = self%record(row_next, contact(event))
       end do
-      do event = 1, size(contact)
-         call bear(self%parameters, threshold(event), stiffness(event), limit(event))
-         stretch(event) = back_force / stiffness(event)
-      end do
+      if (self%parameters%coupling == coupling_table) then
+         do event = 1, size(contact)
+            call bear(self%parameters, threshold(event), stiffness(event), limit(event))
+            stretch(event) = back_force / stiffness(event)
+         end do
+      else
+         do event = 1, size(contact)
+            call bear_by_rule(self%parameters, threshold(event), stiffness(event), limit(event))
+            stretch(event) = back_force / stiffness(event)
+         end do
+      end if
       if (.not. allocated(self%births%force)) return
       do event = 1, size(contact)
          call self%give_birth(contact(event), back_force, direction, stiffness(event), &

@@ -19,7 +19,7 @@ module mesoslip_contacts_individual_births
    implicit none
    private
 
-   public :: births_type, bear, drag_of
+   public :: births_type, bear, bear_by_rule, drag_of
 
    !> Draws that are made together
    integer, parameter :: draws_together = 32
@@ -217,15 +217,27 @@ contains
       !> Stiffness [N/m] and breaking stretch [m]
       real(wp), intent(out) :: stiffness, limit
 
-      stiffness = parameters%stiffness
       if (parameters%coupling == coupling_table) then
-         limit = threshold * (parameters%static_force / stiffness)
-         stiffness = stiffness * parameters%law%stiffness_at(threshold)
-         return
+         limit = threshold * (parameters%static_force / parameters%stiffness)
+         stiffness = parameters%stiffness * parameters%law%stiffness_at(threshold)
+      else
+         call bear_by_rule(parameters, threshold, stiffness, limit)
       end if
+   end subroutine bear
+
+   !> The same where the stiffness follows from the threshold.
+   pure subroutine bear_by_rule(parameters, threshold, stiffness, limit)
+      !> What the contacts are made of
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Relative threshold
+      real(wp), intent(in) :: threshold
+      !> Stiffness [N/m] and breaking stretch [m]
+      real(wp), intent(out) :: stiffness, limit
+
+      stiffness = parameters%stiffness
       if (parameters%coupling == coupling_scaled) stiffness = stiffness * sqrt(threshold)
       limit = threshold * parameters%static_force / stiffness
-   end subroutine bear
+   end subroutine bear_by_rule
 
    !> Relative threshold of a contact that was drawn.
    pure function threshold_of(parameters, drawn) result(threshold)

@@ -43,7 +43,10 @@ PRESCRIBED = {"slider": {"kind": "prescribed"}, "contacts__coupling": "equal"}
     [
         kind
         for kind in KINDS
-        if not any(one in kind for one in ("lattice", "ageing", "table", "newborn", "thermal, me"))
+        if not any(
+            one in kind
+            for one in ("lattice", "ageing", "table", "stiffnesses", "newborn", "thermal, me")
+        )
     ],
 )
 @pytest.mark.parametrize("law", ["relax", "log"])

@@ -109,7 +109,7 @@ class RegimeResult:
             return text
         if self.cycles < MIN_CYCLES:
             return (
-                f"{text}; {self.cycles} whole cycles between {with_unit(self.window_start, 's')} "
+                f"{text}; {self.cycles} whole cycle{'' if self.cycles == 1 else 's'} between {with_unit(self.window_start, 's')} "
                 f"and {with_unit(self.window_end, 's')}, at least {MIN_CYCLES} are needed: give a "
                 "longer duration"
             )

@@ -110,7 +110,8 @@ class RegimeResult:
         if self.cycles < MIN_CYCLES:
             whole = "1 whole cycle" if self.cycles == 1 else f"{self.cycles} whole cycles"
             return (
-                f"{text}; {whole} between {with_unit(self.window_start, 's')} and {with_unit(self.window_end, 's')}, at least {MIN_CYCLES} are needed: give a "
+                f"{text}; {whole} between {with_unit(self.window_start, 's')} "
+                f"and {with_unit(self.window_end, 's')}, at least {MIN_CYCLES} are needed: give a "
                 "longer duration"
             )
         period = with_error(self.period, self.period * self.period_variation, "s", 3)

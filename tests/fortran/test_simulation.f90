@@ -63,6 +63,8 @@ program test_simulation
    call runs_ahead("ensemble", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call runs_ahead("scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("ageing", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ageing", "prescribed", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("activated", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("activated", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("activated", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)

@@ -9,6 +9,7 @@ module mesoslip_contacts_ageing_base
       & row_stiffness, ahead_coordinate
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_schedule, only: max_events
    implicit none
    private
 
@@ -17,7 +18,7 @@ module mesoslip_contacts_ageing_base
    public :: in_queue, in_leaders, in_falling
    public :: leaders, falling, near
    public :: life_length, life_birth, life_limit, life_motion, no_motion, any_motion
-   public :: next_length, next_limit, next_speed, solved_together
+   public :: next_length, next_limit, next_speed, next_configured, solved_together
 
    !> Gap to its threshold over the mean breaking stretch at which a contact breaks that ages.
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
@@ -43,8 +44,8 @@ module mesoslip_contacts_ageing_base
    real(wp), parameter :: no_motion = -1.0_wp, any_motion = huge(1.0_wp)
 
    !> Numbers of the next life of a contact
-   integer, parameter :: next_length = 2
-   integer, parameter :: next_limit = 1, next_speed = 2
+   integer, parameter :: next_length = 3
+   integer, parameter :: next_limit = 1, next_speed = 2, next_configured = 3
    !> Next lives that are solved together, of which some are not drawn
    integer, parameter :: solved_together = 64
 
@@ -63,7 +64,8 @@ module mesoslip_contacts_ageing_base
       real(wp), allocatable :: life(:, :)
       type(contact_queue_type) :: queue
       !> Limit of the next life of each contact if it is born at a speed in the direction of motion
-      !> [m], and that speed [m/s]; shape (next_length, count). It is known ahead, or not
+      !> [m], and that speed [m/s], known ahead or not; its configured breaking stretch, if it is
+      !> listed in a schedule [m]; shape (next_length, count)
       real(wp), allocatable :: next(:, :)
       !> Contacts for which it is still to be found
       integer :: unsolved_count = 0, unsolved(solved_together) = 0
@@ -76,8 +78,8 @@ module mesoslip_contacts_ageing_base
       !> fall break than those that are near
       real(wp) :: scan_upper = huge(1.0_wp), scan_lower = -huge(1.0_wp)
       real(wp) :: scan_time = huge(1.0_wp)
-      !> Time of the last response [s], duration of the last motion, and by how much lately
-      !> the acceleration was another at the end of a motion [m/s2]
+      !> Time of the last response [s], duration of the last motion that was not steady or 0, and by
+      !> how much the acceleration was another at the end of a motion since then [m/s2]
       real(wp) :: now = 0.0_wp, duration = 0.0_wp, acceleration_jump = 0.0_wp
       !> Whether the slider moves steadily in the direction of the queue, number of its motion, and
       !> the speed for which the queue is ordered [m/s]; births and solutions since that was set
@@ -86,6 +88,8 @@ module mesoslip_contacts_ageing_base
       integer :: solved = 0
       !> Whether the law stayed as it was in the last response
       logical :: is_unchanged = .false.
+      !> Contacts of the breaks in the schedule
+      integer :: listed(max_events) = 0
    contains
       procedure :: rebuild
       procedure :: behind_of

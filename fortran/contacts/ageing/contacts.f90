@@ -24,7 +24,8 @@ module mesoslip_contacts_ageing_contacts
    use mesoslip_contacts_ageing_leaders, only: bound_leaders, break_leaders
    use mesoslip_contacts_ageing_lists, only: append
    use mesoslip_contacts_ageing_motion, only: bound_speed, follow_motion, min_ratio
-   use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, queue_newborn
+   use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, plan_steady, &
+      & queue_newborn, settle_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: exchange_individual, total_law
    use mesoslip_contacts_individual_queue, only: new_contact_queue
@@ -34,6 +35,7 @@ module mesoslip_contacts_ageing_contacts
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_schedule, only: schedule_type
    implicit none
    private
 
@@ -53,6 +55,8 @@ module mesoslip_contacts_ageing_contacts
       procedure :: initialize
       procedure :: offer
       procedure :: respond
+      procedure :: plan
+      procedure :: settle
       procedure :: join
       procedure :: shift_order
       procedure :: exchange
@@ -167,9 +171,14 @@ contains
       real(wp) :: breaks
 
       self%now = after%time
-      self%duration = after%time - before%time
-      self%acceleration_jump = max(abs(after%acceleration - before%acceleration), &
-         & memory * self%acceleration_jump)
+      if (self%is_steady) then
+         self%duration = 0.0_wp
+         self%acceleration_jump = abs(after%acceleration - before%acceleration)
+      else
+         self%duration = after%time - before%time
+         self%acceleration_jump = max(abs(after%acceleration - before%acceleration), &
+            & memory * self%acceleration_jump)
+      end if
       breaks = self%breaks
       self%is_unchanged = self%detached%next_due > after%time
       if (self%is_steady) then
@@ -181,6 +190,42 @@ contains
       if (self%breaks > breaks) self%is_unchanged = .false.
       call self%attach_due(after)
    end subroutine respond
+
+   !> Write a schedule of what comes next, in the steady motion of a slider that keeps to its drive.
+   subroutine plan(self, pose, limit, schedule)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
+      !> The schedule; at its end if there is none
+      type(schedule_type), intent(inout) :: schedule
+
+      schedule%is_over = .true.
+      if (pose%inverse_mass > 0.0_wp .or. pose%direction * self%direction < 0.0_wp) return
+      self%cost = 1.0_wp
+      call follow_motion(self, pose)
+      if (self%is_steady) call plan_steady(self, pose, limit, schedule)
+   end subroutine plan
+
+   !> Keep the books of a schedule.
+   subroutine settle(self, schedule, pose)
+      !> The contacts
+      class(contact_ageing_type), intent(inout) :: self
+      !> The schedule, as far as the slider came
+      type(schedule_type), intent(inout) :: schedule
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      self%now = pose%time
+      self%duration = 0.0_wp
+      self%acceleration_jump = 0.0_wp
+      call settle_steady(self, schedule)
+      ! What broke a moment ago and attaches at once was not in the schedule.
+      if (schedule%is_over) call self%attach_due(pose)
+      self%detached_count = real(self%detached%count, wp)
+   end subroutine settle
 
    !> Break all contacts that are due.
    subroutine break_due(self, pose)

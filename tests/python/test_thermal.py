@@ -280,6 +280,32 @@ def test_a_long_hold_of_a_rigid_slider(klein):
     assert abs(float(tree["energy_residual"].values[0])) < 1e-10
 
 
+def test_a_rigid_slider_moves_on_after_a_long_hold(klein):
+    """It starts in balance but for rounding, which the drive outweighs before the time can grow."""
+    config = klein(
+        run__duration=None,
+        drive={
+            "stage": [
+                {"duration": 0.2, "velocity": -1e-6},
+                {"duration": 1e6, "velocity": 0.0},
+                {"duration": 0.2, "velocity": 1e-6},
+            ]
+        },
+        contacts__count=500,
+        contacts__coupling="equal",
+        contacts__delay_law="exponential",
+        contacts__threshold__relative_width=0.05,
+        contacts__thermal={"rate": 1e3, "force_ratio": 0.02},
+        output__interval=2e3,
+    )
+    tree = mesoslip.run(config)
+    # Hardly anything is left of the force before the last stage, which begins at 0.
+    expected = config.contacts.stiffness * 0.2e-6
+    assert 0 < float(tree["contact_force"].values[0, -1]) <= 1.001 * expected
+    # The time has five digits less than that of a run without the hold.
+    assert abs(float(tree["energy_residual"].values[0])) < 1e-7
+
+
 @pytest.mark.parametrize(
     "changes",
     [

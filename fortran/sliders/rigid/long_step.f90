@@ -91,13 +91,18 @@ contains
       !> Terms of the series
       integer, intent(in) :: terms
 
-      real(wp) :: step, change, reach, target, direction
+      real(wp) :: step, change, reach, target, direction, tick
       real(wp) :: series(0:long_terms - 1), damper(0:long_terms - 1)
       type(motion_rates_type) :: late
       logical :: crosses, turns, is_due
       integer :: term
 
       call expand(system, self%damping, early, terms, series, damper)
+      tick = spacing(self%time)
+      if (abs(series(0)) + tick * abs(series(1)) <= tick**2 * abs(series(2))) then
+         ! The drive turns the slider before the time can grow: it is at rest and in balance.
+         series(:1) = 0.0_wp
+      end if
       self%terms = terms
       self%series(:terms - 1) = series(:terms - 1)
 

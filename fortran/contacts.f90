@@ -6,8 +6,8 @@ module mesoslip_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
    use mesoslip_contacts_lattice, only: make_contact_lattice
-   use mesoslip_contacts_populations, only: make_activated_populations, &
-      & make_ageing_populations, make_contact_populations
+   use mesoslip_contacts_populations, only: make_activated_ageing_populations, &
+      & make_activated_populations, make_ageing_populations, make_contact_populations
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: i8
    use mesoslip_numerics_parameters, only: parameters_type
@@ -40,6 +40,8 @@ contains
          call make_contact_activated(contacts, common, parameters, error)
       case ("activated populations")
          call make_activated_populations(contacts, common, parameters, error)
+      case ("activated ageing populations")
+         call make_activated_ageing_populations(contacts, common, parameters, error)
       case ("activated ageing")
          call make_activated_ageing(contacts, common, parameters, error)
       case ("ageing")

@@ -19,7 +19,8 @@ module mesoslip_contacts_populations
    private
 
    public :: contact_populations_type, new_contact_populations, make_contact_populations
-   public :: make_ageing_populations, make_activated_populations
+   public :: make_ageing_populations, make_activated_populations, &
+      & make_activated_ageing_populations
 
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: max_attached_part = 0.1_wp
@@ -128,26 +129,70 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       type(contact_populations_type), allocatable :: populations
-      real(wp) :: resolution, rate, force
+      real(wp) :: resolution
 
       call parameters%take("resolution", resolution, error)
+      if (allocated(error)) return
+      allocate (populations)
+      call new_contact_populations(populations, common, resolution, error)
+      if (allocated(error)) return
+      call activate(populations, parameters, error)
+      if (allocated(error)) return
+      call move_alloc(populations, contacts)
+   end subroutine make_activated_populations
+
+   !> Set up populations whose thresholds change with age, and that break by thermal activation, from
+   !> named numbers.
+   subroutine make_activated_ageing_populations(contacts, common, parameters, error)
+      !> The contacts
+      class(contacts_type), allocatable, intent(out) :: contacts
+      !> What all kinds of contacts are made of
+      type(contact_parameters_type), intent(in) :: common
+      !> The other numbers: resolution, the law of ageing, rate and force of activation
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_populations_type), allocatable :: populations
+      type(contact_parameters_type) :: all
+      type(ageing_law_type) :: ageing
+      real(wp) :: resolution
+
+      all = common
+      call parameters%take("resolution", resolution, error)
+      call take_ageing_law(ageing, all%law, parameters, error)
+      if (allocated(error)) return
+      allocate (populations)
+      call new_contact_populations(populations, all, resolution, error)
+      if (allocated(error)) return
+      call populations%pinned%set_ageing(ageing)
+      call activate(populations, parameters, error)
+      if (allocated(error)) return
+      call move_alloc(populations, contacts)
+   end subroutine make_activated_ageing_populations
+
+   !> Let populations break by thermal activation.
+   subroutine activate(self, parameters, error)
+      type(contact_populations_type), intent(inout) :: self
+      !> The last numbers: rate and force of activation
+      type(parameters_type), intent(inout) :: parameters
+      type(error_type), allocatable, intent(inout) :: error
+
+      real(wp) :: rate, force
+
       call parameters%take("activation_rate", rate, error)
       call parameters%take("activation_force", force, error)
       call parameters%finish(error)
       if (allocated(error)) return
       if (.not. (rate > 0.0_wp .and. force > 0.0_wp &
-         & .and. common%coupling == coupling_equal)) then
+         & .and. self%parameters%coupling == coupling_equal)) then
          call raise(error, status_invalid, "activation needs equal contacts, and a positive rate " &
             & // "and force")
          return
       end if
-      allocate (populations)
-      call new_contact_populations(populations, common, resolution, error)
-      if (allocated(error)) return
-      call populations%pinned%activate(rate, force / common%static_force, resolution)
-      populations%detached%short_gap = activated_gap
-      call move_alloc(populations, contacts)
-   end subroutine make_activated_populations
+      call self%pinned%activate(rate, force / self%parameters%static_force, self%resolution)
+      self%detached%short_gap = activated_gap
+   end subroutine activate
 
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state)

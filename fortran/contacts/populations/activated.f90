@@ -8,8 +8,10 @@ module mesoslip_contacts_populations_activated
    use mesoslip_contacts_populations_activation, only: activation_type, growth_type
    use mesoslip_contacts_populations_breaking, only: breaking_populations_type, tiny_gap, &
       & trial_type, unresolved_part
-   use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_broken, &
-      & column_force, column_level, column_origin, column_weight, moments_length, number
+   use mesoslip_contacts_populations_nodes, only: new_threshold_nodes, threshold_nodes_type
+   use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
+      & column_broken, column_force, column_level, column_origin, column_weight, moments_length, &
+      & number
    use mesoslip_contacts_populations_survivors, only: new_survivors, no_level, &
       & survivors_type
    use mesoslip_interface_law, only: pose_type
@@ -32,8 +34,11 @@ module mesoslip_contacts_populations_activated
       !> Whether they do, and how
       logical :: is_activated = .false.
       type(activation_type) :: activation
-      !> What it leaves of contacts
+      !> What it leaves of contacts, and of those whose thresholds change with age
       type(survivors_type), private :: survivors
+      type(threshold_nodes_type), private :: nodes
+      !> Time in which contacts join a population [s]
+      real(wp), private :: joining_time = huge(1.0_wp)
    contains
       !> Let contacts break by activation
       procedure, non_overridable :: set_activation
@@ -43,22 +48,35 @@ module mesoslip_contacts_populations_activated
       procedure, non_overridable :: join_last
       !> Whether contacts may join a population
       procedure, non_overridable :: may_join
+      !> Note what a population has gone through while it attached
+      procedure, non_overridable :: begin_hazard
+      procedure, non_overridable, private :: break_one, number_left, thresholds_reached, &
+         & first_break_force
    end type activated_populations_type
 
 contains
 
    !> Let contacts break by activation.
-   subroutine set_activation(self, activation)
+   subroutine set_activation(self, activation, resolution)
       !> The populations
       class(activated_populations_type), intent(inout) :: self
       !> How they do
       type(activation_type), intent(in) :: activation
+      !> Length of a step over the spread of the breaking stretches
+      real(wp), intent(in) :: resolution
 
       self%is_activated = .true.
       self%keeps_order = .true.
       self%activation = activation
-      call new_survivors(self%survivors, self%parameters%law, self%moments(1), number, &
-         & activation%width)
+      if (self%ages) then
+         self%joining_time = joining_part * min(1.0_wp, resolution) * self%ageing%time
+         call new_threshold_nodes(self%nodes, self%parameters%law, self%moments(1), self%ageing, &
+            & activation%width)
+         allocate (self%kept(self%nodes%count, size(self%population, 1)), source=1.0_wp)
+      else
+         call new_survivors(self%survivors, self%parameters%law, self%moments(1), number, &
+            & activation%width)
+      end if
    end subroutine set_activation
 
    !> Find what breaks in a motion of the slider.
@@ -73,8 +91,7 @@ contains
       real(wp), intent(out) :: late, onset
 
       type(growth_type) :: growth
-      real(wp) :: moments(moments_length), direction, edge, max_breaks, start, end, last, broken, &
-         & cut, left, heat, squares
+      real(wp) :: direction, edge, max_breaks, start, end, last, broken, cut, left, heat, squares
       integer :: row, column
 
       direction = sign(1.0_wp, displacement - before%displacement)
@@ -95,25 +112,11 @@ contains
          trial%count = self%count
          call clear_sums(trial)
          do row = 1, self%count
-            associate (weight => population(row, column_weight), held => self%left(number, row))
+            associate (held => self%left(number, row))
                start = force_at(before%displacement)
                end = force_at(after%displacement)
                last = force_at(displacement)
-               broken = population(row, column_broken)
-               cut = held
-               call self%moments(1)%interpolate(max(broken, abs(last)), moments)
-               if (abs(last) > broken) cut = min(held, weight * self%survivors%left( &
-                  & abs(last), population(row, column_level), moments(number)))
-               trial%population(row) = row
-               trial%broken(row) = max(broken, abs(last))
-               trial%level(row) = self%activation%level_after(growth, &
-                  & population(row, column_level), start, end)
-               left = min(cut, weight * self%survivors%left(trial%broken(row), &
-                  & trial%level(row), moments(number)))
-               if (left < unresolved_part * weight) then
-                  left = 0.0_wp
-                  if (cut < unresolved_part * weight) cut = 0.0_wp
-               end if
+               call self%break_one(row, growth, before, after, [start, end, last], cut, left)
                trial%moments(:, row) = left
 
                ! Forces along the direction from here on.
@@ -126,7 +129,7 @@ contains
                trial%breaks = trial%breaks + (held - left)
                trial%drop = trial%drop + (held - cut) * last + heat * end
                if (held > cut) then
-                  squares = mean_square(max(start, broken), last)
+                  squares = mean_square(self%first_break_force(row, before, start, last), last)
                   trial%lost(row) = trial%lost(row) + (held - cut) * squares
                   trial%work = trial%work + 0.5_wp * (held - cut) * (last**2 - squares)
                   trial%cut_work = trial%cut_work + 0.5_wp * (held - cut) * (last**2 - squares)
@@ -163,6 +166,107 @@ contains
 
    end subroutine try_motion
 
+   !> Find what breaks of a population.
+   pure subroutine break_one(self, row, growth, before, after, forces, cut, left)
+      class(activated_populations_type), intent(inout) :: self
+      !> Which one, and what the motion adds to levels
+      integer, intent(in) :: row
+      type(growth_type), intent(in) :: growth
+      type(pose_type), intent(in) :: before, after
+      !> Forces on the contacts before and after, and to which contacts are found that come to their
+      !> thresholds
+      real(wp), intent(in) :: forces(3)
+      !> What is left of its contacts without activation in the motion, and with it
+      real(wp), intent(out) :: cut, left
+
+      real(wp) :: moments(moments_length)
+
+      associate (trial => self%trial, population => self%population)
+         trial%population(row) = row
+         trial%broken(row) = max(population(row, column_broken), &
+            & self%thresholds_reached(row, forces(3), after%time))
+         trial%level(row) = population(row, column_level)
+         call self%moments(1)%interpolate(trial%broken(row), moments)
+         associate (weight => population(row, column_weight))
+            cut = self%left(number, row)
+            if (self%ages) then
+               if (trial%broken(row) > population(row, column_broken)) cut = min(cut, &
+                  & weight * self%nodes%left(trial%broken(row), self%kept(:, row), moments(number)))
+               trial%kept(:, row) = self%kept(:, row)
+               call self%nodes%pass(self%activation, growth, before, after, &
+                  & population(row, column_birth), forces(:2), trial%broken(row), &
+                  & trial%kept(:, row))
+               left = min(cut, weight * self%nodes%left(trial%broken(row), trial%kept(:, row), &
+                  & moments(number)))
+            else
+               if (trial%broken(row) > population(row, column_broken)) cut = min(cut, &
+                  & weight * self%survivors%left(trial%broken(row), trial%level(row), &
+                  & moments(number)))
+               trial%level(row) = self%activation%level_after(growth, trial%level(row), forces(1), &
+                  & forces(2))
+               left = min(cut, weight * self%survivors%left(trial%broken(row), trial%level(row), &
+                  & moments(number)))
+            end if
+            if (left < unresolved_part * weight) then
+               left = 0.0_wp
+               if (cut < unresolved_part * weight) cut = 0.0_wp
+            end if
+         end associate
+      end associate
+   end subroutine break_one
+
+   !> Configured threshold of the contacts of a population whose thresholds are reached.
+   pure function thresholds_reached(self, row, force, time) result(threshold)
+      class(activated_populations_type), intent(in) :: self
+      integer, intent(in) :: row
+      !> Force on the contacts, and when that is [s]
+      real(wp), intent(in) :: force, time
+      real(wp) :: threshold
+
+      threshold = abs(force)
+      if (self%ages) threshold = self%ageing%configured(threshold, &
+         & max(0.0_wp, time - self%population(row, column_birth)))
+   end function thresholds_reached
+
+   !> Force along the direction at which the first contacts of a population come to their thresholds.
+   pure function first_break_force(self, row, before, start, last) result(force)
+      class(activated_populations_type), intent(in) :: self
+      integer, intent(in) :: row
+      type(pose_type), intent(in) :: before
+      !> Forces before the motion and at its end
+      real(wp), intent(in) :: start, last
+      real(wp) :: force
+
+      real(wp) :: reached
+
+      associate (broken => self%population(row, column_broken))
+         force = max(start, broken)
+         if (.not. self%ages) return
+         force = max(start, 0.0_wp)
+         reached = self%thresholds_reached(row, force, before%time)
+         if (broken > reached) force = force + (last - force) * (broken - reached) &
+            & / (self%trial%broken(row) - reached)
+      end associate
+   end function first_break_force
+
+   !> What is left of the contacts of a population over its weight.
+   pure function number_left(self, row) result(left)
+      class(activated_populations_type), intent(in) :: self
+      integer, intent(in) :: row
+      real(wp) :: left
+
+      real(wp) :: moments(moments_length)
+
+      associate (broken => self%population(row, column_broken))
+         call self%moments(1)%interpolate(broken, moments)
+         if (self%ages) then
+            left = self%nodes%left(broken, self%kept(:, row), moments(number))
+         else
+            left = self%survivors%left(broken, self%population(row, column_level), moments(number))
+         end if
+      end associate
+   end function number_left
+
    !> Set the sums over what breaks to zero.
    pure subroutine clear_sums(trial)
       type(trial_type), intent(inout) :: trial
@@ -183,12 +287,13 @@ contains
       mean_square = (first**2 + first * second + second**2) / 3.0_wp
    end function mean_square
 
-   !> Whether contacts may join a population: hardly any of it have broken.
-   pure function may_join(self, row)
+   !> Whether contacts may join a population: hardly any of it have broken, and it is not older.
+   pure function may_join(self, row, birth)
       !> The populations
       class(activated_populations_type), intent(in) :: self
-      !> Which one
+      !> Which one, and when the contacts attached [s]
       integer, intent(in) :: row
+      real(wp), intent(in) :: birth
       !> Whether they may
       logical :: may_join
 
@@ -196,24 +301,41 @@ contains
 
       call self%moments(1)%interpolate(self%population(row, column_broken), moments)
       may_join = self%left(number, row) > (1.0_wp - max_joined_loss) &
-         & * self%population(row, column_weight) * moments(number)
+         & * self%population(row, column_weight) * moments(number) &
+         & .and. birth - self%population(row, column_birth) <= self%joining_time
    end function may_join
 
+   !> Note what the contacts of a population have gone through since they attached.
+   subroutine begin_hazard(self, row, duration, force)
+      !> The populations
+      class(activated_populations_type), intent(inout) :: self
+      !> Which one
+      integer, intent(in) :: row
+      !> The time since then [s], and the force on them
+      real(wp), intent(in) :: duration, force
+
+      self%population(row, column_level) = self%activation%newborn_level(duration, force)
+      if (.not. allocated(self%kept)) return
+      call self%nodes%pass_newborn(self%activation%rate, duration, force, self%kept(:, row))
+   end subroutine begin_hazard
+
    !> Let contacts that attach join a population that attached close by.
-   subroutine join_last(self, row, origin, contacts, level, displacement, time, energy)
+   subroutine join_last(self, row, origin, birth, contacts, force, displacement, time, energy)
       !> The populations
       class(activated_populations_type), intent(inout) :: self
       !> Which population
       integer, intent(in) :: row
-      !> Where they attach [m], how many they are, and the level of their hazard
-      real(wp), intent(in) :: origin, contacts, level
+      !> Where and when they attach [m] and [s], how many they are, and the force on them
+      real(wp), intent(in) :: origin, birth, contacts, force
       !> Where the slider is [m], and when that is [s]
       real(wp), intent(in) :: displacement, time
       !> Elastic energy that is lost by giving all of them one origin [J]
       real(wp), intent(inout) :: energy
 
-      real(wp) :: moments(moments_length), below(2), part, high, all
+      real(wp) :: below(2), part, high, all, level
+      real(wp), allocatable :: kept(:)
 
+      level = self%activation%newborn_level(time - birth, force)
       associate (population => self%population, width => self%activation%width)
          all = self%left(number, row) + contacts
          part = contacts / all
@@ -229,9 +351,14 @@ contains
             population(row, column_level) = high + width &
                & * log(part * exp(below(1)) + (1.0_wp - part) * exp(below(2)))
          end if
-         call self%moments(1)%interpolate(population(row, column_broken), moments)
-         population(row, column_weight) = all / self%survivors%left( &
-            & population(row, column_broken), population(row, column_level), moments(number))
+         if (allocated(self%kept)) then
+            allocate (kept(self%nodes%count))
+            call self%nodes%pass_newborn(self%activation%rate, time - birth, force, kept)
+            self%kept(:, row) = self%kept(:, row) + part * (kept - self%kept(:, row))
+            population(row, column_birth) = population(row, column_birth) &
+               & + part * (birth - population(row, column_birth))
+         end if
+         population(row, column_weight) = all / self%number_left(row)
          self%left(:, row) = all
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
          population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))

@@ -31,7 +31,8 @@ module mesoslip_contacts_populations_activation
    contains
       !> What a motion adds to levels
       procedure, non_overridable :: growth
-      !> Level after a motion, and after a time under a force
+      !> What a motion adds to a level, the level after it, and after a time under a force
+      procedure, non_overridable :: added
       procedure, non_overridable :: level_after
       procedure, non_overridable :: newborn_level
    end type activation_type
@@ -42,6 +43,11 @@ module mesoslip_contacts_populations_activation
       real(wp), private :: level(2) = no_level
       !> Of those under no force, if the slider rested
       real(wp), private :: rest = no_level
+      !> Mean time of the hazard in the motion, over its duration, of the first two
+      real(wp), private :: time(2) = 0.5_wp
+   contains
+      !> Mean time of the hazard
+      procedure, non_overridable :: mean_time
    end type growth_type
 
 contains
@@ -68,7 +74,7 @@ contains
       !> What is added
       type(growth_type) :: growth
 
-      real(wp) :: duration, exponent(points), place, most, sign
+      real(wp) :: duration, exponent(points), hazard(points), place, most, sign
       integer :: node, one
 
       duration = after%time - before%time
@@ -81,11 +87,52 @@ contains
       sign = 1.0_wp
       do one = 1, 2
          most = maxval(sign * exponent)
-         growth%level(one) = growth%rest + self%width * (most &
-            & + log(sum(self%weight * exp(sign * exponent - most))))
+         hazard = self%weight * exp(sign * exponent - most)
+         growth%level(one) = growth%rest + self%width * (most + log(sum(hazard)))
+         growth%time(one) = sum(hazard * self%point) / sum(hazard)
          sign = -1.0_wp
       end do
    end function growth
+
+   !> Mean time of the hazard in a motion, over its duration.
+   elemental function mean_time(self, start_force, end_force) result(time)
+      !> What the motion adds
+      class(growth_type), intent(in) :: self
+      !> Forces on the contacts before and after
+      real(wp), intent(in) :: start_force, end_force
+      real(wp) :: time
+
+      time = 0.5_wp
+      if (start_force * end_force >= 0.0_wp) then
+         time = self%time(merge(1, 2, start_force + end_force >= 0.0_wp))
+      end if
+   end function mean_time
+
+   !> What a motion adds to the level of a population.
+   elemental function added(self, growth, start_force, end_force) result(more)
+      !> How populations are activated
+      class(activation_type), intent(in) :: self
+      !> What the motion adds
+      type(growth_type), intent(in) :: growth
+      !> Forces on the contacts before and after
+      real(wp), intent(in) :: start_force, end_force
+      real(wp) :: more
+
+      real(wp) :: low, high
+
+      if (.not. growth%rest > no_level) then
+         more = no_level
+      else if (start_force * end_force >= 0.0_wp) then
+         more = abs(start_force) + growth%level(merge(1, 2, start_force + end_force >= 0.0_wp))
+      else
+         ! The force changes its sign, evenly in time.
+         low = min(abs(start_force), abs(end_force)) / self%width
+         high = max(abs(start_force), abs(end_force)) / self%width
+         more = growth%rest + self%width * (high + log((1.0_wp + exp(low - high) &
+            & - 2.0_wp * exp(-high)) / (low + high)))
+         if (high < tiny_exponent) more = growth%rest
+      end if
+   end function added
 
    !> Level of a population after a motion.
    elemental function level_after(self, growth, level, start_force, end_force) result(after)
@@ -97,22 +144,11 @@ contains
       real(wp), intent(in) :: level, start_force, end_force
       real(wp) :: after
 
-      real(wp) :: more, low, high
+      real(wp) :: more
 
-      if (.not. growth%rest > no_level) then
-         after = level
-         return
-      end if
-      if (start_force * end_force >= 0.0_wp) then
-         more = abs(start_force) + growth%level(merge(1, 2, start_force + end_force >= 0.0_wp))
-      else
-         ! The force changes its sign, evenly in time.
-         low = min(abs(start_force), abs(end_force)) / self%width
-         high = max(abs(start_force), abs(end_force)) / self%width
-         more = growth%rest + self%width * (high + log((1.0_wp + exp(low - high) &
-            & - 2.0_wp * exp(-high)) / (low + high)))
-         if (high < tiny_exponent) more = growth%rest
-      end if
+      after = level
+      more = self%added(growth, start_force, end_force)
+      if (.not. more > no_level) return
       after = more
       if (.not. level > no_level) return
       after = max(level, more) + self%width * log(1.0_wp + exp(-abs(level - more) / self%width))

@@ -32,10 +32,11 @@ module mesoslip_contacts_populations_breaking
       !> The populations of which contacts break, their forces at attaching along the direction,
       !> the distances from there, the thresholds below which they will have broken, the levels of
       !> their hazards, what the moments will be, and twice the energy that is lost; shape (count,
-      !> or more)
+      !> or more). Of contacts that age and break by activation: what it leaves at nodes.
       integer :: count = 0
       integer, allocatable :: population(:)
       real(wp), allocatable :: force(:), distance(:), broken(:), level(:), moments(:, :), lost(:)
+      real(wp), allocatable :: kept(:, :)
       !> Breaks, and their mass; work that need not be done for them [J]
       real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp
       !> Force at the end that the contacts which break would bear [N], and how far it is [m]
@@ -272,6 +273,9 @@ contains
          & self%trial%distance(rows), self%trial%broken(rows))
       allocate (self%trial%level(rows), source=no_level)
       allocate (self%trial%moments(moments_length, rows), self%trial%lost(rows))
+      if (.not. allocated(self%kept)) return
+      if (allocated(self%trial%kept)) deallocate (self%trial%kept)
+      allocate (self%trial%kept(size(self%kept, 1), rows))
    end subroutine make_room_to_try
 
    !> List the populations of which contacts break until the slider comes to a displacement.
@@ -375,6 +379,7 @@ contains
             self%left(:, row) = self%trial%moments(:, trial)
             population(row, column_broken) = self%trial%broken(trial)
             population(row, column_level) = self%trial%level(trial)
+            if (allocated(self%kept)) self%kept(:, row) = self%trial%kept(:, trial)
             if (self%left(number, row) > 0.0_wp) then
                if (self%trial%direction > 0.0_wp) then
                   population(row, column_ahead) = self%trial%end
@@ -420,6 +425,7 @@ contains
          if (kept == row) cycle
          self%population(kept, :) = self%population(row, :)
          self%left(:, kept) = self%left(:, row)
+         if (allocated(self%kept)) self%kept(:, kept) = self%kept(:, row)
       end do
       self%count = kept
    end subroutine remove_empty

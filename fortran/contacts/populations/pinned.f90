@@ -8,8 +8,8 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_populations_activated, only: activated_populations_type, joining_part
    use mesoslip_contacts_populations_activation, only: new_activation
    use mesoslip_contacts_populations_breaking, only: unresolved_part
-   use mesoslip_contacts_populations_rows, only: column_level, column_weight, compliant, &
-      & moments_length, new_population_rows, number, stiff
+   use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
+      & new_population_rows, number, stiff
    use mesoslip_contacts_populations_table_lives, only: new_table_lives, newborn_law
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -108,14 +108,15 @@ contains
       length = step_part * resolution * min(spread, max_spread) * stretch
    end function step_length
 
-   !> Let contacts break by thermal activation, which spreads their breaking stretches too.
+   !> Let contacts break by thermal activation, which spreads their breaking stretches too. If their
+   !> thresholds change with age, that has been set before.
    subroutine activate(self, rate, width, resolution)
       !> The populations, of equal contacts
       class(pinned_populations_type), intent(inout) :: self
       !> Rate of breaking at the threshold [1/s], f_T/f_s, and length of a step over the spread
       real(wp), intent(in) :: rate, width, resolution
 
-      call self%set_activation(new_activation(rate, width, self%stretch))
+      call self%set_activation(new_activation(rate, width, self%stretch), resolution)
       self%step = step_length(hypot(self%parameters%law%width, width), resolution, self%stretch)
    end subroutine activate
 
@@ -260,7 +261,7 @@ contains
       !> Elastic energy that is lost as contacts join others [J]
       real(wp), intent(out) :: lost
 
-      real(wp) :: origin, force, level
+      real(wp) :: origin, force, mean_force
       integer :: class
       logical :: joins
 
@@ -271,18 +272,17 @@ contains
       lost = 0.0_wp
       origin = moment / births
       joins = .false.
-      if (self%is_activated) joins = self%may_join_last(origin, direction)
+      if (self%is_activated) joins = self%may_join_last(origin, birth, direction)
       do class = 1, self%classes
          force = direction * self%class_force(class)
-         level = self%activation%newborn_level(time - birth, &
-            & force + 0.5_wp * (displacement - origin) / self%stretch)
+         mean_force = force + 0.5_wp * (displacement - origin) / self%stretch
          if (joins) then
-            call self%join_last(self%count - self%classes + class, origin, &
-               & births * self%newborn_share(class), level, displacement, time, lost)
+            call self%join_last(self%count - self%classes + class, origin, birth, &
+               & births * self%newborn_share(class), mean_force, displacement, time, lost)
          else
             call self%add(origin, force, self%share(class) * births, &
                & self%law_of(class, direction), self%class_broken(class), displacement, birth, time)
-            self%population(self%count, column_level) = level
+            if (self%is_activated) call self%begin_hazard(self%count, time - birth, mean_force)
          end if
       end do
       if (joins) return
@@ -304,10 +304,10 @@ contains
    end function law_of
 
    !> Whether contacts that attach may join the last populations.
-   pure function may_join_last(self, origin, direction) result(joins)
+   pure function may_join_last(self, origin, birth, direction) result(joins)
       class(pinned_populations_type), intent(in) :: self
-      !> Where they attach [m], and the direction of their forces
-      real(wp), intent(in) :: origin, direction
+      !> Where and when they attach [m] and [s], and the direction of their forces
+      real(wp), intent(in) :: origin, birth, direction
       logical :: joins
 
       integer :: row
@@ -315,7 +315,7 @@ contains
       joins = self%open_count == self%classes .and. self%open_direction * direction > 0.0_wp &
          & .and. abs(origin - self%open_origin) <= joining_part * self%step
       do row = self%count - self%open_count + 1, self%count
-         joins = joins .and. self%may_join(row)
+         joins = joins .and. self%may_join(row, birth)
       end do
    end function may_join_last
 

@@ -95,6 +95,9 @@ module mesoslip_contacts_populations_rows
       real(wp), allocatable :: population(:, :)
       !> Moments of their contacts that are left, shape (moments_length, rows)
       real(wp), allocatable :: left(:, :)
+      !> Part of them that thermal activation leaves at nodes over the thresholds, if they age too,
+      !> shape (nodes, rows)
+      real(wp), allocatable :: kept(:, :)
    contains
       !> Add a population
       procedure, non_overridable :: add
@@ -167,6 +170,7 @@ contains
             population(row, column_ahead) = origin + self%stretch * ahead
             population(row, column_behind) = origin - self%stretch * behind
          end if
+         if (allocated(self%kept)) self%kept(:, row) = 1.0_wp
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
          population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
          self%ahead = min(self%ahead, population(row, column_ahead))
@@ -187,6 +191,10 @@ contains
       allocate (larger(moments_length, 2 * self%count), source=0.0_wp)
       larger(:, :self%count) = self%left
       call move_alloc(larger, self%left)
+      if (.not. allocated(self%kept)) return
+      allocate (larger(size(self%kept, 1), 2 * self%count), source=0.0_wp)
+      larger(:, :self%count) = self%kept
+      call move_alloc(larger, self%kept)
    end subroutine make_room
 
    !> Displacement at which contacts of a population break next in a direction.
@@ -336,6 +344,7 @@ contains
       call archive%section("pinned populations")
       call archive%exchange("population", self%population)
       call archive%exchange("left", self%left)
+      if (allocated(self%kept)) call archive%exchange("kept", self%kept)
       call archive%exchange("count", self%count)
       call archive%exchange("ahead", self%ahead)
       call archive%exchange("behind", self%behind)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from mesoslip.configuration.contacts.activated import (
     ActivatedAgeingContacts,
+    ActivatedAgeingPopulations,
     ActivatedContacts,
     ActivatedPopulations,
 )
@@ -20,6 +21,7 @@ from mesoslip.configuration.tables import Run
 
 KINDS: tuple[type[ContactKind], ...] = (
     ActivatedAgeingContacts,
+    ActivatedAgeingPopulations,
     ActivatedContacts,
     ActivatedPopulations,
     AgeingContacts,

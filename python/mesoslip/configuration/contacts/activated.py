@@ -160,10 +160,21 @@ class ActivatedPopulations(PopulationContacts):
                 "state thresholds do not have the law by which activation is tabulated",
                 config.contacts.initial,
             )
-        if config.contacts.ageing is not None:
-            yield Complaint(
-                "contacts.ageing",
-                'needs engine "eq" with contacts.thermal: as thresholds change, the hazards of '
-                "contacts of different thresholds have no ratio that stays, so that one number "
-                "does not give what is left of a population",
-            )
+
+
+class ActivatedAgeingPopulations(ActivatedPopulations):
+    """Infinitely many contacts that break by thermal activation and age."""
+
+    kernel_kind: ClassVar[str] = "activated ageing populations"
+
+    @classmethod
+    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
+        return super().is_meant(run, contacts, interaction) and contacts.ageing is not None
+
+    def kernel_parameters(self, config: Setting) -> Parameters:
+        return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
+
+    def problems(self, config: Setting) -> Complaints:
+        yield from super().problems(config)
+        # Coupling and interaction have been checked.
+        yield from (one for one in ageing_problems(config) if one.key == INITIAL_AGE)

@@ -1,0 +1,371 @@
+!> What thermal activation leaves of contacts whose thresholds change with age, by threshold.
+!>
+!> A contact of the configured threshold u has the threshold a + b u at an age, with a and b that are
+!> those of its population. Its integrated hazard is a sum of exp((f - a - b u)/theta) over the life:
+!> with b constant it would be exp((e - b u)/theta) with one level e of the population, but as b
+!> changes, hazards of two thresholds have no ratio that stays. So a population keeps the part that
+!> is left of its contacts at the nodes of Gauss-Legendre rules in panels over the thresholds. Panels
+!> are so short that both the law and the hazard are smooth in them: where contacts below some
+!> threshold have broken, the rest of its panel is integrated by the polynomial through the nodes.
+module mesoslip_contacts_populations_nodes
+   use mesoslip_contacts_ageing_law, only: ageing_law_type
+   use mesoslip_contacts_partial_moments, only: partial_moments_type
+   use mesoslip_contacts_populations_activation, only: activation_type, growth_type
+   use mesoslip_contacts_threshold_coordinate, only: threshold_coordinate_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
+   use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_quadrature, only: gauss_legendre
+   implicit none
+   private
+
+   public :: threshold_nodes_type, new_threshold_nodes
+
+   !> Nodes of a panel
+   integer, parameter :: points = 8
+   !> Panels over the range of the law at least, and length of a panel over theta and the factor b of
+   !> contacts that are old
+   integer, parameter :: law_panels = 12
+   real(wp), parameter :: panel_length = 2.0_wp, old_age = 1.0e4_wp
+   !> Probability that a threshold is outside of the panels, on either side
+   real(wp), parameter :: outside = 1.0e-13_wp
+   !> Hazard that counts as none, one that is expanded, and exponent of one that breaks all
+   real(wp), parameter :: no_hazard = 1.0e-15_wp, small_hazard = 0.02_wp, max_exponent = 100.0_wp
+   !> Change of thresholds in a step over theta up to which it enters at one time, the panels of a
+   !> step by the changes in it where it is larger, and their nodes
+   real(wp), parameter :: max_change = 0.1_wp, change_of_panel = 1.5_wp
+   integer, parameter :: max_panels = 40, times = 4
+
+   !> Points over the thresholds, the same for all populations.
+   type :: threshold_nodes_type
+      !> Number of nodes
+      integer :: count = 0
+      !> f_T/f_s, and one over it
+      real(wp), private :: width = 1.0_wp, inverse_width = 1.0_wp
+      !> How thresholds age, and a threshold for which that is resolved
+      type(ageing_law_type), private :: ageing
+      real(wp), private :: typical = 1.0_wp
+      !> Edges of the panels, in the coordinate of the law
+      type(threshold_coordinate_type), private :: coordinate
+      real(wp), allocatable, private :: edge(:)
+      !> Thresholds of the nodes, density times length of the panel, and the share of contacts; shares
+      !> from each panel on
+      real(wp), allocatable, private :: threshold(:), density(:), share(:), shares_from(:)
+      !> Legendre's polynomials at the nodes of a panel with the weights of its rule
+      real(wp), private :: basis(points, points) = 0.0_wp
+      !> Nodes and weights over the time of a step
+      real(wp), private :: time(times) = 0.0_wp, weight(times) = 0.0_wp
+   contains
+      !> How many contacts are left
+      procedure, non_overridable :: left
+      !> What a motion leaves, and a time after attaching
+      procedure, non_overridable :: pass
+      procedure, non_overridable :: pass_newborn
+      procedure, non_overridable, private :: place_panels, panel_of, break_some, find_passage
+   end type threshold_nodes_type
+
+   !> Hazards of contacts in a motion: a sum of exp(constant - slope u).
+   type :: passage_type
+      integer :: count = 0
+      real(wp) :: constant(max_panels * times) = 0.0_wp, slope(max_panels * times) = 0.0_wp
+   end type passage_type
+
+contains
+
+   !> Place nodes over the thresholds of a law.
+   subroutine new_threshold_nodes(self, law, moments, ageing, width)
+      !> The nodes
+      type(threshold_nodes_type), intent(out) :: self
+      !> The law of configured thresholds
+      class(threshold_law_type), intent(in) :: law
+      !> Its partial moments
+      type(partial_moments_type), intent(in) :: moments
+      !> How thresholds age
+      type(ageing_law_type), intent(in) :: ageing
+      !> f_T/f_s
+      real(wp), intent(in) :: width
+
+      real(wp) :: point(points), weight(points), place, length, x
+      integer :: panel, node, degree
+
+      self%width = width
+      self%inverse_width = 1.0_wp / width
+      self%ageing = ageing
+      self%typical = 1.0_wp + 2.0_wp * law%width
+      self%coordinate = moments%coordinate
+      call gauss_legendre(point, weight)
+      call gauss_legendre(self%time, self%weight)
+      do node = 1, points
+         x = 2.0_wp * point(node) - 1.0_wp
+         do degree = 1, points
+            self%basis(node, degree) = weight(node) * legendre(degree - 1, x)
+         end do
+      end do
+      call self%place_panels(law, moments)
+      self%count = points * (size(self%edge) - 1)
+      allocate (self%threshold(self%count), self%density(self%count), self%share(self%count))
+      allocate (self%shares_from(size(self%edge)), source=0.0_wp)
+      do panel = size(self%edge) - 1, 1, -1
+         length = self%edge(panel + 1) - self%edge(panel)
+         self%shares_from(panel) = self%shares_from(panel + 1)
+         do node = 1, points
+            place = self%edge(panel) + point(node) * length
+            associate (one => (panel - 1) * points + node)
+               self%threshold(one) = self%coordinate%threshold(place)
+               self%density(one) = law%density(self%threshold(one)) &
+                  & * self%coordinate%slope(place) * length
+               self%share(one) = weight(node) * self%density(one)
+               self%shares_from(panel) = self%shares_from(panel) + self%share(one)
+            end associate
+         end do
+      end do
+   end subroutine new_threshold_nodes
+
+   !> Place the edges of panels.
+   subroutine place_panels(self, law, moments)
+      class(threshold_nodes_type), intent(inout) :: self
+      class(threshold_law_type), intent(in) :: law
+      type(partial_moments_type), intent(in) :: moments
+
+      real(wp), allocatable :: cell(:)
+      real(wp) :: max_length, first, last, growth
+      integer :: one, part, parts
+
+      growth = max(1.0_wp, self%ageing%threshold(1.0_wp, 1.0_wp, old_age * self%ageing%time))
+      max_length = panel_length * self%width / growth
+      if (law%cells > 0) then
+         cell = moments%edge
+      else
+         first = self%coordinate%at(moments%min_threshold)
+         last = self%coordinate%at(min(moments%max_threshold, law%quantile(outside)))
+         cell = [(self%coordinate%threshold(first + one * ((last - first) / law_panels)), &
+            & one=0, law_panels)]
+      end if
+      self%edge = [self%coordinate%at(cell(1))]
+      do one = 1, size(cell) - 1
+         parts = max(1, ceiling((cell(one + 1) - cell(one)) / max_length))
+         self%edge = [self%edge, (self%coordinate%at(cell(one) &
+            & + part * ((cell(one + 1) - cell(one)) / parts)), part=1, parts)]
+      end do
+   end subroutine place_panels
+
+   !> Legendre's polynomial.
+   pure function legendre(degree, x) result(value)
+      integer, intent(in) :: degree
+      real(wp), intent(in) :: x
+      real(wp) :: value
+
+      real(wp) :: before, next
+      integer :: one
+
+      value = 1.0_wp
+      before = 0.0_wp
+      do one = 1, degree
+         next = ((2 * one - 1) * x * value - (one - 1) * before) / one
+         before = value
+         value = next
+      end do
+   end function legendre
+
+   !> The panel of a threshold, the first or last one if it is outside.
+   pure function panel_of(self, place) result(panel)
+      class(threshold_nodes_type), intent(in) :: self
+      !> The threshold in the coordinate of the law
+      real(wp), intent(in) :: place
+      integer :: panel
+
+      integer :: last, middle
+
+      panel = 1
+      last = size(self%edge)
+      do while (last - panel > 1)
+         middle = (panel + last) / 2
+         if (self%edge(middle) <= place) then
+            panel = middle
+         else
+            last = middle
+         end if
+      end do
+   end function panel_of
+
+   !> How many contacts are left.
+   pure function left(self, broken, kept, number)
+      !> The nodes
+      class(threshold_nodes_type), intent(in) :: self
+      !> Configured threshold at or below which contacts broke at once
+      real(wp), intent(in) :: broken
+      !> Part that activation leaves at each node
+      real(wp), intent(in), contiguous :: kept(:)
+      !> Number without activation
+      real(wp), intent(in) :: number
+      real(wp) :: left
+
+      real(wp) :: place, x, part(points), value(0:points), all, some
+      integer :: panel, first, degree
+
+      left = 0.0_wp
+      if (.not. number > 0.0_wp) return
+      panel = 1
+      x = -1.0_wp
+      if (broken > self%threshold(1)) then
+         place = self%coordinate%at(broken)
+         panel = self%panel_of(place)
+         x = 2.0_wp * (place - self%edge(panel)) / (self%edge(panel + 1) - self%edge(panel)) &
+            & - 1.0_wp
+         if (.not. x < 1.0_wp) return
+         x = max(x, -1.0_wp)
+      end if
+      ! Integrals of the polynomials through the nodes from there to the end of the panel.
+      value(0) = 1.0_wp
+      value(1) = x
+      do degree = 1, points - 1
+         value(degree + 1) = ((2 * degree + 1) * x * value(degree) - degree * value(degree - 1)) &
+            & / (degree + 1)
+      end do
+      part = self%basis(:, 1) * (0.5_wp * (1.0_wp - x))
+      do degree = 1, points - 1
+         part = part + self%basis(:, degree + 1) &
+            & * (0.5_wp * (value(degree - 1) - value(degree + 1)))
+      end do
+      first = (panel - 1) * points
+      part = part * self%density(first + 1:first + points)
+      all = sum(part) + self%shares_from(panel + 1)
+      some = sum(part * kept(first + 1:first + points)) &
+         & + dot_product(self%share(first + points + 1:), kept(first + points + 1:))
+      if (all > 0.0_wp) left = number * max(0.0_wp, min(1.0_wp, some / all))
+   end function left
+
+   !> What a motion leaves of the contacts of a population.
+   pure subroutine pass(self, activation, growth, before, after, birth, force, broken, kept)
+      !> The nodes
+      class(threshold_nodes_type), intent(in) :: self
+      !> How contacts are activated, and what the motion adds to levels
+      type(activation_type), intent(in) :: activation
+      type(growth_type), intent(in) :: growth
+      !> Where the slider was, and where it is
+      type(pose_type), intent(in) :: before, after
+      !> When the contacts attached [s], and the forces on them before and after
+      real(wp), intent(in) :: birth, force(2)
+      !> Configured threshold at or below which they have broken
+      real(wp), intent(in) :: broken
+      !> Part that is left at each node
+      real(wp), intent(inout), contiguous :: kept(:)
+
+      type(passage_type) :: passage
+      real(wp) :: ages(2), age, mean(2), factor(2)
+
+      if (.not. after%time > before%time) return
+      ages = max(0.0_wp, [before%time, after%time] - birth)
+      call line_at(self%ageing, ages(1), mean(1), factor(1))
+      call line_at(self%ageing, ages(2), mean(2), factor(2))
+      if ((abs(mean(2) - mean(1)) + self%typical * abs(factor(2) - factor(1))) &
+         & * self%inverse_width > max_change) then
+         call self%find_passage(activation%rate, ages, force, mean, factor, passage)
+      else
+         ! At the time at which most of the hazard comes.
+         age = ages(1) + growth%mean_time(force(1), force(2)) * (ages(2) - ages(1))
+         call line_at(self%ageing, age, mean(1), factor(1))
+         passage%count = 1
+         passage%constant(1) = (activation%added(growth, force(1), force(2)) - mean(1)) &
+            & * self%inverse_width
+         passage%slope(1) = factor(1) * self%inverse_width
+      end if
+      call self%break_some(passage, broken, kept)
+   end subroutine pass
+
+   !> What the time since they attached leaves of contacts.
+   pure subroutine pass_newborn(self, rate, duration, force, kept)
+      !> The nodes
+      class(threshold_nodes_type), intent(in) :: self
+      !> Rate of breaking at the threshold [1/s], the time [s], and the force on the contacts
+      real(wp), intent(in) :: rate, duration, force
+      !> Part that is left at each node
+      real(wp), intent(out), contiguous :: kept(:)
+
+      type(passage_type) :: passage
+      real(wp) :: mean(2), factor(2)
+
+      kept = 1.0_wp
+      if (.not. rate * duration > 0.0_wp) return
+      call line_at(self%ageing, 0.0_wp, mean(1), factor(1))
+      call line_at(self%ageing, duration, mean(2), factor(2))
+      call self%find_passage(rate, [0.0_wp, duration], [force, force], mean, factor, passage)
+      call self%break_some(passage, 0.0_wp, kept)
+   end subroutine pass_newborn
+
+   !> Thresholds at an age: a and b of a + b u.
+   pure subroutine line_at(ageing, age, mean, factor)
+      type(ageing_law_type), intent(in) :: ageing
+      real(wp), intent(in) :: age
+      real(wp), intent(out) :: mean, factor
+
+      mean = ageing%threshold(0.0_wp, 1.0_wp, age)
+      factor = ageing%threshold(1.0_wp, 1.0_wp, age) - mean
+   end subroutine line_at
+
+   !> Hazards while thresholds change: a rule over the logarithm of the age, under a force that
+   !> changes evenly in time.
+   pure subroutine find_passage(self, rate, ages, force, mean, factor, passage)
+      class(threshold_nodes_type), intent(in) :: self
+      !> Rate of breaking at the threshold [1/s]
+      real(wp), intent(in) :: rate
+      !> Ages [s], forces, and a and b before and after
+      real(wp), intent(in) :: ages(2), force(2), mean(2), factor(2)
+      type(passage_type), intent(out) :: passage
+
+      real(wp) :: logarithm(2), length, age, f, a, b
+      integer :: panels, panel, node
+
+      logarithm = log(ages + self%ageing%time)
+      length = logarithm(2) - logarithm(1)
+      panels = min(max_panels, ceiling(max(length, ((abs(mean(2) - mean(1)) &
+         & + self%typical * abs(factor(2) - factor(1))) + abs(force(2) - force(1))) &
+         & * self%inverse_width / change_of_panel)))
+      panels = max(1, panels)
+      length = length / panels
+      do panel = 1, panels
+         do node = 1, times
+            age = exp(logarithm(1) + (panel - 1 + self%time(node)) * length) - self%ageing%time
+            age = min(max(age, ages(1)), ages(2))
+            f = abs(force(1) + (force(2) - force(1)) * (age - ages(1)) / (ages(2) - ages(1)))
+            call line_at(self%ageing, age, a, b)
+            passage%count = passage%count + 1
+            passage%slope(passage%count) = b * self%inverse_width
+            passage%constant(passage%count) = (f - a) * self%inverse_width &
+               & + log(rate * self%weight(node) * length * (age + self%ageing%time))
+         end do
+      end do
+   end subroutine find_passage
+
+   !> Let contacts break by their hazards.
+   pure subroutine break_some(self, passage, broken, kept)
+      class(threshold_nodes_type), intent(in) :: self
+      type(passage_type), intent(in) :: passage
+      real(wp), intent(in) :: broken
+      real(wp), intent(inout), contiguous :: kept(:)
+
+      real(wp) :: hazard, u
+      integer :: node, first
+
+      first = 1
+      if (broken > self%threshold(1)) then
+         first = (self%panel_of(self%coordinate%at(broken)) - 1) * points + 1
+      end if
+      associate (constant => passage%constant(:passage%count), &
+         & slope => passage%slope(:passage%count))
+         do node = first, self%count
+            u = self%threshold(node)
+            hazard = sum(exp(min(constant - slope * u, max_exponent)))
+            if (hazard > small_hazard) then
+               kept(node) = kept(node) * exp(-hazard)
+            else
+               ! The higher the threshold the smaller the hazard.
+               if (hazard < no_hazard) exit
+               kept(node) = kept(node) * (1.0_wp - hazard * (0.5_wp - hazard / 12.0_wp)) &
+                  & / (1.0_wp + hazard * (0.5_wp + hazard / 12.0_wp))
+            end if
+         end do
+      end associate
+   end subroutine break_some
+
+end module mesoslip_contacts_populations_nodes

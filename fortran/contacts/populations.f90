@@ -141,8 +141,8 @@ contains
       call move_alloc(populations, contacts)
    end subroutine make_activated_populations
 
-   !> Set up populations whose thresholds change with age, and that break by thermal activation, from
-   !> named numbers.
+   !> Set up populations whose thresholds change with age, and that break by thermal activation,
+   !> from named numbers.
    subroutine make_activated_ageing_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts

@@ -40,6 +40,8 @@ program test_simulation
    call closes_without_contacts("populations", "rigid", "gaussian", initial_relaxed)
    call closes_without_contacts("activated populations", "rigid", "gaussian", initial_relaxed)
    call closes_without_contacts("activated populations", "prescribed", "uniform", initial_steady)
+   call closes_without_contacts("activated ageing populations", "rigid", "gaussian", &
+      & initial_relaxed)
    call elastic("series", "series", 1.0e-11_wp)
    call goes_on("ensemble", "rigid", "series")
    call goes_on("ensemble", "prescribed", "series")
@@ -56,6 +58,7 @@ program test_simulation
    call goes_on("activated", "rigid", "series")
    call goes_on("activated", "prescribed", "series")
    call goes_on("activated ageing", "rigid", "series")
+   call goes_on("activated ageing populations", "rigid", "series")
    call runs_ahead("ensemble", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 5.0e-4_wp)
    call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 0.0_wp)
@@ -447,6 +450,9 @@ contains
       case ("activated populations")
          call new_parameters(parameters, [character(len=name_length) :: common, activation(3:), &
             & "resolution"], [values, bell(3:), 0.5_wp])
+      case ("activated ageing populations")
+         call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
+            & activation(3:), "resolution"], [values, relax, bell(3:), 0.5_wp])
       case ("activated", "activated scattered")
          call new_parameters(parameters, [character(len=name_length) :: common, activation], &
             & [values, bell])

@@ -95,7 +95,7 @@ def draw(random: Random) -> Tables:
         contacts["thermal"] = _thermal(random, contacts, speed / stretch, duration)
         if engine == "me" and contacts["initial"] == "uniform":
             contacts["initial"] = random.choice(["relaxed", "steady"])
-        elif engine == "eq" and not interaction and random.random() < 0.4:
+        if not interaction and random.random() < 0.4:
             contacts["ageing"] = _ageing(random, contacts, duration)
     if contacts["initial"] != "steady" and "ageing" not in contacts and random.random() < NEWBORN:
         contacts["newborn_width"] = _newborn_width(random, contacts, engine)

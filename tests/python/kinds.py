@@ -150,6 +150,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "slider": {"kind": "prescribed"},
         "contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03},
     },
+    "rigid, thermal, ageing, me": AGEING | THERMAL | COARSE,
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},

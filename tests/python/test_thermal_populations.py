@@ -197,7 +197,6 @@ def test_an_output_has_the_error_of_its_force():
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("contacts__ageing", {"law": "log", "time": 1.0, "growth": 0.1}, 'needs engine "eq"'),
         ("contacts__coupling", "scaled", 'must be "equal"'),
         ("contacts__initial", "uniform", '"relaxed" or "steady"'),
     ],

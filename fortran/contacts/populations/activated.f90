@@ -167,7 +167,7 @@ contains
    end subroutine try_motion
 
    !> Find what breaks of a population.
-   pure subroutine break_one(self, row, growth, before, after, forces, cut, left)
+   subroutine break_one(self, row, growth, before, after, forces, cut, left)
       class(activated_populations_type), intent(inout) :: self
       !> Which one, and what the motion adds to levels
       integer, intent(in) :: row
@@ -228,7 +228,7 @@ contains
          & max(0.0_wp, time - self%population(row, column_birth)))
    end function thresholds_reached
 
-   !> Force along the direction at which the first contacts of a population come to their thresholds.
+   !> Force along the direction at which the first contacts of a population reach their thresholds.
    pure function first_break_force(self, row, before, start, last) result(force)
       class(activated_populations_type), intent(in) :: self
       integer, intent(in) :: row

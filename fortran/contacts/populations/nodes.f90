@@ -1,12 +1,13 @@
 !> What thermal activation leaves of contacts whose thresholds change with age, by threshold.
 !>
-!> A contact of the configured threshold u has the threshold a + b u at an age, with a and b that are
-!> those of its population. Its integrated hazard is a sum of exp((f - a - b u)/theta) over the life:
-!> with b constant it would be exp((e - b u)/theta) with one level e of the population, but as b
-!> changes, hazards of two thresholds have no ratio that stays. So a population keeps the part that
-!> is left of its contacts at the nodes of Gauss-Legendre rules in panels over the thresholds. Panels
-!> are so short that both the law and the hazard are smooth in them: where contacts below some
-!> threshold have broken, the rest of its panel is integrated by the polynomial through the nodes.
+!> A contact of the configured threshold u has the threshold a + b u at an age, with a and b that
+!> are those of its population. Its integrated hazard is a sum of exp((f - a - b u)/theta) over the
+!> life: with b constant it would be exp((e - b u)/theta) with one level e of the population, but as
+!> b changes, hazards of two thresholds have no ratio that stays. So a population keeps the part
+!> that is left of its contacts at the nodes of Gauss-Legendre rules in panels over the thresholds.
+!> Panels are so short that both the law and the hazard are smooth in them: where contacts below
+!> some threshold have broken, the rest of its panel is integrated by the polynomial through the
+!> nodes.
 module mesoslip_contacts_populations_nodes
    use mesoslip_contacts_ageing_law, only: ageing_law_type
    use mesoslip_contacts_partial_moments, only: partial_moments_type
@@ -23,18 +24,18 @@ module mesoslip_contacts_populations_nodes
 
    !> Nodes of a panel
    integer, parameter :: points = 8
-   !> Panels over the range of the law at least, and length of a panel over theta and the factor b of
-   !> contacts that are old
-   integer, parameter :: law_panels = 12
+   !> Panels over the range of the law at least, and length of a panel over theta and the factor b
+   !> of contacts that are old
+   integer, parameter :: law_panels = 10
    real(wp), parameter :: panel_length = 2.0_wp, old_age = 1.0e4_wp
    !> Probability that a threshold is outside of the panels, on either side
    real(wp), parameter :: outside = 1.0e-13_wp
-   !> Hazard that counts as none, one that is expanded, and exponent of one that breaks all
-   real(wp), parameter :: no_hazard = 1.0e-15_wp, small_hazard = 0.02_wp, max_exponent = 100.0_wp
-   !> Change of thresholds in a step over theta up to which it enters at one time, the panels of a
-   !> step by the changes in it where it is larger, and their nodes
-   real(wp), parameter :: max_change = 0.1_wp, change_of_panel = 1.5_wp
-   integer, parameter :: max_panels = 40, times = 4
+   !> Logarithms of a hazard that counts as none, and of one that breaks all
+   real(wp), parameter :: no_hazard = -32.0_wp, max_exponent = 5.0_wp
+   !> Change of thresholds in a step over theta up to which it enters at one time; changes in the
+   !> parts of a step where it is larger, their nodes, and those of a step of small changes
+   real(wp), parameter :: max_change = 0.1_wp, change_of_part = 1.5_wp, small_change = 0.5_wp
+   integer, parameter :: max_parts = 40, times = 4, short_times = 2
 
    !> Points over the thresholds, the same for all populations.
    type :: threshold_nodes_type
@@ -48,27 +49,22 @@ module mesoslip_contacts_populations_nodes
       !> Edges of the panels, in the coordinate of the law
       type(threshold_coordinate_type), private :: coordinate
       real(wp), allocatable, private :: edge(:)
-      !> Thresholds of the nodes, density times length of the panel, and the share of contacts; shares
-      !> from each panel on
+      !> Thresholds of the nodes, density times length of the panel, and the share of contacts;
+      !> shares from each panel on
       real(wp), allocatable, private :: threshold(:), density(:), share(:), shares_from(:)
       !> Legendre's polynomials at the nodes of a panel with the weights of its rule
       real(wp), private :: basis(points, points) = 0.0_wp
-      !> Nodes and weights over the time of a step
+      !> Nodes and weights over the time of a part of a step, of two orders
       real(wp), private :: time(times) = 0.0_wp, weight(times) = 0.0_wp
+      real(wp), private :: short_time(short_times) = 0.0_wp, short_weight(short_times) = 0.0_wp
    contains
       !> How many contacts are left
       procedure, non_overridable :: left
       !> What a motion leaves, and a time after attaching
       procedure, non_overridable :: pass
       procedure, non_overridable :: pass_newborn
-      procedure, non_overridable, private :: place_panels, panel_of, break_some, find_passage
+      procedure, non_overridable, private :: place_panels, panel_of, break_some, pass_ages
    end type threshold_nodes_type
-
-   !> Hazards of contacts in a motion: a sum of exp(constant - slope u).
-   type :: passage_type
-      integer :: count = 0
-      real(wp) :: constant(max_panels * times) = 0.0_wp, slope(max_panels * times) = 0.0_wp
-   end type passage_type
 
 contains
 
@@ -95,6 +91,7 @@ contains
       self%coordinate = moments%coordinate
       call gauss_legendre(point, weight)
       call gauss_legendre(self%time, self%weight)
+      call gauss_legendre(self%short_time, self%short_weight)
       do node = 1, points
          x = 2.0_wp * point(node) - 1.0_wp
          do degree = 1, points
@@ -236,7 +233,7 @@ contains
    end function left
 
    !> What a motion leaves of the contacts of a population.
-   pure subroutine pass(self, activation, growth, before, after, birth, force, broken, kept)
+   subroutine pass(self, activation, growth, before, after, birth, force, broken, kept)
       !> The nodes
       class(threshold_nodes_type), intent(in) :: self
       !> How contacts are activated, and what the motion adds to levels
@@ -251,30 +248,27 @@ contains
       !> Part that is left at each node
       real(wp), intent(inout), contiguous :: kept(:)
 
-      type(passage_type) :: passage
-      real(wp) :: ages(2), age, mean(2), factor(2)
+      real(wp) :: ages(2), age, mean(2), factor(2), change
 
       if (.not. after%time > before%time) return
       ages = max(0.0_wp, [before%time, after%time] - birth)
       call line_at(self%ageing, ages(1), mean(1), factor(1))
       call line_at(self%ageing, ages(2), mean(2), factor(2))
-      if ((abs(mean(2) - mean(1)) + self%typical * abs(factor(2) - factor(1))) &
-         & * self%inverse_width > max_change) then
-         call self%find_passage(activation%rate, ages, force, mean, factor, passage)
+      change = (abs(mean(2) - mean(1)) + self%typical * abs(factor(2) - factor(1))) &
+         & * self%inverse_width
+      if (change > max_change) then
+         call self%pass_ages(activation%rate, ages, force, change, broken, kept)
       else
          ! At the time at which most of the hazard comes.
          age = ages(1) + growth%mean_time(force(1), force(2)) * (ages(2) - ages(1))
          call line_at(self%ageing, age, mean(1), factor(1))
-         passage%count = 1
-         passage%constant(1) = (activation%added(growth, force(1), force(2)) - mean(1)) &
-            & * self%inverse_width
-         passage%slope(1) = factor(1) * self%inverse_width
+         call self%break_some([(activation%added(growth, force(1), force(2)) - mean(1)) &
+            & * self%inverse_width], [factor(1) * self%inverse_width], broken, kept)
       end if
-      call self%break_some(passage, broken, kept)
    end subroutine pass
 
    !> What the time since they attached leaves of contacts.
-   pure subroutine pass_newborn(self, rate, duration, force, kept)
+   subroutine pass_newborn(self, rate, duration, force, kept)
       !> The nodes
       class(threshold_nodes_type), intent(in) :: self
       !> Rate of breaking at the threshold [1/s], the time [s], and the force on the contacts
@@ -282,15 +276,14 @@ contains
       !> Part that is left at each node
       real(wp), intent(out), contiguous :: kept(:)
 
-      type(passage_type) :: passage
       real(wp) :: mean(2), factor(2)
 
       kept = 1.0_wp
       if (.not. rate * duration > 0.0_wp) return
       call line_at(self%ageing, 0.0_wp, mean(1), factor(1))
       call line_at(self%ageing, duration, mean(2), factor(2))
-      call self%find_passage(rate, [0.0_wp, duration], [force, force], mean, factor, passage)
-      call self%break_some(passage, 0.0_wp, kept)
+      call self%pass_ages(rate, [0.0_wp, duration], [force, force], (abs(mean(2) - mean(1)) &
+         & + self%typical * abs(factor(2) - factor(1))) * self%inverse_width, 0.0_wp, kept)
    end subroutine pass_newborn
 
    !> Thresholds at an age: a and b of a + b u.
@@ -303,69 +296,85 @@ contains
       factor = ageing%threshold(1.0_wp, 1.0_wp, age) - mean
    end subroutine line_at
 
-   !> Hazards while thresholds change: a rule over the logarithm of the age, under a force that
-   !> changes evenly in time.
-   pure subroutine find_passage(self, rate, ages, force, mean, factor, passage)
+   !> Let contacts break while their thresholds change: a rule over the logarithm of the age, under
+   !> a force that changes evenly in time.
+   subroutine pass_ages(self, rate, ages, force, change, broken, kept)
       class(threshold_nodes_type), intent(in) :: self
       !> Rate of breaking at the threshold [1/s]
       real(wp), intent(in) :: rate
-      !> Ages [s], forces, and a and b before and after
-      real(wp), intent(in) :: ages(2), force(2), mean(2), factor(2)
-      type(passage_type), intent(out) :: passage
-
-      real(wp) :: logarithm(2), length, age, f, a, b
-      integer :: panels, panel, node
-
-      logarithm = log(ages + self%ageing%time)
-      length = logarithm(2) - logarithm(1)
-      panels = min(max_panels, ceiling(max(length, ((abs(mean(2) - mean(1)) &
-         & + self%typical * abs(factor(2) - factor(1))) + abs(force(2) - force(1))) &
-         & * self%inverse_width / change_of_panel)))
-      panels = max(1, panels)
-      length = length / panels
-      do panel = 1, panels
-         do node = 1, times
-            age = exp(logarithm(1) + (panel - 1 + self%time(node)) * length) - self%ageing%time
-            age = min(max(age, ages(1)), ages(2))
-            f = abs(force(1) + (force(2) - force(1)) * (age - ages(1)) / (ages(2) - ages(1)))
-            call line_at(self%ageing, age, a, b)
-            passage%count = passage%count + 1
-            passage%slope(passage%count) = b * self%inverse_width
-            passage%constant(passage%count) = (f - a) * self%inverse_width &
-               & + log(rate * self%weight(node) * length * (age + self%ageing%time))
-         end do
-      end do
-   end subroutine find_passage
-
-   !> Let contacts break by their hazards.
-   pure subroutine break_some(self, passage, broken, kept)
-      class(threshold_nodes_type), intent(in) :: self
-      type(passage_type), intent(in) :: passage
+      !> Ages [s] and forces before and after, and change of thresholds over theta
+      real(wp), intent(in) :: ages(2), force(2), change
       real(wp), intent(in) :: broken
       real(wp), intent(inout), contiguous :: kept(:)
 
-      real(wp) :: hazard, u
-      integer :: node, first
+      real(wp) :: constant(max_parts * times), slope(max_parts * times), logarithm(2), length, more
+      integer :: parts, part, node, count
+
+      logarithm = log(ages + self%ageing%time)
+      length = logarithm(2) - logarithm(1)
+      more = max(length, change + abs(force(2) - force(1)) * self%inverse_width)
+      count = 0
+      if (more < small_change) then
+         do node = 1, short_times
+            call add(self%short_time(node) * length, self%short_weight(node) * length)
+         end do
+      else
+         parts = max(1, min(max_parts, ceiling(more / change_of_part)))
+         length = length / parts
+         do part = 1, parts
+            do node = 1, times
+               call add((part - 1 + self%time(node)) * length, self%weight(node) * length)
+            end do
+         end do
+      end if
+      call self%break_some(constant(:count), slope(:count), broken, kept)
+
+   contains
+
+      !> Add what comes around an age.
+      subroutine add(place, weight)
+         !> Logarithm of the age from that before, and its weight
+         real(wp), intent(in) :: place, weight
+
+         real(wp) :: age, f, a, b
+
+         age = exp(logarithm(1) + place) - self%ageing%time
+         age = min(max(age, ages(1)), ages(2))
+         f = abs(force(1) + (force(2) - force(1)) * (age - ages(1)) / (ages(2) - ages(1)))
+         call line_at(self%ageing, age, a, b)
+         count = count + 1
+         slope(count) = b * self%inverse_width
+         constant(count) = (f - a) * self%inverse_width &
+            & + log(rate * weight * (age + self%ageing%time))
+      end subroutine add
+
+   end subroutine pass_ages
+
+   !> Let contacts break by their hazards, sums of exp(constant - slope u).
+   pure subroutine break_some(self, constant, slope, broken, kept)
+      class(threshold_nodes_type), intent(in) :: self
+      real(wp), intent(in), contiguous :: constant(:), slope(:)
+      real(wp), intent(in) :: broken
+      real(wp), intent(inout), contiguous :: kept(:)
+
+      real(wp) :: hazard(self%count), end
+      integer :: first, last, one
 
       first = 1
       if (broken > self%threshold(1)) then
          first = (self%panel_of(self%coordinate%at(broken)) - 1) * points + 1
       end if
-      associate (constant => passage%constant(:passage%count), &
-         & slope => passage%slope(:passage%count))
-         do node = first, self%count
-            u = self%threshold(node)
-            hazard = sum(exp(min(constant - slope * u, max_exponent)))
-            if (hazard > small_hazard) then
-               kept(node) = kept(node) * exp(-hazard)
-            else
-               ! The higher the threshold the smaller the hazard.
-               if (hazard < no_hazard) exit
-               kept(node) = kept(node) * (1.0_wp - hazard * (0.5_wp - hazard / 12.0_wp)) &
-                  & / (1.0_wp + hazard * (0.5_wp + hazard / 12.0_wp))
-            end if
-         end do
-      end associate
+      ! The higher the threshold the smaller the hazard.
+      end = maxval((constant - no_hazard) / slope)
+      if (.not. end > self%threshold(first)) return
+      last = points * self%panel_of(self%coordinate%at(end))
+      hazard(first:last) = exp(min(constant(1) - slope(1) * self%threshold(first:last), &
+         & max_exponent))
+      do one = 2, size(constant)
+         hazard(first:last) = hazard(first:last) + exp(min(constant(one) &
+            & - slope(one) * self%threshold(first:last), max_exponent))
+      end do
+      kept(first:last) = kept(first:last) * exp(-hazard(first:last))
    end subroutine break_some
 
 end module mesoslip_contacts_populations_nodes

@@ -1,0 +1,80 @@
+"""Infinitely many contacts that age and break by thermal activation: closed forms and limits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from kinds import RELAX, configuration
+from mesoslip.theory.thermal import steady_force
+from test_thermal import unit
+from test_thermal_populations import COUNT, extrapolated_force, finished
+
+LOG = {"law": "log", "time": 1.0, "growth": 0.05}
+YOUNG = {"law": "relax", "time": 30.0, "young_force_ratio": 0.6, "young_relative_width": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("threshold", "ageing", "ratio", "velocity"),
+    [
+        ({"law": "gaussian", "relative_width": 0.2}, LOG, 0.02, 1e-4),
+        ({"law": "gaussian", "relative_width": 0.1}, YOUNG, 0.04, 1e-1),
+        ({"law": "uniform", "relative_width": 0.3}, LOG, 0.08, 1e-1),
+        ({"law": "weibull", "relative_width": 0.2}, YOUNG, 0.04, 1e-1),
+    ],
+)
+def test_steady_force_is_that_of_the_theory(threshold, ageing, ratio, velocity):
+    changes: dict[str, Any] = {
+        "contacts__threshold": threshold,
+        "contacts__ageing": ageing,
+        "contacts__thermal": {"rate": 1.0, "force_ratio": ratio},
+    }
+    expected = steady_force(unit(COUNT, **changes), velocity) / COUNT
+    assert extrapolated_force(velocity, 12.0, **changes) == pytest.approx(expected, rel=5e-4)
+
+
+@pytest.mark.parametrize(
+    "ageing", [{"law": "log", "time": 1e-4, "growth": 0.03}, RELAX], ids=["log", "relax"]
+)
+def test_many_contacts_come_to_the_populations(ageing):
+    """With slips, a hold and a reversal."""
+    many = 5000
+    changes = {"contacts__ageing": ageing, "contacts__back_force_ratio": 0.1}
+    exact = finished(
+        configuration("rigid, thermal", run__engine="me", run__resolution=0.5, **changes)
+    )
+    assert abs(exact.energy_residual) < 1e-8
+    drawn = finished(configuration("rigid, thermal", contacts__count=many, **changes))
+    difference = drawn.trace[:, 5] - exact.trace[:, 5]
+    assert np.sqrt(np.mean(difference**2)) < 1.5 / math.sqrt(many) * 18e-6
+
+
+def test_thresholds_that_do_not_grow_are_the_model_without_ageing():
+    """By nodes over the thresholds, and by tables."""
+
+    def force(**changes):
+        kind = "prescribed, thermal"
+        common = {"run__engine": "me", "run__resolution": 1.0}
+        return finished(configuration(kind, **common, **changes)).trace[:, 5]
+
+    same = force(contacts__ageing={"law": "log", "time": 1e6, "growth": 0.0})
+    np.testing.assert_allclose(same, force(), rtol=0, atol=1e-8 * 18e-6)
+
+
+def test_without_temperature_it_is_the_model_without():
+    """The difference falls with f_T, to the errors of both."""
+
+    def force(**changes):
+        kind = "prescribed, me"
+        common = {"contacts__coupling": "equal", "contacts__ageing": RELAX, "run__resolution": 0.5}
+        return finished(configuration(kind, **common, **changes)).trace[:, 5]
+
+    plain = force()
+    differences = [
+        np.max(np.abs(force(contacts__thermal={"rate": 1e3, "force_ratio": ratio}) - plain))
+        for ratio in (4e-2, 2e-2)
+    ]
+    assert differences[0] < 0.015 * 18e-6
+    assert differences[1] < 0.45 * differences[0]

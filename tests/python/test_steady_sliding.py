@@ -276,7 +276,7 @@ def test_stick_slip_above_the_stiffness_of_the_force_curve(klein, tmp_path, comm
     file = tmp_path / "wide.toml"
     file.write_text(config.to_toml())
     printed = command("curve", file)[1]
-    assert "with them there may be stick-slip nevertheless" in printed
+    assert "with it there may be stick-slip nevertheless" in printed
     assert "necessary" not in printed + command("info", file)[1]
 
 

@@ -42,7 +42,7 @@ def test_a_file_system_without_locks_is_reported(output, monkeypatch):
         raise OSError(-101, "NetCDF: HDF error")
 
     monkeypatch.setattr(fcntl, "flock", refuse)
-    monkeypatch.setattr(files, "_groups", fail)
+    monkeypatch.setattr(files, "_built", fail)
     with pytest.raises(FileError, match=r"no locks \(No locks available\).*LOCKING=FALSE"):
         mesoslip.open_output(output)
     before = output.read_bytes()

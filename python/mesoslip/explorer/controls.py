@@ -25,6 +25,8 @@ STEPS = 200
 NONE = "none"
 # Threshold laws that are made of a width alone.
 WIDTH_LAWS = tuple(name for name, law in LAWS.items() if not law.is_sampled)
+# Couplings that need no table of stiffnesses.
+RULES = tuple(name for name in COUPLINGS if name != "table")
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,7 @@ CONTROLS = (
     Control("contacts.delay", "delay τ_d", "Contacts", 2, usual=1e-3),
     Control("contacts.back_force_ratio", "back force f_b/f_s", "Contacts", range=(0, 0.9)),
     Control("contacts.drag_rate", "drag rate η", "Contacts", 5, usual=1e11),
-    Control("contacts.coupling", "coupling", "Contacts", choices=tuple(COUPLINGS)),
+    Control("contacts.coupling", "coupling", "Contacts", choices=RULES),
     Control("contacts.initial", "at the start", "Contacts", choices=tuple(INITIAL_STATES)),
     Control("contacts.threshold.law", "law", "Thresholds", choices=WIDTH_LAWS),
     Control(

@@ -11,28 +11,24 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, special
+from scipy import optimize
 from scipy.interpolate import BPoly
 
-from mesoslip import _core
-from mesoslip.configuration.kernel_parameters import Parameters, named
-from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
-from mesoslip.simulation.kernel import checked
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
+from mesoslip.theory.renewal import POINTS, solve_renewal
 from mesoslip.theory.sliders import loading_rate
 from mesoslip.theory.steady_sliding import depends_on_velocity
-from mesoslip.theory.table_lives import TableLives, table_lives
+from mesoslip.theory.stretch_density import stretch_density
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -44,8 +40,6 @@ WITHOUT_NEWBORN_WIDTH = (
     'the width; a run of a prescribed slider with engine "me" gives F(X)'
 )
 
-# Points of collocation in a panel: the force converges with the order of this number.
-POINTS = 12
 # Width of the first panels over the spread of the break stretches.
 FIRST_WIDTH = 0.7
 # Maximum multiplications of a finer solution, which take about a second.
@@ -101,45 +95,6 @@ class CriticalPoint(NamedTuple):
     D0: float
     D2: float
     D3: float
-
-
-@dataclass(frozen=True)
-class _Solution:
-    """Polynomials of the dimensionless displacement, and numbers of the solver."""
-
-    edges: Array
-    point: Array
-    force: BPoly
-    slope: BPoly
-    stiffness: BPoly
-    breaks: BPoly
-    conservation_error: float
-    mismatch: float
-
-
-def _polynomials(edges: Array, point: Array, values: Array) -> BPoly:
-    """The polynomials through values at the points of each panel, shape (points, panels)."""
-    degree = len(point) - 1
-    k = np.arange(degree + 1)
-    bernstein = special.comb(degree, k) * point[:, None] ** k * (1 - point[:, None]) ** (degree - k)
-    return BPoly(np.linalg.solve(bernstein, values), edges, extrapolate=False)
-
-
-def _solve(parameters: Parameters, start: float, width: float, panels: int) -> _Solution:
-    point, breaks, slope, force, stiffness, pinned, mismatch = checked(
-        _core.force_curve(*named(parameters), start, width, panels, POINTS)
-    )
-    edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
-    return _Solution(
-        edges,
-        point,
-        force=_polynomials(edges, point, force),
-        slope=_polynomials(edges, point, slope),
-        stiffness=_polynomials(edges, point, stiffness),
-        breaks=_polynomials(edges, point, breaks),
-        conservation_error=float(np.max(np.abs(pinned - 1))),
-        mismatch=float(mismatch),
-    )
 
 
 def curve(config: ConfigLike) -> xr.DataTree:
@@ -267,7 +222,7 @@ class ForceCurve:
                         )
                     ]
                 )
-            fine = _solve(parameters, start, width, panels)
+            fine = solve_renewal(parameters, start, width, panels)
             self.kernel_seconds += time.perf_counter() - begin
             if coarse is not None:
                 inside = np.linspace(max(0.0, start), length, 20011)[1:-1]
@@ -521,111 +476,16 @@ class ForceCurve:
         The fraction is not zero after a relaxed start while some of the first generation remain.
         The integral of the density and the fraction add up to 1.
         """
-        contacts = self.config.contacts
-        law = contacts.threshold.above(contacts.back_force_ratio)
         unit = self._stretch
-        x = np.atleast_1d(np.asarray(stretch, dtype=float)) / unit
-        moved = displacement / unit
-        density = self._newborn_density(law, x, moved)
-        density += self._first_density(law, x, moved)
-        atom = 0.0
-        if contacts.initial == "relaxed" and self._table is not None:
-            atom = float(np.sum(self._table.above(np.array([moved]))))
-        elif contacts.initial == "relaxed":
-            atom = float(law.survival(self._threshold_of(np.array(moved))))
-        return density / unit, atom
-
-    @cached_property
-    def _table(self) -> TableLives | None:
-        """Contacts with the stiffnesses of a table; None for others."""
-        return table_lives(self.config)
-
-    def _threshold_of(self, stretch: Array) -> Array:
-        """Threshold of contacts that break at a stretch."""
-        if self.config.contacts.coupling == "equal":
-            return stretch
-        return np.maximum(stretch, 0.0) ** 2
-
-    def _average_between(
-        self, law: ThresholdLaw, lower: Array, upper: Array, function: Callable[[Array], Array]
-    ) -> Array:
-        """E[f(u); lower < u < upper] for arrays of limits, by Gauss's rule."""
-        node, weight = np.polynomial.legendre.leggauss(100)
-        # As a function of the normal deviate of the same probability no law has narrow features.
-        low, high = (
-            special.ndtri(np.clip(law.survival(limit), 1e-17, 1 - 1e-16))
-            for limit in (upper, lower)
+        density, atom = stretch_density(
+            self.config,
+            self._solution.breaks,
+            np.atleast_1d(np.asarray(stretch, dtype=float)) / unit,
+            displacement / unit,
+            newborn_width=self.newborn_width / unit,
+            mean_life=self.scales.mean_life,
         )
-        z = low[..., None] + (high - low)[..., None] * (node + 1) / 2
-        values = function(law.quantile(special.ndtr(z))) * np.exp(-0.5 * z**2)
-        average: Array = np.sum(values * weight, axis=-1) * (high - low) / 2
-        return average / math.sqrt(2 * math.pi)
-
-    def _newborn_density(self, law: ThresholdLaw, x: Array, moved: float) -> Array:
-        contacts = self.config.contacts
-        if not contacts.reattach:
-            return np.zeros_like(x)
-        breaks = self._solution.breaks
-        back = contacts.back_force_ratio
-        width = self.newborn_width / self._stretch
-        node, weight = np.zeros(1), np.ones(1)
-        if width > 0:
-            node, weight = special.roots_hermitenorm(32)
-            weight = weight / math.sqrt(2 * math.pi)
-        lowest = np.maximum(self._threshold_of(np.maximum(x, 0.0)), law.minimum)
-        total, acceptance = np.zeros_like(x), 0.0
-        for shift, part in zip(width * node, weight, strict=True):
-            gap = x - shift
-            if self._table is not None:
-                density = self._table.newborn_density(
-                    x, moved, shift, lambda at: np.nan_to_num(breaks(at))
-                )
-                acceptance += part * self._table.accepted(shift)
-            elif contacts.coupling == "equal":
-                age = gap - back
-                rate = np.where((age >= 0) & (age <= moved), breaks(moved - age), 0.0)
-                density = rate * law.survival(lowest)
-                acceptance += part * float(law.survival(back + shift))
-            else:
-                # Ages between 0 and X belong to x_b(u) between gap and gap - X.
-                lower, upper = (
-                    np.where(edge > 0, (back / np.maximum(edge, 1e-9)) ** 2, np.inf)
-                    for edge in (gap, gap - moved)
-                )
-                lower = np.maximum(np.where(gap > 0, lower, np.inf), lowest)
-
-                def attached(threshold: Array, gap: Array = gap) -> Array:
-                    birth = moved - gap[:, None] + back / np.sqrt(threshold)
-                    rate: Array = np.nan_to_num(breaks(birth))
-                    return rate
-
-                density = self._average_between(law, lower, np.maximum(lower, upper), attached)
-                root = 0.5 * (shift + math.sqrt(shift**2 + 4 * back))
-                acceptance += part * float(law.survival(root**2 if root > 0 else 0.0))
-            total += part * density
-        return total / acceptance
-
-    def _first_density(self, law: ThresholdLaw, x: Array, moved: float) -> Array:
-        contacts = self.config.contacts
-        if self._table is not None and contacts.initial != "relaxed":
-            return self._table.first_density(x, moved, contacts.initial, self.scales.mean_life)
-        equal = contacts.coupling == "equal"
-        back = contacts.back_force_ratio
-        lowest = np.maximum(self._threshold_of(np.maximum(x, 0.0)), law.minimum)
-        if contacts.initial == "uniform":
-            density = self._average_between(
-                law, lowest, np.full_like(x, np.inf), lambda u: 1 / (u if equal else np.sqrt(u))
-            )
-            return np.where(x >= moved, density, 0.0)
-        if contacts.initial == "steady":
-            start = np.maximum(x - moved, 0.0)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                least = np.where(start > 0, (back / start) ** 2, np.inf if back > 0 else 0.0)
-            if equal:
-                least = np.where(x - moved >= back, 0.0, np.inf)
-            least = np.where(x < moved, np.inf, least)
-            return law.survival(np.maximum(lowest, least)) / self.scales.mean_life
-        return np.zeros_like(x)
+        return density / unit, atom
 
     def to_tree(self) -> xr.DataTree:
         """The curve and its instability in the layout of an output file.

@@ -9,7 +9,7 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import klein_tables
-from mesoslip.analysis.lyapunov import Orbit, growth_rate, pooled, summary, transverse_distances
+from mesoslip.analysis.lyapunov import Orbit, growth, pooled, summary, transverse_distances
 from mesoslip.analysis.return_map import map_exponent, settled_peaks
 from mesoslip.configuration.config import Config
 
@@ -97,25 +97,48 @@ def test_a_shift_in_time_is_no_distance():
     _, none = transverse_distances(orbit(0.0, 0.0), orbit(1e-4, 0.0), 100)
     assert none.max() < 1e-7
     times, grown = transverse_distances(orbit(0.0, 0.0), orbit(1e-4, 1e-6), 100)
-    rate, length = growth_rate(times, grown, 0.0, 1.0)
-    assert rate == pytest.approx(0.3, rel=0.02)
+    gain, length = growth(times, grown, 0.0, 1.0)
+    assert gain / length == pytest.approx(0.3, rel=0.02)
     assert length > 15
 
 
-def test_growth_is_fitted_between_two_distances():
+def test_growth_counts_between_two_distances():
     times = np.arange(40.0)
     distances = np.minimum(np.maximum(1e-9 * np.exp(times), 1e-6), 1e-1)
-    assert growth_rate(times, distances, 1e-5, 1e-2)[0] == pytest.approx(1.0)
-    assert math.isnan(growth_rate(times, distances, 1e-3, 2e-3)[0])
+    gain, length = growth(times, distances, 1e-5, 1e-2)
+    assert gain == pytest.approx(length)
+    # First distances at or above the bounds.
+    assert length == math.ceil(math.log(1e7)) - math.ceil(math.log(1e4))
+    # A distance that decays counts until it is below the range.
+    gain, length = growth(times, np.maximum(np.exp(-times), 1e-6), 1e-4, 0.5)
+    assert (gain, length) == (pytest.approx(-length), 7.0)
+    assert growth(times, np.full(40, 1e-6), 1e-5, 1e-2) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("low", [1e-9, 1e-4])
+def test_the_range_of_distances_does_not_bias_the_rate(low):
+    # Random walks of the logarithm, by steps wider than their mean, as slips are.
+    rng = np.random.default_rng(3)
+    steps = rng.normal(0.5, 1.0, (400, 150))
+    walks = np.exp(np.log(1e-11) + np.cumsum(steps, axis=1))
+    times = np.arange(150.0)
+    grown, lengths = np.array([growth(times, walk, low, 1e-2) for walk in walks]).T
+    fit = pooled(grown, lengths, 1e3 * np.arange(400.0))
+    assert fit.error < 0.03
+    assert abs(fit.exponent - 0.5) < 3 * fit.error
 
 
 def test_the_error_of_a_mean_rate_is_that_of_its_scatter():
     rng = np.random.default_rng(1)
-    fits = [pooled(rng.normal(2.0, 0.5, 20), np.ones(20)) for _ in range(400)]
-    means, errors = np.array(fits).T
+    lengths, apart, together = np.ones(20), 2.0 * np.arange(20), np.linspace(0.0, 4.0, 20)
+    draws = [rng.normal(2.0, 0.5, 20) for _ in range(400)]
+    means, errors = np.array([pooled(one, lengths, apart) for one in draws]).T
     assert means.mean() == pytest.approx(2.0, abs=0.02)
     assert errors.mean() == pytest.approx(means.std(), rel=0.1)
-    assert math.isnan(pooled(np.array([1.0, np.nan]), np.ones(2)).error)
+    # Twins of 20 times in a run of 5.
+    ratio = pooled(draws[0], lengths, together).error / pooled(draws[0], lengths, apart).error
+    assert ratio == pytest.approx(2.0)
+    assert math.isnan(pooled(np.array([1.0, 0.0]), np.array([1.0, 0.0]), np.arange(2.0)).error)
 
 
 def test_the_exponent_of_a_map_is_the_mean_logarithm_of_its_slope():

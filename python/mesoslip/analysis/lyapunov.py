@@ -43,8 +43,8 @@ WINDOW_PERIODS = 1
 MIN_SAMPLES = 16
 # Windows after which the distance has turned to the direction that grows most.
 SETTLING_WINDOWS = 3
-# Windows that a fit has at least.
-MIN_WINDOWS = 3
+# Windows for which a twin is followed at least: one step of growth.
+MIN_WINDOWS = SETTLING_WINDOWS + 2
 # Distance up to which growth is linear, over the amplitude of the motion.
 MAX_DISTANCE = 0.1
 # Parts of the run before the first twin, and in which each is followed.
@@ -145,8 +145,12 @@ def transverse_distances(one: Orbit, other: Orbit, window: int) -> tuple[Array, 
     return times, np.sqrt(np.sum(left**2, axis=1) / window)
 
 
-def growth_rate(times: Array, distances: Array, low: float, high: float) -> tuple[float, float]:
-    """Rate at which a distance grows while it is small.
+def growth(times: Array, distances: Array, low: float, high: float) -> tuple[float, float]:
+    """Growth of a distance while it is between two bounds.
+
+    Both ends are first passages: the first distance in the range, and the first one beyond it,
+    which counts. Without that last step, of the size of the growth in a slip, the rate
+    would come out too small, the more so the narrower the range.
 
     Parameters
     ----------
@@ -155,21 +159,22 @@ def growth_rate(times: Array, distances: Array, low: float, high: float) -> tupl
     distances
         Distances, shape (windows).
     low, high
-        The fit begins with the first distance above the one and ends before the first above the
-        other.
+        The range.
 
     Returns
     -------
-    Rate [1/s], NaN if fewer than `MIN_WINDOWS` are in the range, and the time of the fit [s].
+    Growth of the logarithm, and the time that it took [s]; both 0 if the distance is never in the
+    range, or only at the end.
     """
-    begin = max(SETTLING_WINDOWS, _first(distances >= low))
-    end = _first(distances >= high)
-    inside = slice(begin, end)
-    known = distances[inside] > 0
-    time, logarithm = times[inside][known], np.log(distances[inside][known])
-    if time.size < MIN_WINDOWS:
-        return math.nan, 0.0
-    return float(np.polyfit(time, logarithm, 1)[0]), float(time[-1] - time[0])
+    late = slice(SETTLING_WINDOWS, None)
+    time, distance = times[late], distances[late]
+    begin = _first((distance >= low) & (distance > 0))
+    time, distance = time[begin:], distance[begin:]
+    beyond = (distance >= high) | (distance < low) | (distance == 0)
+    end = min(_first(beyond), len(distance) - 1)
+    if end < 1 or distance[end] == 0:
+        return 0.0, 0.0
+    return math.log(distance[end] / distance[0]), float(time[end] - time[0])
 
 
 def _first(condition: NDArray[np.bool_]) -> int:
@@ -177,16 +182,31 @@ def _first(condition: NDArray[np.bool_]) -> int:
     return int(np.argmax(condition)) if condition.any() else len(condition)
 
 
-def pooled(rates: Array, weights: Array) -> Fit:
-    """Mean of rates of independent twins, weighted by the times of their fits, and its error."""
-    known = np.isfinite(rates)
-    rates, weights = rates[known], weights[known]
-    if rates.size < 2:
-        return Fit(math.nan if rates.size == 0 else float(rates[0]), math.nan)
-    share = weights / weights.sum()
-    mean = float(np.sum(share * rates))
-    error = math.sqrt(np.sum(share**2 * (rates - mean) ** 2) * rates.size / (rates.size - 1))
-    return Fit(mean, error)
+def pooled(grown: Array, lengths: Array, starts: Array) -> Fit:
+    """Growth of several twins over the time that it took, and its error.
+
+    The error is that of a ratio, from the scatter of the twins. Twins that follow the same part of
+    a run are not independent: they count as one in the time that they share.
+
+    Parameters
+    ----------
+    grown
+        Growth of the logarithm of each distance, shape (twins).
+    lengths
+        Times that it took [s], shape (twins).
+    starts
+        When the twins started [s], ascending, shape (twins).
+    """
+    known = lengths > 0
+    grown, lengths, starts = grown[known], lengths[known], starts[known]
+    total = lengths.sum()
+    if lengths.size < 2:
+        return Fit(float(grown.sum() / total) if total > 0 else math.nan, math.nan)
+    mean = float(grown.sum() / total)
+    scatter = np.sum((grown - mean * lengths) ** 2) * lengths.size / (lengths.size - 1)
+    before = np.maximum.accumulate(np.concatenate([[-math.inf], (starts + lengths)[:-1]]))
+    covered = np.sum(np.maximum(starts + lengths - np.maximum(starts, before), 0.0))
+    return Fit(mean, math.sqrt(scatter * total / covered) / float(total))
 
 
 def lyapunov(
@@ -268,9 +288,10 @@ def lyapunov(
     times = np.stack([one[0][:windows] for one in results])
     distances = np.stack([one[1][:windows] for one in results])
     low, high = _range(checked, reference.after(float(starts[0])).amplitude)
-    fits = [growth_rate(*one, low, high) for one in zip(times, distances, strict=True)]
-    rates, lengths = (np.array(one) for one in zip(*fits, strict=True))
-    fit = pooled(rates, lengths)
+    found = [growth(*one, low, high) for one in zip(times, distances, strict=True)]
+    grown, lengths = (np.array(one) for one in zip(*found, strict=True))
+    fit = pooled(grown, lengths, starts)
+    rates = np.divide(grown, lengths, out=np.full(twins, math.nan), where=lengths > 0)
     settled = peaks["start_time"] >= starts[0]
     data = {
         "distance": (("twin", "window"), distances),

@@ -4,6 +4,7 @@ from .analysis.lyapunov import lyapunov
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
+from .analysis.tables import write_table
 from .api import run
 from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
@@ -62,4 +63,5 @@ __all__ = [
     "run",
     "slips",
     "sweep",
+    "write_table",
 ]

@@ -50,6 +50,21 @@ def test_slips_for_a_spreadsheet_and_for_print(run, tmp_path, command):
     assert all(one.count("&") == len(columns) - 1 for one in text.splitlines() if "&" in one)
     assert command("slips", run, "--csv", tmp_path / "t.csv")[0] == 0
     assert (tmp_path / "t.csv").read_bytes() == (tmp_path / "s.csv").read_bytes()
+    for name in ("s.csv", "s.md", "s.tex"):
+        mesoslip.write_table(mesoslip.slips(run), tmp_path / f"python.{name}")
+        assert (tmp_path / f"python.{name}").read_text() == (tmp_path / name).read_text()
+
+
+def test_statistics_have_the_digits_of_their_deviation(run, command):
+    statistics = command("slips", run)[1].partition("\n\n")[2].splitlines()
+    exact = mesoslip.slips(run)["force_drop"].values * 1e6
+    line = next(one for one in statistics if one.lstrip().startswith("force drop (µN)"))
+    mean, deviation, low, high = line.split()[-4:]
+    decimals = len(deviation.partition(".")[2])
+    assert float(deviation) == pytest.approx(exact.std(), rel=0.05)
+    assert (mean, low, high) == tuple(
+        f"{one:.{decimals}f}" for one in (exact.mean(), exact.min(), exact.max())
+    )
 
 
 def test_responses_and_avalanches(run, tmp_path, command):
@@ -61,6 +76,13 @@ def test_responses_and_avalanches(run, tmp_path, command):
     lines = path.read_text().splitlines()
     count = mesoslip.avalanches(OLD).sizes["avalanche"]
     assert len(lines) == 4 + count
+    mesoslip.write_table(mesoslip.avalanches(OLD), tmp_path / "python.md")
+    assert (tmp_path / "python.md").read_text() == path.read_text()
+    found = mesoslip.response(run, fit=False)
+    mesoslip.write_table(found, tmp_path / "python.tex")
+    assert "Steady sliding" in (tmp_path / "python.tex").read_text()
+    with pytest.raises(mesoslip.FileError, match="mesoslip.slips, avalanches or response"):
+        mesoslip.write_table(mesoslip.derived(run), tmp_path / "python.md")
     status, _, error = command("slips", run, "--table", run)
     assert status != 0
     assert "run.nc" in error

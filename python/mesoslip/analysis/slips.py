@@ -179,6 +179,19 @@ def catalogue_of(tree: Tree) -> Catalogue:
     return Catalogue(columns, unit)
 
 
+def catalogue_from(data: xr.Dataset) -> Catalogue:
+    """The catalogue that `slips` returned."""
+    columns = {
+        name: Column(
+            data[name].values,
+            data[name].attrs.get("units", "1"),
+            data[name].attrs.get("long_name", name),
+        )
+        for name in COLUMNS
+    }
+    return Catalogue(columns, columns["force_drop"].unit)
+
+
 def slips(output: OutputLike) -> xr.Dataset:
     """The catalogue of slips of an output, dimension ``slip``, in SI.
 

@@ -17,33 +17,7 @@ from mesoslip.command_line.options import (
     show_all,
     time_of,
 )
-from mesoslip.quantities import column, number, with_error
-
-# Columns of the catalogue of slips: header, and unit in SI.
-COLUMNS = {
-    "start_time": ("start", "s"),
-    "duration": ("duration", "s"),
-    "force_before": ("force before", "N"),
-    "force_after": ("force after", "N"),
-    "force_drop": ("force drop", "N"),
-    "peak_velocity": ("peak velocity", "m/s"),
-    "contacts_broken": ("breaks", "1"),
-    "waiting_time": ("waiting time", "s"),
-    "stick_duration": ("stick duration", "s"),
-    "loading_rate": ("loading rate", "N/s"),
-    "loading_stiffness": ("loading stiffness", "N/m"),
-    "creep_displacement": ("creep before", "m"),
-    "creep_share": ("creep share", "1"),
-    "peak_fall_rate": ("peak fall rate", "N/s"),
-}
-# Columns of which the terminal has statistics, and --csv and --json the rows.
-STATISTICS_ONLY = {
-    "stick_duration",
-    "loading_rate",
-    "loading_stiffness",
-    "creep_displacement",
-    "peak_fall_rate",
-}
+from mesoslip.quantities import column, with_error
 
 
 def slips(
@@ -52,56 +26,33 @@ def slips(
     as_json: JsonOption = False,
 ) -> None:
     """Print the catalogue of slips, with statistics."""
+    from mesoslip.analysis import slip_tables
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
-    from mesoslip.output.tables import PrintedTable, is_printed, write_printed
+    from mesoslip.output.tables import is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:
         catalogue, counts = catalogues.catalogue_of(tree), catalogues.counts(tree)
-        has_several = tree.sizes["realization"] > 1
-    if table is not None and not is_printed(table):
-        catalogue.write_csv(table)
-    rows, statistics = catalogue.rows, catalogue.statistics
-    # Columns of which nothing is known, as breaks of a measured trace, are left out.
-    shown = [name for name in COLUMNS if not rows or any(row[name] is not None for row in rows)]
-    force_unit = catalogue.force_unit
-    heads, columns = {}, {}
-    for name in shown:
-        heads[name], unit = catalogues.as_recorded(*COLUMNS[name], force_unit)
-        columns[name] = column([row[name] for row in rows], unit, 5)
-    in_table = [name for name in shown if name not in STATISTICS_ONLY]
-    table_rows = [[columns[name].head(heads[name]) for name in in_table]]
-    table_rows += [[columns[name].text(row[name]) for name in in_table] for row in rows]
-    if has_several:
-        owners = ["realization", *(str(row["realization_index"]) for row in rows)]
-        table_rows = [[owner, *row] for owner, row in zip(owners, table_rows, strict=True)]
+    for_print = slip_tables.printed(catalogue)
     if table is not None and is_printed(table):
-        names, *cells = map(tuple, table_rows)
-        write_printed([PrintedTable("Slips", names, tuple(cells))], table)
+        write_printed([for_print], table)
+    elif table is not None:
+        catalogue.write_csv(table)
+    rows = catalogue.rows
     if as_json:
-        answer = {"slips": rows, "statistics": statistics}
+        answer = {"slips": rows, "statistics": catalogue.statistics}
         print_json(answer if counts is None else answer | {"slip_counts": counts})
         return
-    print_table(table_rows)
+    print_table((for_print.head, *for_print.rows))
     typer.echo(f"{counted(len(rows), 'slip')}{'; all columns with --csv FILE' if rows else ''}")
-    for name in shown:
-        if name in statistics:
-            mean, deviation, low, high = (
-                statistics[name][what]
-                for what in ("mean", "standard_deviation", "minimum", "maximum")
-            )
-            scale = columns[name].scale
-            low_text, high_text = (number(one / scale.size, 5) for one in (low, high))
-            spread = (
-                f", standard deviation {number(deviation / scale.size, 2)}, "
-                f"range {low_text} to {high_text}"
-            )
-            summary = f"mean {number(mean / scale.size, 5)}{spread if low < high else ''}"
-            typer.echo(f"{scale.label(heads[name]):26} {summary}")
+    if rows:
+        statistics = slip_tables.printed_statistics(catalogue)
+        typer.echo("")
+        print_table((statistics.head, *statistics.rows))
     if counts is not None:
-        _print_counts(counts, force_unit)
+        _print_counts(counts, catalogue.force_unit)
 
 
 def _print_counts(counts: dict[str, Any], unit: str) -> None:

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots.draw import draw, movie_of
@@ -30,12 +31,12 @@ def plot(
     view: str | None = None,
     snapshot: int | None = None,
     realization: int | None = None,
-    start: float = -math.inf,
-    end: float = math.inf,
+    start: float | str = -math.inf,
+    end: float | str = math.inf,
     x: str | None = None,
     figure: Figure | SubFigure | None = None,
     ax: Axes | None = None,
-    width: float | None = None,
+    width: float | str | None = None,
     font_size: float | None = None,
     title: str | None = None,
     letters: bool = False,
@@ -66,7 +67,7 @@ def plot(
     realization
         Number of the realization of a run; by default the first one, with others behind it.
     start, end
-        Interval of time of a run [s] that is drawn.
+        Interval of time of a run that is drawn: seconds, or quantities such as "1.9 s".
     x
         Horizontal axis of a run: "time", "displacement" of the slider, or "drive" for the
         displacement of the drive; by default the time, of a slider without inertia its
@@ -76,8 +77,8 @@ def plot(
     ax
         Axes for the most informative panel, and for nothing else.
     width
-        Width [m] of a new figure for print, such as 0.086 for a column of a journal; panels that
-        stood beside each other are below each other if it is narrow.
+        Width of a new figure for print, such as "8.6 cm" (or 0.086, in meters) for a column of a
+        journal; panels that stood beside each other are below each other if it is narrow.
     font_size
         Size of the font [pt]; 8 by default.
     title
@@ -104,12 +105,15 @@ def plot(
     if not outputs:
         raise FileError("there is no output to draw")
     extent = Extent(
-        _whole("realization", realization), _number("start", start), _number("end", end), x
+        _whole("realization", realization),
+        _quantity("start", start, "s", "1.9 s"),
+        _quantity("end", end, "s", "2 s"),
+        x,
     )
     options = Options(extent, _whole("snapshot", snapshot))
     how = Print(
-        None if width is None else _number("width", width, "meters"),
-        None if font_size is None else _number("font_size", font_size, "points"),
+        None if width is None else _quantity("width", width, "m", "8.6 cm"),
+        None if font_size is None else _number("font_size", font_size, "a number of points"),
         title,
         letters,
         None if style is None else as_path(style),
@@ -140,8 +144,24 @@ def plot(
     return drawn
 
 
-def _number(key: str, value: object, unit: str = "seconds") -> float:
-    """A quantity in SI, as a number or an array of one number.
+def _quantity(key: str, value: object, unit: str, example: str) -> float:
+    """A quantity in SI: a string with a unit, a number, or an array of one number.
+
+    Raises
+    ------
+    ConfigError
+        If it is something else, or has another dimension.
+    """
+    if not isinstance(value, str):
+        return _number(key, value, f"a quantity such as {example!r}, or a number in {unit}")
+    try:
+        return to_si(value, unit, example)
+    except ValueError as error:
+        raise ConfigError([Problem("", key, str(error), value)]) from None
+
+
+def _number(key: str, value: object, wanted: str) -> float:
+    """A number, or an array of one; ``wanted`` is for the message.
 
     Raises
     ------
@@ -153,7 +173,7 @@ def _number(key: str, value: object, unit: str = "seconds") -> float:
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
-        raise ConfigError([Problem("", key, f"must be a number of {unit}", value)]) from None
+        raise ConfigError([Problem("", key, f"must be {wanted}", value)]) from None
 
 
 def _whole(key: str, value: object) -> int | None:

@@ -1,0 +1,48 @@
+"""Tables of slips, avalanches and responses as files."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from mesoslip.analysis import avalanches, response, slip_tables, slips
+from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.errors import FileError
+from mesoslip.output.tables import is_printed, write_printed
+
+
+def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
+    """Write what `slips`, `avalanches` or `response` returned as a table.
+
+    Parameters
+    ----------
+    data
+        The catalogue, or the response.
+    file
+        The file: ``.tex`` for LaTeX with booktabs, ``.md`` for Markdown, each column in one unit;
+        otherwise comma-separated values in SI units.
+
+    Raises
+    ------
+    FileError
+        If the data are of another kind, or the file cannot be written.
+    """
+    path = as_path(file)
+    for_print = is_printed(path)
+    if isinstance(data, xr.DataTree) and "steady" in data.children:
+        if for_print:
+            write_printed(response.tables(data), path)
+        else:
+            response.write_csv(data, path)
+    elif isinstance(data, xr.Dataset) and "slip" in data.dims:
+        catalogue = slips.catalogue_from(data)
+        if for_print:
+            write_printed([slip_tables.printed(catalogue)], path)
+        else:
+            catalogue.write_csv(path)
+    elif isinstance(data, xr.Dataset) and "avalanche" in data.dims:
+        if for_print:
+            write_printed([avalanches.printed(data)], path)
+        else:
+            avalanches.write_csv(data, path)
+    else:
+        raise FileError(f"{path}: is for what mesoslip.slips, avalanches or response returns")

@@ -52,6 +52,15 @@ def test_a_picture_is_drawn_into_what_is_given(old, view):
     assert len(right.axes) - before == (view == "lattice")
 
 
+@pytest.mark.parametrize("width", [None, "8.6 cm"])
+def test_a_lattice_has_no_empty_space_beside_it(old, width):
+    figure = mesoslip.plot(old, view="lattice", width=width)
+    figure.draw_without_rendering()
+    for axes in figure.axes[: len(figure.axes) // 2]:
+        room, drawn = axes.get_position(original=True), axes.get_position()
+        assert drawn.width * drawn.height > 0.8 * room.width * room.height
+
+
 def test_pictures_of_the_theory(klein):
     for tree in (mesoslip.curve(klein()), mesoslip.onset(klein())):
         axes = Figure().subplots()

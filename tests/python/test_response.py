@@ -385,7 +385,15 @@ def test_the_command(tmp_path, command):
     assert status == 0
     assert out.count("Holds") == 1
     assert "Rate and state" not in out
-    assert command("plot", path, "--view", "response", "-o", tmp_path / "a.png")[0] == 0
+    figure = mesoslip.plot(path, tmp_path / "a.png", view="response", width="8.6 cm")
+    figure.draw_without_rendering()
+    record = figure.axes[0]
+    legend, whole = record.get_legend().get_window_extent(), figure.bbox
+    # Above the curves, and in the figure.
+    assert legend.y0 > record.get_window_extent().y1
+    assert (legend.x0, legend.x1, legend.y1) == pytest.approx(
+        (max(legend.x0, 0), min(legend.x1, whole.x1), min(legend.y1, whole.y1))
+    )
 
 
 def test_mistakes_are_errors(tmp_path, command):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import matplotlib as mpl
@@ -20,6 +21,10 @@ Array = NDArray[np.float64]
 
 # Contacts that are drawn as a polygon each; more of them become an image.
 MAX_POLYGONS = 20_000
+# Width of a lattice in a picture, or its height if that is greater [inch].
+LATTICE_WIDTH = 2.6
+# Width of the colours beside a lattice, and height of the title over it [inch].
+BESIDE_LATTICE, OVER_LATTICE = 1.0, 0.45
 # Colour of missing values.
 BLANK = "0.93"
 
@@ -101,12 +106,25 @@ def is_on_lattice(snapshots: xr.Dataset) -> bool:
     return "row" in snapshots.sizes
 
 
+def lattice_size(snapshots: xr.Dataset) -> tuple[float, float]:
+    """Width and height of axes in which the lattice leaves no empty space [inch]."""
+    x, y = snapshots["x"].values, snapshots["y"].values
+    spacing = x[0, 1] - x[0, 0]
+    aspect = (np.ptp(y) + 2 * spacing) / (np.ptp(x) + 2 * spacing)
+    width = LATTICE_WIDTH * min(1.0, 1.0 / aspect)
+    return width, width * aspect
+
+
+def load_range(load: Array) -> Normalize:
+    """Limits of the colours of loads: from 0, or the minimum, to the threshold."""
+    return Normalize(min(0.0, math.floor(10 * np.nanmin(load, initial=0.0)) / 10), 1.0)
+
+
 def draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
     """Draw the force over threshold of the contacts of a snapshot."""
-    drawn = draw_contacts(
-        axes, snapshot, snapshot["load"].values, cmap="viridis", norm=Normalize(-1, 1)
-    )
-    axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label="force over threshold")
+    load = snapshot["load"].values
+    drawn = draw_contacts(axes, snapshot, load, cmap="viridis", norm=load_range(load))
+    axes.figure.colorbar(drawn, ax=axes, label="force over threshold")
     time = with_unit(snapshot["snapshot_time"].item(), "s", 6)
     axes.set_title(f"snapshot at {time}\ngrey: detached", loc="left")
 
@@ -118,4 +136,4 @@ def draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:
     drawn = draw_contacts(
         axes, snapshot, generation, cmap="inferno_r", norm=Normalize(1, np.nanmax(generation))
     )
-    axes.figure.colorbar(drawn, ax=axes, shrink=0.8, label="generation")
+    axes.figure.colorbar(drawn, ax=axes, label="generation")

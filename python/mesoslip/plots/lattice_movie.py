@@ -6,18 +6,30 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from mesoslip.output.access import group_of
 from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import curve, draw_curves
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.lattice import MAX_POLYGONS, chosen_lattice, draw_contacts
+from mesoslip.plots.lattice import (
+    BESIDE_LATTICE,
+    MAX_POLYGONS,
+    OVER_LATTICE,
+    chosen_lattice,
+    draw_contacts,
+    lattice_size,
+    load_range,
+)
 from mesoslip.plots.movie import MAX_FRAMES, Movie, chosen_frames, time_bar
-from mesoslip.plots.style import canvas
 from mesoslip.plots.trace import driving_force_of
 from mesoslip.quantities import with_unit
+
+# Height of the axes of the time and their labels [inch].
+TIME_HEIGHT = 1.0
 
 
 def lattice_movie(tree: xr.DataTree, number: int | None = None) -> Movie:
@@ -35,8 +47,7 @@ def _spreading(snapshot: xr.Dataset) -> Movie:
     steps = np.unique(np.linspace(0, last, min(MAX_FRAMES, last + 1)).astype(int))
     broken = np.array([np.count_nonzero((generation > 0) & (generation <= one)) for one in steps])
     generation[generation == 0] = np.nan
-    figure = canvas(None, (3.6, 4.0))
-    axes, below = figure.subplots(2, 1, height_ratios=[5, 1])
+    figure, axes, below = _panels(snapshot)
     norm = Normalize(1, max(last, 2))
     empty = np.full(generation.shape, np.nan)
     drawn = draw_contacts(axes, snapshot, empty, cmap="inferno_r", norm=norm)
@@ -52,7 +63,7 @@ def _spreading(snapshot: xr.Dataset) -> Movie:
         _recolor(drawn, np.where(generation <= steps[number], generation, np.nan))
         bar.set_xdata([steps[number]] * 2)
 
-    return Movie(figure, len(steps), show)  # type: ignore[arg-type]
+    return Movie(figure, len(steps), show)
 
 
 def _snapshots(tree: xr.DataTree, snapshot: xr.Dataset) -> Movie:
@@ -60,10 +71,9 @@ def _snapshots(tree: xr.DataTree, snapshot: xr.Dataset) -> Movie:
     data = snapshots_of(tree, snapshot)
     frames = snapshot_frames(data)
     times = data["snapshot_time"].values
-    figure = canvas(None, (3.6, 4.2))
-    axes, below = figure.subplots(2, 1, height_ratios=[4, 1])
-    norm = Normalize(-1, 1)
+    figure, axes, below = _panels(snapshot)
     load = data["load"].values
+    norm = load_range(load)
     drawn = draw_contacts(axes, snapshot, load[frames[0]], cmap="viridis", norm=norm)
     label = "force over threshold"
     figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=label)
@@ -75,7 +85,16 @@ def _snapshots(tree: xr.DataTree, snapshot: xr.Dataset) -> Movie:
         axes.set_title(f"{with_unit(times[index], 's', 6)}; grey: detached", loc="left")
         move(times[index])
 
-    return Movie(figure, len(frames), show)  # type: ignore[arg-type]
+    return Movie(figure, len(frames), show)
+
+
+def _panels(snapshot: xr.Dataset) -> tuple[Figure, Axes, Axes]:
+    """A figure with axes for the lattice and, below it, for the time."""
+    width, height = lattice_size(snapshot)
+    heights = height + OVER_LATTICE, TIME_HEIGHT
+    figure = Figure(figsize=(width + BESIDE_LATTICE, sum(heights)))
+    axes, below = figure.subplots(2, 1, height_ratios=heights)
+    return figure, axes, below
 
 
 def _recolor(drawn: Any, values: Any) -> None:

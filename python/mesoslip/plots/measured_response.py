@@ -18,7 +18,7 @@ from mesoslip.analysis.response import response_of, rows_of
 from mesoslip.errors import RunError
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.record import draw_record, force_unit, title_record
+from mesoslip.plots.record import draw_record, fit_label, force_unit, title_record
 from mesoslip.plots.style import RED, Canvas, canvas, styled
 from mesoslip.quantities import Scale, scale_for, with_error
 
@@ -73,18 +73,19 @@ def _horizontal(experiment: Experiment, found: MeasuredFit) -> Array:
 def _draw_fit(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
     unit = force_unit(experiment)
     force = (found.model.points.force - found.residual) / unit.size
-    label = f"{found.model.law} law"
+    parts = [f"{found.model.law} law"]
     if found.stands_out and not found.undetermined:
         a, b = (
             with_error(found.value(name) / unit.size, found.error(name) / unit.size)
             for name in ("a", "b")
         )
         distance = with_error(found.value("slip_distance"), found.error("slip_distance"), "m")
-        label += f"\n$a$ = {a}\n$b$ = {b}\n$D_c$ = {distance}"
+        parts += [f"$a$ = {a}", f"$b$ = {b}", f"$D_c$ = {distance}"]
     else:
-        label += ": not determined"
+        parts += ["not determined"]
+    label = fit_label(axes, parts)
     axes.plot(_horizontal(experiment, found) / scale.size, force, color=RED, label=label)
-    axes.legend(loc="upper right")
+    axes.legend(loc="best")
 
 
 def _draw_residuals(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
@@ -190,9 +191,10 @@ def draw_measured(
         grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
         record = figure.add_subplot(grid[0, :])
         draw_record(record, experiment, scale)
-        title_record(record, tree)
         if found is not None:
             _draw_fit(record, experiment, found, scale)
+        title_record(record, tree)
+        if found is not None:
             residuals = figure.add_subplot(grid[1, :], sharex=record)
             _draw_residuals(residuals, experiment, found, scale)
             record.set_xlabel("")

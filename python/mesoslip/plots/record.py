@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
+from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
-from mesoslip.plots.style import BLUE, titles
+from mesoslip.plots.style import BLUE, axes_width, titles, wrapped
 from mesoslip.quantities import Scale, scale_for, with_unit
 
 Array = NDArray[np.float64]
@@ -22,6 +26,8 @@ MAX_MARKS = 200
 MAX_LABELS = 12
 # Distance of the title from the record, with the labels of stages between them [pt].
 LABEL_ROOM = 22
+# Distance of the lines of a legend, over the size of its font.
+LINE_SPACING = 1.5
 # Minimum distance of two labels, as a part of the width.
 LABEL_WIDTH = 0.03
 
@@ -70,10 +76,41 @@ def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
     _label_stages(axes, experiment, x, scale)
 
 
+def fit_label(axes: Axes, parts: Sequence[str]) -> str:
+    """Label of a law that is fitted to the record, in lines that fit into axes.
+
+    Parameters
+    ----------
+    axes
+        Where.
+    parts
+        The law, and its parameters, none of which breaks into two lines.
+    """
+    text = ", ".join(one.replace(" ", "\N{NO-BREAK SPACE}") for one in parts)
+    return wrapped(text, axes_width(axes))
+
+
 def title_record(axes: Axes, tree: xr.DataTree, about: str = "") -> None:
-    """Write the title of an output above the labels of its stages, and a line about them."""
+    """Write the title of an output above the labels of its stages, and a line about them; between
+    title and labels the legend, where it hides no data."""
     titles(axes, tree, about)
-    axes.set_title(axes.get_title(loc="left"), loc="left", pad=LABEL_ROOM)
+    labels = axes.get_legend_handles_labels()[1]
+    lines = sum(label.count("\n") + 1 for label in labels)
+    size = FontProperties(size=mpl.rcParams["legend.fontsize"])
+    line = LINE_SPACING * size.get_size_in_points()
+    if labels:
+        axes.legend(
+            loc="lower left",
+            bbox_to_anchor=(0, 1.0),
+            bbox_transform=offset_copy(
+                axes.transAxes, axes.figure.figure, y=LABEL_ROOM, units="points"
+            ),
+            borderaxespad=0.0,
+            borderpad=0.0,
+            handlelength=1.6,
+        )
+    pad = LABEL_ROOM + lines * line
+    axes.set_title(axes.get_title(loc="left"), loc="left", pad=pad)
 
 
 def _dots(experiment: Experiment) -> NDArray[np.int64]:

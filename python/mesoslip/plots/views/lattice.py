@@ -5,9 +5,17 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.axes import Axes
 
-from mesoslip.plots.lattice import chosen_lattice, draw_generations, draw_load
+from mesoslip.plots.lattice import (
+    BESIDE_LATTICE,
+    OVER_LATTICE,
+    chosen_lattice,
+    draw_generations,
+    draw_load,
+    lattice_size,
+)
 from mesoslip.plots.lattice_movie import lattice_movie
-from mesoslip.plots.style import Canvas, side_by_side, styled
+from mesoslip.plots.printing import is_narrow
+from mesoslip.plots.style import Canvas, canvas, styled
 from mesoslip.plots.views.base import Options, View
 
 
@@ -16,7 +24,12 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     snapshot = chosen_lattice(tree, options.snapshot)
     size = snapshot["avalanche_size"].item()
     with styled():
-        figure, panels = side_by_side(figure, (6.5, 3.4) if size else (3.6, 3.4), 2 if size else 1)
+        count = 2 if size else 1
+        width, height = lattice_size(snapshot)
+        rows, columns = (count, 1) if is_narrow(figure) else (1, count)
+        whole = columns * (width + BESIDE_LATTICE), rows * (height + OVER_LATTICE)
+        figure = canvas(figure, whole)
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
         draw_load(panels[0], snapshot)
         if size:
             draw_generations(panels[1], snapshot)

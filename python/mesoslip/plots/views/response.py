@@ -17,15 +17,12 @@ from mesoslip.plots.forced_response import draw_forced
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.record import draw_record, title_record
-from mesoslip.plots.style import RED, Canvas, axes_width, canvas, styled, wrapped, write_title
+from mesoslip.plots.record import draw_record, fit_label, title_record
+from mesoslip.plots.style import RED, Canvas, canvas, styled, write_title
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
 Array = NDArray[np.float64]
-
-# Part of the width of axes that a line of a legend in them takes.
-LEGEND_PART = 0.7
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, scale: Scale) -> None:
@@ -33,13 +30,16 @@ def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, sc
     sign = next(one.direction for one in experiment.stages if one.direction)
     drive = sign * np.interp(record.time + record.start, experiment.time, experiment.drive)
     force = (record.force - found.residual) / experiment.static_force
-    label = f"{found.law.law} law, $a$ = {found.law.a / experiment.static_force:.2g} $F_s$, "
-    label += f"$b$ = {found.law.b / experiment.static_force:.2g} $F_s$, "
-    label += f"$D_c$ = {with_unit(found.law.slip_distance, 'm', 3)}"
+    parts = [
+        f"{found.law.law} law",
+        f"$a$ = {found.law.a / experiment.static_force:.2g} $F_s$",
+        f"$b$ = {found.law.b / experiment.static_force:.2g} $F_s$",
+        f"$D_c$ = {with_unit(found.law.slip_distance, 'm', 3)}",
+    ]
     # As the table does for a law that does not describe the record.
     misfit = found.relative_misfit(record)
-    label += f" (misfit {percent(misfit)})" if misfit > MAX_MISFIT else ""
-    label = wrapped(label, LEGEND_PART * axes_width(axes))
+    parts += [f"misfit {percent(misfit)}"] if misfit > MAX_MISFIT else []
+    label = fit_label(axes, parts)
     axes.plot(drive / scale.size, force, color=RED, label=label)
     axes.legend(loc="best")
 

@@ -196,12 +196,12 @@ def _draw_map(
     edges = keys[0].edges, keys[1].edges
     if not choices:
         scale = LogNorm() if spans_decades(shown) else None
-        mesh = axes.pcolormesh(*edges, shown, cmap="viridis", norm=scale)
+        mesh = axes.pcolormesh(*edges, shown, cmap="viridis", norm=scale, rasterized=True)
         axes.figure.colorbar(mesh, ax=axes)
         return
     colors = ListedColormap(CHOICE_COLORS[: len(choices)])
     norm = BoundaryNorm(np.arange(len(choices) + 1) - 0.5, len(choices))
-    mesh = axes.pcolormesh(*edges, shown, cmap=colors, norm=norm)
+    mesh = axes.pcolormesh(*edges, shown, cmap=colors, norm=norm, rasterized=True)
     bar = axes.figure.colorbar(mesh, ax=axes, ticks=range(len(choices)))
     bar.ax.set_yticklabels(choices)
     bar.minorticks_off()

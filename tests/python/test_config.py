@@ -159,6 +159,21 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("title", "a\0b", ["title", "character"]),
         ("title", "\udcff", ["title", "UTF-8"]),
         ("output__snapshots", 5, ["output.snapshots", "must be a list"]),
+        (
+            "output__snapshots",
+            [{"from": "1 s", "to": "2 m", "points": 3}],
+            ["output.snapshots", "2 m", "0.5 ms"],
+        ),
+        (
+            "output__snapshots",
+            [{"from": "1 s", "to": "2 s", "step": "1 ms"}],
+            ["output.snapshots", "points = 30"],
+        ),
+        (
+            "output__snapshots",
+            [{"from": "2 s", "to": "1 s", "points": 3}],
+            ["output.snapshots", "ends after it begins"],
+        ),
         ("outputs", {}, ["outputs", "unknown key", "'output'"]),
         ("delay", "2 ms", ["delay: unknown key; did you mean 'contacts.delay'?"]),
         ("run__delay", "2 ms", ["run.delay: unknown key; did you mean 'contacts.delay'?"]),
@@ -684,6 +699,12 @@ def test_too_much_for_the_memory(klein, changes, words):
     (problem,) = caught.value.problems
     for word in words:
         assert word in str(problem)
+
+
+def test_snapshots_at_the_times_of_a_range(klein):
+    span = {"from": "1.9 s", "to": "1.93 s", "points": 4}
+    times = klein(output__snapshots=["1.5 s", span, 3.0]).output.snapshots
+    assert times == pytest.approx((1.5, 1.9, 1.91, 1.92, 1.93, 3.0), rel=1e-15)
 
 
 def test_memory_of_slips_and_snapshots_that_fit(klein):

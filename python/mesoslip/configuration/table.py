@@ -20,6 +20,9 @@ from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from mesoslip.configuration.units import to_si
 
+# Maximum number of times of a range.
+MAX_POINTS = 100_000
+
 
 def _within(value: object, unit: str, example: str, minimum: float, maximum: float) -> float:
     """A quantity in an SI unit: 0, or of a size within bounds."""
@@ -35,6 +38,35 @@ def _quantity(unit: str, example: str, minimum: float, maximum: float) -> Any:
     return BeforeValidator(
         partial(_within, unit=unit, example=example, minimum=minimum, maximum=maximum)
     )
+
+
+def with_ranges(values: object) -> object:
+    """A list of times in which each ``{ from, to, points }`` is replaced by equidistant times [s].
+
+    Raises
+    ------
+    ValueError
+        If a range has other keys, or wrong values.
+    """
+    if not isinstance(values, list | tuple):
+        return values
+    return [time for one in values for time in _times(one)]
+
+
+def _times(value: object) -> list[object]:
+    if not isinstance(value, Mapping):
+        return [value]
+    wanted = 'expected { from = "1.9 s", to = "1.93 s", points = 30 }'
+    if set(value) != {"from", "to", "points"}:
+        raise ValueError(f"a range has other keys; {wanted}")
+    first, last = (to_si(value[key], "s", "0.5 ms") for key in ("from", "to"))
+    points = _whole(value["points"])
+    if not isinstance(points, int) or isinstance(points, bool) or not 2 <= points <= MAX_POINTS:
+        raise ValueError(f"a range has from 2 to {MAX_POINTS} points; {wanted}")
+    if not first < last:
+        raise ValueError(f"a range ends after it begins; {wanted}")
+    step = (last - first) / (points - 1)
+    return [*(first + number * step for number in range(points - 1)), last]
 
 
 def _whole(value: object) -> object:

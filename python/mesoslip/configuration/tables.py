@@ -17,6 +17,7 @@ from mesoslip.configuration.table import (
     Velocity,
     Whole,
     problem,
+    with_ranges,
 )
 
 
@@ -104,8 +105,11 @@ class Output(Table):
     """Whether the displacement of each layer is recorded."""
     avalanche_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
     """Minimum size of recorded avalanches; by default all are recorded."""
-    snapshots: tuple[Annotated[Time, Field(ge=0)], ...] = ()
-    """Times at which a snapshot of all contacts is recorded; with engine `eq`."""
+    snapshots: Annotated[
+        tuple[Annotated[Time, Field(ge=0)], ...], BeforeValidator(with_ranges)
+    ] = ()
+    """Times at which a snapshot of all contacts is recorded; with engine `eq`. An entry of the list
+    may be a range, ``{ from = "1.9 s", to = "1.93 s", points = 30 }``."""
     snapshot_size: Annotated[Whole, Field(ge=1, lt=2**53)] | None = None
     """Minimum size of avalanches after which a snapshot of all contacts is recorded."""
 

@@ -11,6 +11,7 @@ module mesoslip_contacts_lattice
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_memory, only: request_large_pages
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory, &
       & status_stalled
@@ -20,7 +21,7 @@ module mesoslip_contacts_lattice
       & snapshot_individual, total_law
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_neighbours, only: coordination, find_neighbours, &
-      & lattice_names
+      & lattice_names, max_neighbours
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_origin, &
       & row_stiffness
    implicit none
@@ -50,8 +51,8 @@ module mesoslip_contacts_lattice
    type, extends(individual_contacts_type) :: contact_lattice_type
       !> Stiffness of a bond [N/m]
       real(wp), private :: bond = 0.0_wp
-      !> Neighbours of each contact, shape (neighbours, count)
-      integer, allocatable, private :: neighbour(:, :)
+      !> One of the lattice_ codes, and the number of neighbours of each contact
+      integer, private :: lattice = 0, sides = 0
       !> What these are to it while it is pinned, shape (surroundings_length, count)
       real(wp), allocatable, private :: surroundings(:, :)
       !> Contacts that let go together
@@ -69,7 +70,7 @@ module mesoslip_contacts_lattice
       procedure :: snapshot
       procedure :: exchange
       procedure, private, non_overridable :: cascade, list_due, list_behind, sum_neighbours, &
-         & update_neighbours
+         & update_neighbours, neighbours_of
    end type contact_lattice_type
 
 contains
@@ -85,27 +86,26 @@ contains
       !> Set if the lattice does not hold as many contacts, or there is not enough memory
       type(error_type), allocatable, intent(out) :: error
 
-      integer :: neighbours, stat
+      integer :: stat
 
-      neighbours = coordination(interaction%lattice)
-      if (neighbours == 0 .or. interaction%columns < 1) then
+      self%lattice = interaction%lattice
+      self%sides = coordination(interaction%lattice)
+      if (self%sides == 0 .or. interaction%columns < 1) then
          call raise(error, status_invalid, "unknown lattice")
          return
       end if
       self%parameters = parameters
       self%bond = interaction%bond
-      self%bonds = real(neighbours, wp) * interaction%bond
+      self%bonds = real(self%sides, wp) * interaction%bond
       call self%allocate_records(interaction%columns, interaction%rows, error)
       if (allocated(error)) return
-      allocate (self%neighbour(neighbours, parameters%count), stat=stat)
-      if (stat == 0) allocate (self%generation(parameters%count), stat=stat)
+      allocate (self%generation(parameters%count), stat=stat)
       if (stat == 0) allocate (self%surroundings(surroundings_length, parameters%count), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the neighbours of contacts")
          return
       end if
-      call find_neighbours(interaction%lattice, interaction%columns, interaction%rows, &
-         & self%neighbour)
+      call request_large_pages(self%surroundings, size(self%surroundings))
       self%surroundings = 0.0_wp
       call new_break_tree(self%tree, parameters%count, error)
    end subroutine new_contact_lattice
@@ -292,12 +292,13 @@ contains
       !> Force of the neighbours where the stretch of the contact is zero [N]
       real(wp) :: force
 
-      integer :: side
+      integer :: side, neighbour(max_neighbours)
       real(wp) :: pull
 
+      neighbour = self%neighbours_of(contact)
       pull = 0.0_wp
-      do side = 1, size(self%neighbour, 1)
-         associate (record => self%record(:, self%neighbour(side, contact)))
+      do side = 1, self%sides
+         associate (record => self%record(:, neighbour(side)))
             if (record(row_stiffness) > 0.0_wp) pull = pull + (displacement - record(row_origin))
          end associate
       end do
@@ -323,18 +324,29 @@ contains
       call self%update_neighbours(contact, 1.0_wp)
    end subroutine join
 
+   !> Neighbours of a contact.
+   pure function neighbours_of(self, contact) result(neighbour)
+      class(contact_lattice_type), intent(in) :: self
+      integer, intent(in) :: contact
+      !> Their numbers, as many as there are sides
+      integer :: neighbour(max_neighbours)
+
+      call find_neighbours(self%lattice, self%track%columns, self%track%rows, contact, neighbour)
+   end function neighbours_of
+
    !> Sum what a contact keeps of its neighbours.
    pure subroutine sum_neighbours(self, contact)
       class(contact_lattice_type), intent(inout) :: self
       integer, intent(in) :: contact
 
-      integer :: side
+      integer :: side, neighbour(max_neighbours)
       real(wp) :: ahead, free, is_pinned
 
+      neighbour = self%neighbours_of(contact)
       ahead = 0.0_wp
       free = 0.0_wp
-      do side = 1, size(self%neighbour, 1)
-         associate (record => self%record(:, self%neighbour(side, contact)))
+      do side = 1, self%sides
+         associate (record => self%record(:, neighbour(side)))
             is_pinned = merge(1.0_wp, 0.0_wp, record(row_stiffness) > 0.0_wp)
             ahead = ahead + is_pinned * (record(row_origin) - self%record(row_origin, contact))
             free = free + (1.0_wp - is_pinned)
@@ -350,11 +362,11 @@ contains
       real(wp), intent(in) :: change
 
       ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
-      if (size(self%neighbour, 1) == 6) then
-         call update_all(contact, change, 6, self%neighbour(:, contact), self%parameters%count, &
+      if (self%sides == 6) then
+         call update_all(contact, change, 6, self%neighbours_of(contact), self%parameters%count, &
             & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
       else
-         call update_all(contact, change, 4, self%neighbour(:, contact), self%parameters%count, &
+         call update_all(contact, change, 4, self%neighbours_of(contact), self%parameters%count, &
             & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
       end if
    end subroutine update_neighbours
@@ -363,7 +375,7 @@ contains
    pure subroutine update_all(contact, change, sides, neighbour, count, record, surroundings, &
       & bond, direction, tree, behind)
       !> The contact, -1 if it broke and +1 if it attached, and its neighbours, of so many in all
-      integer, intent(in) :: contact, sides, count, neighbour(sides)
+      integer, intent(in) :: contact, sides, count, neighbour(max_neighbours)
       real(wp), intent(in) :: change
       real(wp), intent(in) :: record(record_length, count)
       real(wp), intent(inout) :: surroundings(surroundings_length, count)

@@ -431,10 +431,10 @@ def interaction_cost() -> None:
             most = breaks + max(400_000, 3 * count)
             while realization.breaks < most and not realization.finished:
                 realization.advance(1_000_000)
-            # Tree, neighbours, what these are to a contact, and a list of contacts live in the
-            # kernel during a segment.
+            # Tree, what its neighbours are to a contact, and a list of contacts live in the kernel
+            # during a segment.
             memory = (memory_in_use() - before) / count
-            memory += 36 if strength is None else 17 + 24 + 16 + 4
+            memory += 36 if strength is None else 17 + 16 + 4
             breaks = realization.breaks - breaks
             cost = (realization.kernel_seconds - seconds) / breaks * 1e9
             reference = reference or cost

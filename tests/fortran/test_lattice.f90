@@ -11,7 +11,7 @@ program test_lattice
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_contacts_individual_neighbours, only: coordination, find_neighbours, &
-      & lattice_square, lattice_triangular
+      & lattice_square, lattice_triangular, max_neighbours
    use mesoslip_numerics_random, only: uniform_pair
    use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use testing, only: check, check_close, finish
@@ -94,6 +94,19 @@ contains
       call check(is_right, "the first contact of a tree made anew")
    end subroutine breaks_first
 
+   !> Neighbours of all sites, shape (neighbours, sites).
+   subroutine list_neighbours(lattice, columns, rows, neighbour)
+      integer, intent(in) :: lattice, columns, rows
+      integer, intent(out) :: neighbour(:, :)
+
+      integer :: site, some(max_neighbours)
+
+      do site = 1, columns * rows
+         call find_neighbours(lattice, columns, rows, site, some)
+         neighbour(:, site) = some(:size(neighbour, 1))
+      end do
+   end subroutine list_neighbours
+
    !> Each bond is there from both ends, and none leads back to its start.
    subroutine have_neighbours(lattice, columns, rows)
       integer, intent(in) :: lattice, columns, rows
@@ -103,7 +116,7 @@ contains
       logical :: is_mutual
 
       allocate (neighbour(coordination(lattice), columns * rows))
-      call find_neighbours(lattice, columns, rows, neighbour)
+      call list_neighbours(lattice, columns, rows, neighbour)
       is_mutual = .true.
       do place = 1, columns * rows
          do side = 1, size(neighbour, 1)
@@ -210,7 +223,7 @@ contains
       real(wp) :: values(3, contacts%parameters%count), stretch(contacts%parameters%count), force
       integer :: neighbour(4, contacts%parameters%count), place
 
-      call find_neighbours(lattice_square, columns, rows, neighbour)
+      call list_neighbours(lattice_square, columns, rows, neighbour)
       call contacts%snapshot(0.0_wp, displacement, values)
       associate (record => contacts%record)
          stretch = merge(displacement - record(row_origin, :), 0.0_wp, &

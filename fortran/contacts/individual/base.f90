@@ -19,6 +19,7 @@ module mesoslip_contacts_individual_base
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_numerics_memory, only: request_large_pages
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_schedule, only: max_events, schedule_type
    implicit none
@@ -116,11 +117,13 @@ contains
             & // "of contacts")
          return
       end if
-      allocate (self%record(record_length, self%parameters%count), source=0.0_wp, stat=stat)
+      allocate (self%record(record_length, self%parameters%count), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the contacts")
          return
       end if
+      call request_large_pages(self%record, size(self%record))
+      self%record = 0.0_wp
       call new_detached_contacts(self%detached, self%parameters%count, self%parameters%reattach, &
          & self%parameters%delay_law == delay_fixed, error)
       if (.not. allocated(error)) call self%births%allocate_draws(self%parameters, error)

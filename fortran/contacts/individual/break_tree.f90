@@ -6,6 +6,7 @@
 module mesoslip_contacts_individual_break_tree
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_memory, only: request_large_pages
    implicit none
    private
 
@@ -72,6 +73,7 @@ contains
          call raise(error, status_memory, "not enough memory for the order of breaking")
          return
       end if
+      call request_large_pages(self%minimum, positions)
       call self%clear()
    end subroutine new_break_tree
 

@@ -4,12 +4,14 @@ module mesoslip_contacts_individual_neighbours
    private
 
    public :: lattice_triangular, lattice_square, lattice_names
-   public :: coordination, find_neighbours
+   public :: coordination, find_neighbours, max_neighbours
 
    !> Six neighbours; odd rows are half a spacing to the right of even ones, counted from 0
    integer, parameter :: lattice_triangular = 1
    !> Four neighbours
    integer, parameter :: lattice_square = 2
+   !> Maximum number of neighbours
+   integer, parameter :: max_neighbours = 6
    !> Names of the lattice_ codes
    character(len=*), parameter :: lattice_names(2) = [character(len=10) :: "triangular", "square"]
 
@@ -27,42 +29,40 @@ contains
       if (lattice == lattice_square) number = 4
    end function coordination
 
-   !> Neighbours of all sites, numbered from 1, row by row.
+   !> Neighbours of a site. Sites are numbered from 1, row by row.
    !>
+   !> They are computed each time: a table of them would come out of the memory, which takes longer.
    !> With two rows or columns in all, a site is the neighbour of another twice.
-   pure subroutine find_neighbours(lattice, columns, rows, neighbour)
+   pure subroutine find_neighbours(lattice, columns, rows, site, neighbour)
       !> One of the lattice_ codes
       integer, intent(in) :: lattice
       !> Columns and rows; of a triangular lattice an even number of rows
       integer, intent(in) :: columns, rows
-      !> Numbers of the neighbours, shape (coordination, columns rows)
-      integer, intent(out) :: neighbour(:, :)
+      !> Number of the site
+      integer, intent(in) :: site
+      !> Numbers of the neighbours, shape (max_neighbours), of which the first ones are set
+      integer, intent(out) :: neighbour(max_neighbours)
 
-      integer :: column, row, site, slant
+      integer :: column, row, left, right, up, down
 
-      do row = 0, rows - 1
-         do column = 0, columns - 1
-            site = row * columns + column + 1
-            neighbour(:2, site) = [at(column - 1, row), at(column + 1, row)]
-            if (lattice == lattice_triangular) then
-               slant = modulo(row, 2) - 1
-               neighbour(3:, site) = [at(column + slant, row - 1), &
-                  & at(column + slant + 1, row - 1), at(column + slant, row + 1), &
-                  & at(column + slant + 1, row + 1)]
-            else
-               neighbour(3:, site) = [at(column, row - 1), at(column, row + 1)]
-            end if
-         end do
-      end do
-
-   contains
-
-      !> Number of a site.
-      pure integer function at(column, row)
-         integer, intent(in) :: column, row
-
-         at = modulo(row, rows) * columns + modulo(column, columns) + 1
-      end function at
+      row = (site - 1) / columns
+      column = site - 1 - row * columns
+      left = merge(site - 1, site - 1 + columns, column > 0)
+      right = merge(site + 1, site + 1 - columns, column < columns - 1)
+      up = merge(-columns, (rows - 1) * columns, row > 0)
+      down = merge(columns, (1 - rows) * columns, row < rows - 1)
+      neighbour(:2) = [left, right]
+      if (lattice == lattice_square) then
+         neighbour(3:) = [site + up, site + down, 0, 0]
+      else
+         ! Those to the left in the rows above and below, then those to the right.
+         if (modulo(row, 2) == 0) then
+            right = site
+         else
+            left = site
+         end if
+         neighbour(3:) = [left + up, right + up, left + down, right + down]
+      end if
    end subroutine find_neighbours
 
 end module mesoslip_contacts_individual_neighbours

@@ -15,7 +15,7 @@ class LatticeContacts(ContactKind):
     """Contacts with bonds between neighbours (S25 to S27)."""
 
     kernel_kind: ClassVar[str] = "lattice"
-    bytes_per_contact: ClassVar[int] = 260
+    bytes_per_contact: ClassVar[int] = 236
 
     interaction: Interaction
 

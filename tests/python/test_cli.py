@@ -365,7 +365,11 @@ def test_a_drive_that_the_run_cuts_is_reported(short, tmp_path, command):
     printed = "run.duration ends the run after 2.5 s of a drive of 6 s, in stage 3 of 6"
     assert printed in command("info", stages, *cut)[1]
     assert f"warning: {printed}" in command("run", stages, *cut, "-o", tmp_path / "cut.nc")[2]
-    assert "ends the run" not in command("info", stages, "--set", "run.duration=6 s")[1]
+    whole = command("info", stages, "--set", "run.duration=6 s")[1]
+    assert "ends the run" not in whole
+    assert "goes on" not in whole
+    printed = "the stages end after 6 s: the last one goes on for another 3 s, until run.duration"
+    assert printed in command("info", stages, "--set", "run.duration=9 s")[1]
 
 
 def test_an_ending_that_is_not_reached_is_reported(short, tmp_path, command):

@@ -62,7 +62,7 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     """
     there = store.names()
     missing: list[Combination] = []
-    stored_count = missing_count = longest_chain = 0
+    stored_count = missing_count = max_chain = 0
     for group in groups(plan):
         copies = len(group.chains)
         chain = group.chains[0]
@@ -75,7 +75,7 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
             if stored == len(chain):
                 continue
             missing_count += len(chain)
-            longest_chain = max(longest_chain, len(chain))
+            max_chain = max(max_chain, len(chain))
             if not missing or missing[-1] is not chain[-1]:
                 missing += chain
     step = max(1, len(missing) // MAX_TRIED)
@@ -84,7 +84,7 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     mean = float(np.mean(seconds)) + OVERHEAD_SECONDS if seconds else 0.0
     longest = max(seconds, default=0.0)
     # The runs of a chain follow one another.
-    alone = max(longest, mean * longest_chain)
+    alone = max(longest, mean * max_chain)
     wall = max(mean * missing_count / workers, alone) + START_SECONDS if missing else 0.0
     trace_bytes = max((_trace_bytes(one) for one in plan.combinations), default=0.0)
     # Three copies: in the tables of the kernel, in the tree, and in measures.

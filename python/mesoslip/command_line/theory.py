@@ -46,7 +46,12 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         return
     for name, one in quantities.items():
         show(name, one.value, one.unit, one.meaning, digits=DERIVED_DIGITS)
-    for message in (verdict(checked), checked.unreached_drive, checked.unreachable_stop):
+    for message in (
+        verdict(checked),
+        checked.unreached_drive,
+        checked.continued_drive,
+        checked.unreachable_stop,
+    ):
         if message is not None:
             typer.echo(message)
 
@@ -192,7 +197,7 @@ def _digits(name: str, curve: ForceCurve) -> int:
 
 
 def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
-    """Print the stiffnesses of the spring above which sliding is stable, in each sense."""
+    """Print the stiffnesses above which sliding is stable: K*, and limits of linear theory."""
     from mesoslip.quantities import percent, with_unit
     from mesoslip.theory.linear_stability import OUT_OF_STEP, shown_by
     from mesoslip.theory.steady_sliding import stiffness_limits

@@ -244,6 +244,19 @@ class Config(Table):
         )
 
     @property
+    def continued_drive(self) -> str | None:
+        """A message about a last stage that goes on beyond its end; None if none does."""
+        length = self.drive.length
+        # As with stages whose durations are rounded in the file.
+        if not self.drive.parts or not 1.01 * length < self.duration < math.inf:
+            return None
+        given = "duration" if self.run.duration is not None else "drive_displacement"
+        return (
+            f"the stages end after {with_unit(length, 's')}: the last one goes on for another "
+            f"{with_unit(self.duration - length, 's')}, until run.{given}"
+        )
+
+    @property
     def unreachable_stop(self) -> str | None:
         """A message about a displacement that should end the run, but is farther away than the
         drive and the contacts can move the slider; None if it can be reached."""

@@ -134,7 +134,7 @@ class Columns(Table):
 class TraceDescription(Table):
     """What a file of a measurement does not say by itself.
 
-    Quantities are texts with units, as they were written; `si` has them in SI.
+    Quantities are strings with units, as they were written; `si` has them in SI.
     """
 
     file: Text

@@ -188,8 +188,8 @@ def read_trace(
 ) -> xr.DataTree:
     """Read a measured trace as the laboratory wrote it, as an output like that of a run.
 
-    Quantities are texts with units, such as "1002 N/m", or numbers in SI. They replace keys of the
-    table [trace] of a file such as EXPERIMENT.toml.
+    Quantities are strings with units, such as "1002 N/m", or numbers in SI. They replace keys of
+    the table [trace] of a file such as EXPERIMENT.toml.
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ class Realization:
         Number of the realization, from 0; each has its own random numbers.
     estimates_errors
         Whether to repeat a run of the master equation with steps twice as long at its end, which
-        tells the errors by its steps.
+        estimates the errors of its steps.
     coarsening
         Length of steps over the configured one, where there are steps.
     after

@@ -220,9 +220,9 @@ class ActivatedLives:
         edges = start + (end - start) * np.linspace(0, 1, count + 1)
         if law is not None:
             # Young thresholds change within the ageing time: panels of equal ratios.
-            longest_age = float(np.max(end))
+            max_age = float(np.max(end))
             young = np.geomspace(
-                0.1 * min(law.time, longest_age), longest_age, math.ceil(AGEING_PANELS / coarseness)
+                0.1 * min(law.time, max_age), max_age, math.ceil(AGEING_PANELS / coarseness)
             )
             young = young[young > np.min(start)]
             edges = np.sort(np.concatenate([edges, np.clip(young, start, end)], axis=1), axis=1)

@@ -142,4 +142,5 @@ def summary(results: list[RegimeResult]) -> str:
     if len(results) == 1:
         return results[0].summary
     counts = Counter(one.regime for one in results)
-    return ", ".join(f"{counts[one]} {NAMES[one].replace('_', '-')}" for one in sorted(counts))
+    names = (f"{counts[one]} {NAMES[one].replace('_', '-')}" for one in sorted(counts))
+    return f"{len(results)} realizations: {', '.join(names)}"

@@ -163,6 +163,16 @@ def test_peaks_are_those_of_the_second_half():
     assert np.array_equal(settled_peaks(tree), slips["force_before"].values[late])
     assert 0 < late.sum() < late.size
     assert mesoslip.plot(tree, view="return-map").axes[0].lines
+    other = mesoslip.run(
+        klein_tables(run__duration=2.0, contacts__count=20, drive__velocity=0.4e-6), executor=1
+    )
+    axes = mesoslip.plot([tree, other], view="bifurcation").axes[0]
+    for line, one, velocity in zip(axes.lines, (tree, other), (100.0, 400.0), strict=True):
+        assert line.get_xdata() == pytest.approx(velocity)
+        assert line.get_ydata() == pytest.approx(1e6 * settled_peaks(one))
+    third = mesoslip.run(klein_tables(run__duration=0.1, contacts__delay=1e-3), executor=1)
+    with pytest.raises(mesoslip.ConfigError, match=r"contacts\.delay.*one number"):
+        mesoslip.plot([tree, third], view="bifurcation")
 
 
 def test_sliders_without_inertia_have_no_twins(tmp_path, command):

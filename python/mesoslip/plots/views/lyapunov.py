@@ -45,7 +45,7 @@ def draw_growth(axes: Axes, tree: xr.DataTree, _: Options) -> None:
             label = rf"$\lambda$ = {with_error(exponent, error, '1/s')}"
             axes.semilogy(time[shown], line[shown], color="black", label=label)
             axes.legend()
-    axes.set_xlabel("time since the start of a twin, s")
+    axes.set_xlabel("time since the start of a twin (s)")
     axes.set_ylabel("distance")
     titles(axes, tree)
 
@@ -57,7 +57,7 @@ def draw_all(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _:
         mean = np.exp(np.mean(np.log(data["distance"].values), axis=0))
         time = data["growth_time"].values.mean(axis=0)
         axes.semilogy(time, mean, color=curve_color(number), label=label)
-    axes.set_xlabel("time since the start of a twin, s")
+    axes.set_xlabel("time since the start of a twin (s)")
     axes.set_ylabel("distance, geometric mean of twins")
 
 

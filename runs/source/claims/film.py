@@ -49,10 +49,12 @@ def film(trees: Sequence[xr.DataTree]) -> Finding:
             measured("maximum change up to 1e5, contacts", largest[1], "1", "small"),
         ),
         verdict(bool(largest[1] < NEARLY and largest[0] > NEARLY)),
-        f"up to 1e5 the slip times of both differ by at most {100 * apart:.0f} % and depend on "
-        "the viscosity alike: what counts is the share of contacts that are detached in the slip, "
-        "which the delay sets; here, for the film as for contacts, half of them at the viscosity "
-        "of the bulk and a quarter at 1e5 (docs/melting-film.md)",
+        f"the claim is false at this delay, 0.5 ms: up to 1e5 the slip times of both differ by at "
+        f"most {100 * apart:.0f} % and depend on the viscosity alike. What counts is the share of "
+        "contacts that are detached in the slip, which the delay sets; here, for the film as for "
+        "contacts, half of them at the viscosity of the bulk and a quarter at 1e5. With a delay of "
+        "0.02 ms the change at 1e5 is 5 % for contacts and 13 % for the film, a small difference "
+        "of the kind claimed (docs/melting-film.md)",
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import resource
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -122,7 +123,7 @@ def assert_same_arrays(path):
 def test_both_ways_to_write_give_the_same(results, tmp_path):
     """Block by block or as a tree: the same values to the bit, attributes, types and encodings."""
     tree = build_tree(results)
-    writing.write_results(results, tmp_path / "streamed.nc")
+    writing.write_results(results, tmp_path / "streamed.nc", threads=2)
     writing.write(tree, tmp_path / "built.nc")
     streamed, built = files.read(tmp_path / "streamed.nc"), files.read(tmp_path / "built.nc")
     assert_same(tree, streamed)
@@ -178,13 +179,16 @@ def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
     """Blocks that end anywhere, within and between realizations."""
     tree = build_tree(results)
     monkeypatch.setattr(filling, "BLOCK_ROWS", rows)
+    monkeypatch.setattr(writing, "MIN_COMPRESSED", 10)
     if max(len(one.rows("trace")) for one in results.realizations) < 1000:
         writing.write_results(results, tmp_path / "out.nc")
         assert_same(tree, files.read(tmp_path / "out.nc"))
 
 
-def test_interrupted_realizations_of_different_length(klein, tmp_path):
+def test_interrupted_realizations_of_different_length(klein, tmp_path, monkeypatch):
     """What a realization did not come to is missing; the times are those of the longest."""
+    monkeypatch.setattr(filling, "BLOCK_ROWS", 30)
+    monkeypatch.setattr(writing, "MIN_COMPRESSED", 10)
     results = run_realizations(klein(**QUICK | {"run__realizations": 3}))
 
     class Cut:
@@ -262,6 +266,27 @@ def test_a_long_run_is_written_in_little_memory(tmp_path):
     with xr.open_datatree(tmp_path / "long.nc", engine="netcdf4") as tree:
         assert tree["velocity"].values[0, -1] == 1_499_999
         assert tree["slip_traces/sample_time"].values[100_000] == 100_000
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_file_that_cannot_grow_is_an_error(results, tmp_path, threads):
+    """Wherever it ends: one message, nothing left behind, and the next file is whole."""
+    path = tmp_path / "out.nc"
+    writing.write_results(results, path)
+    size = path.stat().st_size
+    path.unlink()
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for limit in (size // 2, size - 1):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+        try:
+            with pytest.raises(mesoslip.MesoslipError, match="cannot be written") as printed:
+                writing.write_results(results, path, threads=threads)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert printed.value.exit_status == 1
+        assert not list(tmp_path.iterdir())
+    writing.write_results(results, path, threads=threads)
+    assert_same(build_tree(results), files.read(path))
 
 
 def test_no_group_hides_a_coordinate_of_its_parent(results):

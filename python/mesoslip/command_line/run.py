@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -109,7 +110,7 @@ def run(
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
         try:
-            writing.write_results(results, path)
+            writing.write_results(results, path, threads=workers or os.cpu_count() or 1)
         except FileError as error:
             if checkpoint.write(results.realizations):
                 raise FileError(

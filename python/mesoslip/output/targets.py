@@ -108,6 +108,8 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
         if refused:
             return FileError(f"{path}: cannot be written: {NO_LOCKS.format(refused)}")
         return WriteError(f"{path}: cannot be written: {reason}; is the disk full?")
+    if getattr(error, "errno", None) in {errno.EFBIG, errno.EIO}:
+        return WriteError(f"{path}: cannot be written: {reason}")
     return FileError(f"{path}: cannot be written: {reason}")
 
 

@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import netCDF4
+import numpy as np
 
 from mesoslip import array_packages
+from mesoslip.configuration.config import Config
 from mesoslip.output import filling, layout
+from mesoslip.output.chunks import COMPRESSION_LEVEL, write_chunks
 from mesoslip.output.hdf5 import LOCK
 from mesoslip.output.layout import Entry, GroupLayout
 from mesoslip.output.results import RunResults
@@ -21,10 +24,7 @@ if TYPE_CHECKING:
 # Variables with fewer values are not worth compressing.
 MIN_COMPRESSED = 1000
 
-COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
-
-# Slots of the table in which the chunks of a variable in memory are found.
-CACHE_SLOTS = 11
+COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": COMPRESSION_LEVEL, "shuffle": True}
 
 
 def write(tree: xr.DataTree, path: Path) -> None:
@@ -58,10 +58,19 @@ def _fill_value(variable: xr.Variable) -> dict[str, Any]:
     return {key: variable.encoding[key] for key in ("_FillValue",) if key in variable.encoding}
 
 
-def write_results(results: RunResults, path: Path) -> None:
+def write_results(results: RunResults, path: Path, *, threads: int = 1) -> None:
     """Write the results of a run, of which only blocks are held in memory.
 
     The file is that of `write` and `mesoslip.output.tree.build_tree`.
+
+    Parameters
+    ----------
+    results
+        The results.
+    path
+        The file.
+    threads
+        Threads that arrange and compress values.
 
     Raises
     ------
@@ -69,52 +78,42 @@ def write_results(results: RunResults, path: Path) -> None:
         If it cannot be written.
     """
     groups = layout.describe(results)
-    with (
-        written_whole(path) as part,
-        LOCK,
-        netCDF4.Dataset(part, "w", format="NETCDF4") as file,
-    ):
-        taken = {
-            name: _create_group(file.createGroup(name) if name else file, form, groups[""])
-            for name, form in groups.items()
-        }
-        filling.fill(results, groups, taken)
+    with written_whole(path) as part, LOCK:
+        with netCDF4.Dataset(part, "w", format="NETCDF4") as file:
+            for name, form in groups.items():
+                place = file.createGroup(name) if name else file
+                _create_group(place, form, groups[""], results.config)
+        write_chunks(part, filling.blocks(results, groups), threads)
 
 
 def _create_group(
-    place: netCDF4.Dataset, form: GroupLayout, root: GroupLayout
-) -> dict[str, filling.Values]:
-    """Make the dimensions, variables and attributes of a group of a file."""
+    place: netCDF4.Dataset, form: GroupLayout, root: GroupLayout, config: Config
+) -> None:
+    """Make the dimensions, variables and attributes of a group, and write what is no table."""
     place.setncatts(form.attributes)
     for name, size in form.sizes.items():
         place.createDimension(name, size)
     sizes = {**root.sizes, **form.sizes}
-    made: dict[str, filling.Values] = {}
     for name, entry in form.entries.items():
-        storage = _storage(entry, [sizes[one] for one in entry.dimensions])
+        storage = _storage(entry, [sizes[one] for one in entry.dimensions], config)
         variable = place.createVariable(
             name, entry.dtype, entry.dimensions, fill_value=entry.fill_value, **storage
         )
-        if storage:
-            # Blocks fill chunks: the library's own cache would hold hundreds of megabytes.
-            size = entry.dtype.itemsize * math.prod(storage["chunksizes"])
-            variable.set_var_chunk_cache(2 * size, CACHE_SLOTS, 1.0)
         variable.set_auto_maskandscale(False)
         variable.setncatts(entry.meaning.attributes)
         auxiliary = form.auxiliary_coordinates(name)
         if auxiliary:
             variable.coordinates = " ".join(auxiliary)
-        made[name] = variable
-    return made
+        if not entry.table and np.size(entry.values):
+            variable[...] = np.asarray(entry.values, dtype=entry.dtype)
 
 
-def _storage(entry: Entry, shape: list[int]) -> dict[str, Any]:
+def _storage(entry: Entry, shape: list[int], config: Config) -> dict[str, Any]:
     """Chunks of a variable that hold a block of rows, and compression where it pays."""
     if math.prod(shape) <= MIN_COMPRESSED or not entry.table:
         return {}
-    # One realization at a time; of long dimensions after the first no more than a block's worth.
+    # One realization at a time.
     chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
     along = 1 if entry.is_padded else 0
-    most = min(filling.BLOCK_ROWS, filling.BLOCK_NUMBERS // math.prod(shape[along + 1 :]))
-    chunks[along] = max(1, min(shape[along], most))
+    chunks[along] = min(shape[along], filling.block_rows(config, entry.table))
     return {"chunksizes": chunks, **(COMPRESSION if entry.shrinks else {})}

@@ -1,0 +1,178 @@
+"""Values put into the chunks of a file, arranged and compressed on several threads.
+
+The library of HDF5 does all of that on one thread. Chunks that are made here are stored as they
+are, and read by any program as if the library had made them.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections import deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.output.filling import Block
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+Array = NDArray[Any]
+
+COMPRESSION_LEVEL = 1
+
+
+@dataclass(frozen=True)
+class _Target:
+    """A variable of a file; without `chunks`, its values lie in one piece."""
+
+    dataset: h5py.Dataset
+    chunks: tuple[int, ...] | None
+    dtype: np.dtype[Any]
+    fill_value: Any
+    is_compressed: bool
+
+    @classmethod
+    def of(cls, dataset: h5py.Dataset) -> _Target:
+        is_compressed = dataset.compression is not None
+        return cls(dataset, dataset.chunks, dataset.dtype, dataset.fillvalue, is_compressed)
+
+    def packed(self, where: tuple[Any, ...], values: Array) -> _Piece:
+        """Values as they are stored; this does not use the library of HDF5."""
+        if self.chunks is None:
+            return _Piece(self.dataset, where, values.astype(self.dtype, copy=False))
+        chunk = np.empty(self.chunks, self.dtype)
+        rows = chunk.reshape(-1, *self.chunks[len(where) :])
+        rows[: len(values)] = values
+        rows[len(values) :] = self.fill_value
+        first = [one.start if isinstance(one, slice) else one for one in where]
+        place = (*first, *[0] * (len(self.chunks) - len(first)))
+        return _Piece(
+            self.dataset, place, _compressed(chunk) if self.is_compressed else chunk, True
+        )
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Values on their way to a variable: an array, or a chunk as it is stored."""
+
+    dataset: h5py.Dataset
+    where: tuple[Any, ...]
+    content: bytes | Array
+    is_chunk: bool = False
+
+    def write(self) -> None:
+        if self.is_chunk:
+            self.dataset.id.write_direct_chunk(self.where, self.content)
+        else:
+            self.dataset[self.where] = self.content
+
+
+def write_chunks(path: Path, blocks: Iterable[Block], threads: int) -> None:
+    """Write blocks to the variables of a netCDF-4 file.
+
+    Parameters
+    ----------
+    path
+        The file. Variables in chunks have those of `mesoslip.output.filling.block_rows`, shuffled
+        if they are compressed.
+    blocks
+        The values.
+    threads
+        Threads that arrange and compress them; only the thread of the caller uses the file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    with _Storage(path, "r+") as storage:
+        with h5py.File(storage, "r+") as file:
+            for pieces in _in_order(_with_targets(blocks, file), threads):
+                for piece in pieces:
+                    piece.write()
+                if storage.error is not None:
+                    break
+        if storage.error is not None:
+            raise storage.error
+
+
+class _Storage(FileIO):
+    """A file as the library of HDF5 uses it, which does not learn of writes that fail.
+
+    It would crash if it could not write its own entries as it closes the file.
+
+    Attributes
+    ----------
+    error
+        The first error, after which nothing is written.
+    """
+
+    error: OSError | None = None
+
+    def write(self, values: Buffer) -> int:
+        """Write all values, or none after an error; their number."""
+        left = memoryview(values)
+        try:
+            while left and self.error is None:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.error = error
+        return len(memoryview(values))
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the size of the file."""
+        try:
+            if self.error is None:
+                return super().truncate(size)
+        except OSError as error:
+            self.error = error
+        return size or 0
+
+
+def _with_targets(
+    blocks: Iterable[Block], file: h5py.File
+) -> Iterator[tuple[Block, dict[str, _Target]]]:
+    """Blocks with the variables that they fill, by name."""
+    known: dict[str, _Target] = {}
+    for block in blocks:
+        names = {name: f"{block.group}/{name}" for name in block.entries}
+        for full in names.values():
+            if full not in known:
+                known[full] = _Target.of(file[full])
+        yield block, {name: known[full] for name, full in names.items()}
+
+
+def _in_order(
+    jobs: Iterable[tuple[Block, dict[str, _Target]]], threads: int
+) -> Iterator[list[_Piece]]:
+    """Blocks as they are stored, made on threads, a few ahead of the one that is written."""
+    if threads == 1:
+        for block, targets in jobs:
+            yield _packed(block, targets)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        running: deque[Future[list[_Piece]]] = deque()
+        for block, targets in jobs:
+            running.append(pool.submit(_packed, block, targets))
+            if len(running) > threads:
+                yield running.popleft().result()
+        while running:
+            yield running.popleft().result()
+
+
+def _packed(block: Block, targets: dict[str, _Target]) -> list[_Piece]:
+    return [targets[name].packed(where, values) for name, where, values in block.values()]
+
+
+def _compressed(chunk: Array) -> bytes:
+    """A chunk after the filters of HDF5 for shuffling bytes and for zlib."""
+    each = chunk.reshape(-1, 1).view(np.uint8)
+    return zlib.compress(np.ascontiguousarray(each.T).data, COMPRESSION_LEVEL)

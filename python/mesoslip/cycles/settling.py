@@ -1,7 +1,7 @@
 """A motion of the master equation is brought to its settled cycle.
 
-The map from section to section is iterated. Where it converges, it does so within some ten cycles
-as a rule: contacts forget within a few lives. Where the last changes shrink by one slow factor, the
+The map from section to section is iterated. Where it converges, it usually does so within some ten
+cycles: contacts forget within a few lives. Where the last changes shrink by one slow factor, the
 limit of their geometric series is taken as the next state.
 """
 

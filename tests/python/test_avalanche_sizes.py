@@ -10,7 +10,7 @@ import exponent_coverage
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip import Config
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.analysis.avalanche_sizes import (
@@ -359,8 +359,9 @@ def test_a_peak_of_large_sizes_is_not_taken_for_the_law():
     assert fit.is_rejected
 
 
-@pytest.mark.parametrize("stiffness_ratio", [0.1, 0.03])
-@pytest.mark.parametrize("count", [500, 3000])
+@pytest.mark.parametrize(
+    ("stiffness_ratio", "count"), [(0.03, 500), (0.1, 3000), long(0.1, 500), long(0.03, 3000)]
+)
 def test_errors_cover_where_the_min_size_is_chosen(stiffness_ratio, count):
     """Exact sizes of a quasi-static slider: exponent 3/2 only for large ones.
 

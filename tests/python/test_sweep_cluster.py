@@ -155,6 +155,7 @@ def test_lost_workers_and_a_lost_scheduler(cluster, tmp_path):
     assert not data["status"].any()
 
 
+@pytest.mark.long
 def test_a_point_that_costs_workers_fails_alone(cluster, tmp_path):
     started = cluster(3)
     wanted = own_tables(tmp_path, "deadly", 2)

@@ -8,6 +8,7 @@ import json
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 
 STATIC_FORCE = 18e-6
 STIFF = {"slider__stiffness": 2000.0, "contacts__delay": 0.0}

@@ -46,6 +46,8 @@ module mesoslip_interface_law
       !> One over the mass that the contact force moves [1/kg], and the rate of the slider's own
       !> oscillation [1/s]; 0 for a slider of which the motion is prescribed
       real(wp) :: inverse_mass = 0.0_wp, own_rate = 0.0_wp
+      !> Whether the slider keeps its velocity until the drive changes
+      logical :: is_uniform = .false.
    end type pose_type
 
    !> A clock of thermally activated breaking. The rate of a contact that bears the force f is

@@ -63,6 +63,8 @@ module mesoslip_sliders_base
       !> One over the mass that the contact force moves [1/kg], and the rate of the slider's own
       !> oscillation [1/s]; 0 if its motion is prescribed
       real(wp) :: inverse_mass = 0.0_wp, own_rate = 0.0_wp
+      !> Whether it goes where the drive goes
+      logical :: follows_drive = .false.
       !> Cost of an advance over that of a rigid slider
       real(wp) :: cost = 1.0_wp
       !> Steps, evaluations and failed steps of its integrator, if it has one
@@ -161,7 +163,9 @@ contains
       type(pose_type) :: pose
 
       pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, &
-         & self%direction, self%inverse_mass, self%own_rate)
+         & self%direction, self%inverse_mass, self%own_rate, &
+         & self%follows_drive .and. abs(self%velocity) > 0.0_wp &
+         & .and. .not. abs(self%acceleration) > 0.0_wp)
    end function pose
 
    !> Take note that the drive has changed: most sliders need nothing more.

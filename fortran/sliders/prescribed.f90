@@ -47,6 +47,7 @@ contains
       type(slider_prescribed_type), allocatable :: self
 
       allocate (self)
+      self%follows_drive = .true.
       call parameters%finish(error)
       if (allocated(error)) return
       call move_alloc(self, slider)
@@ -116,9 +117,9 @@ contains
       !> Which steps are of interest; the slider stops after one
       type(step_filter_type), intent(inout) :: filter
 
+      self%has_clocks = schedule%has_clocks
       do
          if (schedule%has_clocks) then
-            self%has_clocks = .true.
             call schedule%hazard%offer(self%displacement, self%clock)
          end if
          call step_on(self, schedule%law(), schedule%window(self%time))

@@ -27,21 +27,23 @@ KLEIN = ROOT / "runs" / "klein.toml"
 
 # What a break and the birth after it are to cost on a machine that has nothing else to do [ns].
 GOALS = {
-    "klein": {4080: 200, 408_000: 400},
+    "klein": {4080: 175, 408_000: 400},
     "prescribed": {4080: 120},
     "quasistatic": {4080: 110, 100_000: 200},
     "lattice": {4080: 500},
 }
 # The same as ratios to 4080 contacts.
 RATIO_GOAL = 2.5
+# The same of a lattice of a million contacts.
+LATTICE_RATIO_GOAL = 2.0
 # Seconds of kernel that 12 s of Klein's case are to take, of whole commands, and how many times as
 # long as the events a fixed step of the same error is to take.
 LAYERS_GOAL = 1.5
 MASTER_EQUATION_GOAL = 0.4
 COMMAND_GOALS = {"run": 0.8, "info": 0.5}
-FIXED_STEP_GOAL = 250.0
+FIXED_STEP_GOAL = 170.0
 # Cost of contacts that age over that of contacts that do not.
-AGEING_GOAL = 1.3
+AGEING_GOAL = 1.5
 # The same of other kinds of contacts over plain ones.
 KIND_GOAL = 1.5
 
@@ -447,7 +449,9 @@ def interaction_cost() -> None:
             )
             if strength == 0.1 and count > 4080:
                 ratio = cost / reference
-                met.append(("lattice, 1000000 over 4080 contacts", ratio, "<=", RATIO_GOAL, ""))
+                met.append(
+                    ("lattice, 1000000 over 4080 contacts", ratio, "<=", LATTICE_RATIO_GOAL, "")
+                )
 
 
 def quasistatic_cost() -> None:

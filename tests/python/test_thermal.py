@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError
+from mesoslip.simulation.realization import Realization
 from mesoslip.theory.thermal import hold_force, steady_force, steady_slope
 from oracles import aged, fixed_step, frozen_law, uniforms
 from scipy import integrate, special
@@ -149,6 +150,59 @@ def test_breaks_come_where_their_deviates_say(ratio, direction):
     np.testing.assert_allclose(
         [time for time, _ in actual], [time for time, _ in expected], rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("ratio", [2e-3, 0.05, 1.0])
+@pytest.mark.parametrize("changes", [{}, {"contacts__delay_law": "exponential"}])
+def test_uniform_motion_breaks_contacts_where_clocks_do(ratio, changes):
+    """Where a velocity grows by a rounding error, contacts go by clocks instead."""
+    velocities = [0.3, -0.1, 0.0, 0.02, 3.0, -1e-3]
+    runs = []
+    for growth in (0.0, 1e-13):
+        stages = [
+            {"duration": 10.0, "start_velocity": one, "end_velocity": one * (1.0 + growth)}
+            for one in velocities
+        ]
+        runs.append(
+            breaks(
+                unit(
+                    30,
+                    run__duration=None,
+                    drive={"stage": stages},
+                    contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+                    contacts__delay=0.1,
+                    contacts__newborn_width=0.25,
+                    **changes,
+                )
+            )
+        )
+    uniform, clocked = runs
+    assert len(uniform) == len(clocked) > 500
+    assert [contact for _, contact in uniform] == [contact for _, contact in clocked]
+    np.testing.assert_allclose(
+        [time for time, _ in uniform], [time for time, _ in clocked], rtol=1e-10
+    )
+
+
+@pytest.mark.parametrize("width", [0.0, 0.25])
+def test_uniform_motion_does_not_depend_on_segments(width):
+    """The bits of a run in segments of one advance are those of a run in one piece."""
+    config = unit(
+        200,
+        run__duration=None,
+        drive={"stage": [{"duration": 4.0, "velocity": one} for one in (0.3, -0.1, 3.0)]},
+        contacts__thermal={"rate": 1.0, "force_ratio": 1.0},
+        contacts__delay=0.1,
+        contacts__back_force_ratio=0.1,
+        contacts__newborn_width=width,
+    )
+    origins = []
+    for advances in (1, 100_000):
+        realization = Realization(config, 0)
+        while not realization.finished:
+            realization.advance(advances)
+        origins.append(realization.contacts["origin"])
+    np.testing.assert_array_equal(*origins)
 
 
 def test_mean_force_at_breaking_is_an_exponential_integral():

@@ -10,7 +10,7 @@
 module mesoslip_contacts_activated_contacts
    use mesoslip_contacts_activated_keys, only: exchange_activated, life_clock, life_key, &
       & life_left, life_next, motions
-   use mesoslip_contacts_activated_lists, only: activated_lists_type, set_up_lists
+   use mesoslip_contacts_activated_steady, only: activated_steady_type, set_up_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
    use mesoslip_contacts_individual_record, only: row_origin
@@ -29,11 +29,12 @@ module mesoslip_contacts_activated_contacts
    public :: initialize_activated, offer_activated
 
    !> Contacts that break by thermal activation.
-   type, extends(activated_lists_type) :: contact_activated_type
+   type, extends(activated_steady_type) :: contact_activated_type
    contains
       procedure :: initialize => initialize_activated
-      procedure :: offer => offer_activated
+      procedure :: offer
       procedure :: respond => respond_activated
+      procedure :: plan
       procedure :: settle
       procedure :: join
       procedure :: exchange
@@ -45,7 +46,8 @@ module mesoslip_contacts_activated_contacts
       procedure :: renew_due
       !> A contact breaks
       procedure, non_overridable :: break_contact
-      procedure, non_overridable, private :: respond_here, pass_ahead, break_activated
+      procedure, non_overridable, private :: respond_here, pass_ahead, break_activated, &
+         & respond_steadily
    end type contact_activated_type
 
 contains
@@ -65,7 +67,7 @@ contains
 
       allocate (self)
       self%parameters = common
-      call set_up_lists(self, parameters, error)
+      call set_up_steady(self, parameters, error)
       call move_alloc(self, contacts)
    end subroutine make_contact_activated
 
@@ -85,7 +87,51 @@ contains
       end do
    end subroutine initialize_activated
 
-   !> Contact force as a law, which holds until a contact breaks, attaches or bears no force.
+   !> Contact force as a law, which holds until a contact breaks or attaches, or its force changes
+   !> its sign.
+   subroutine offer(self, pose, law, window)
+      !> The contacts
+      class(contact_activated_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(out) :: law
+      !> Where it holds
+      type(window_type), intent(out) :: window
+
+      real(wp) :: ahead
+
+      call self%follow_motion(pose)
+      if (.not. self%is_steady) then
+         call offer_activated(self, pose, law, window)
+         return
+      end if
+      law = total_law(self)
+      call self%order(self%ahead)%first(ahead)
+      window = self%window_between(-huge(1.0_wp), ahead, self%detached%next_due)
+      self%clock%is_used = .false.
+   end subroutine offer
+
+   !> Write a schedule of what comes next.
+   subroutine plan(self, pose, limit, schedule)
+      !> The contacts
+      class(contact_activated_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
+      !> The schedule; at its end if there is none
+      type(schedule_type), intent(inout) :: schedule
+
+      call self%follow_motion(pose)
+      if (self%is_steady) then
+         call self%plan_steadily(pose, limit, schedule)
+      else
+         call self%plan_by_clocks(pose, limit, schedule)
+      end if
+   end subroutine plan
+
+   !> The same by clocks: until a contact breaks, attaches or bears no force.
    subroutine offer_activated(self, pose, law, window)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
@@ -113,9 +159,31 @@ contains
       !> Where the slider was, and where it is
       type(pose_type), intent(in) :: before, after
 
+      if (self%is_steady) then
+         call self%respond_steadily(after)
+         return
+      end if
       call self%hazard%go_on(self%clock)
       call self%respond_here(after)
    end subroutine respond_activated
+
+   !> Break and attach contacts in a uniform motion.
+   subroutine respond_steadily(self, pose)
+      class(contact_activated_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: breaks
+      integer :: contact
+
+      breaks = self%breaks
+      do
+         call self%find_due(pose, contact)
+         if (contact == 0) exit
+         call self%break_contact(contact, pose)
+      end do
+      if (self%breaks > breaks) self%track%generation = self%track%generation + 1
+      call self%attach_due(pose)
+   end subroutine respond_steadily
 
    !> Break and attach contacts where the slider is.
    subroutine respond_here(self, pose)
@@ -200,6 +268,10 @@ contains
       call self%draw_deviates([contact], 0_i8)
       self%life(life_left, contact) = self%life(life_next, contact)
       self%life(life_next, contact) = 0.0_wp
+      if (self%is_steady) then
+         call self%join_steadily(contact, pose)
+         return
+      end if
       stretch = pose%displacement - self%record(row_origin, contact)
       if (.not. abs(stretch) > 0.0_wp) stretch = pose%direction
       number = merge(1, 2, stretch > 0.0_wp)
@@ -222,6 +294,12 @@ contains
       real(wp) :: breaks
       integer :: number
 
+      if (self%is_steady) then
+         call self%settle_steadily(schedule)
+         if (schedule%is_over) call self%attach_due(pose)
+         self%detached_count = real(self%detached%count, wp)
+         return
+      end if
       call self%settle_lists(schedule)
       if (schedule%is_over) then
          breaks = self%breaks

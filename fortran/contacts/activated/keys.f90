@@ -51,6 +51,11 @@ module mesoslip_contacts_activated_keys
       integer :: ahead = 1
       !> Number of contacts that go by each clock
       integer :: members(clocks) = 0
+      !> Whether the slider moves uniformly, and its velocity then [m/s]. The key of a contact is
+      !> the stretch along the motion at which its deviate is used up, and it is in the order of a
+      !> motion ahead alone
+      logical :: is_steady = .false.
+      real(wp) :: velocity = 0.0_wp
    contains
       procedure :: rebuild
       procedure :: shift_order
@@ -154,6 +159,12 @@ contains
 
       integer :: number
 
+      if (self%is_steady) then
+         call self%order(self%ahead)%put(contact, &
+            & self%direction * self%record(row_origin, contact) &
+            & + min(self%life(life_key, contact), self%record(row_limit, contact)))
+         return
+      end if
       number = int(self%life(life_clock, contact))
       call self%order(motions + number)%put(contact, self%life(life_key, contact))
       associate (origin => self%record(row_origin, contact), &
@@ -173,6 +184,10 @@ contains
 
       integer :: number
 
+      if (self%is_steady) then
+         call self%order(self%ahead)%remove(contact)
+         return
+      end if
       number = int(self%life(life_clock, contact))
       call self%order(motions + number)%remove(contact)
       call self%order(1)%remove(contact)
@@ -373,6 +388,8 @@ contains
       call archive%section("activated contacts")
       call exchange_individual(self, archive)
       call archive%exchange("life", self%life)
+      call archive%exchange("is_steady", self%is_steady)
+      call archive%exchange("velocity", self%velocity)
       do number = 1, clocks
          call archive%exchange("reading", self%hazard%reading(number))
          call archive%exchange("reference", self%hazard%reference(number))

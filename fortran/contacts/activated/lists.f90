@@ -30,7 +30,8 @@ module mesoslip_contacts_activated_lists
       !> Entry of each contact in the list by coordinate, 0 but while lists are written
       integer, allocatable, private :: entry(:)
    contains
-      procedure :: plan
+      !> Write a schedule by clocks
+      procedure, non_overridable :: plan_by_clocks
       !> Find where the clocks come to their next keys
       procedure, non_overridable :: set_next
       !> Draw the deviates of the next lives of contacts
@@ -103,7 +104,7 @@ contains
 
    !> Write a schedule of what comes next: breaks at thresholds and by the clock of those whose
    !> force has the sign of the motion, and attachments.
-   subroutine plan(self, pose, limit, schedule)
+   subroutine plan_by_clocks(self, pose, limit, schedule)
       !> The contacts
       class(activated_lists_type), intent(inout) :: self
       !> Where the slider is
@@ -133,7 +134,7 @@ contains
       schedule%break_drag(1) = drag_of(self%parameters, self%parameters%stiffness)
       call self%list_attaching(length, pose%direction, schedule)
       schedule%is_over = .false.
-   end subroutine plan
+   end subroutine plan_by_clocks
 
    !> List the next attachments, and the births of those that may attach in the schedule.
    subroutine list_attaching(self, limit, direction, schedule)

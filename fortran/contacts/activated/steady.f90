@@ -1,0 +1,306 @@
+!> Contacts that break by thermal activation under a slider whose motion is prescribed and uniform.
+!>
+!> At the constant velocity v the hazard of a contact under positive force is a function of its
+!> stretch alone: from the stretch a to the stretch x it grows by
+!> omega_0 f_T/(k v) exp(-f_s/f_T) (exp(k x/f_T) - exp(k a/f_T)). So it is known at birth at which
+!> stretch it has grown to the deviate of the contact, which then breaks there, or at its threshold
+!> if that comes first, as a contact without temperature does. No clock is needed, and schedules are
+!> those of contacts without temperature. Under negative force the same holds for the stretch of the
+!> other sign. When the velocity changes, what is left of the deviates goes on with the clocks.
+module mesoslip_contacts_activated_steady
+   use mesoslip_contacts_activated_keys, only: life_clock, life_key, life_left, life_next, motions
+   use mesoslip_contacts_activated_lists, only: activated_lists_type, set_up_lists
+   use mesoslip_contacts_individual_births, only: drag_of
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
+   use mesoslip_interface_law, only: clocks, pose_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: parameters_type
+   use mesoslip_schedule, only: max_events, schedule_type
+   implicit none
+   private
+
+   public :: activated_steady_type, set_up_steady
+
+   !> Minimum velocity, over that at which a threshold force is passed by f_T in the time 1/omega_0:
+   !> the displacement of a slower slider does not resolve the time to rounding
+   real(wp), parameter :: min_velocity_ratio = 1.0e-6_wp
+   !> Position of the stretch at the threshold in the numbers of a next life, and of that at which
+   !> the deviate is used up
+   integer, parameter :: next_limit = 1, next_key = 2, next_length = 2
+
+   !> Contacts that break by thermal activation, and know where if the motion is uniform.
+   type, abstract, extends(activated_lists_type) :: activated_steady_type
+      !> Contacts of the schedule that break
+      integer, private :: steady_listed(max_events) = 0
+      !> Numbers of the next lives of contacts of the schedule, shape (next_length, count)
+      real(wp), allocatable, private :: next(:, :)
+   contains
+      !> See whether the motion is uniform now
+      procedure, non_overridable :: follow_motion
+      !> Break the contacts that are due in a uniform motion
+      procedure, non_overridable :: find_due
+      !> Put a contact that attached in a uniform motion into the order of breaking
+      procedure, non_overridable :: join_steadily
+      !> Write a schedule of a uniform motion, and keep the books of it
+      procedure, non_overridable :: plan_steadily, settle_steadily
+      procedure, non_overridable, private :: begin_steady, end_steady, breaking_stretch, &
+         & list_next
+   end type activated_steady_type
+
+contains
+
+   !> Set up contacts that know where they break in a uniform motion.
+   subroutine set_up_steady(self, parameters, error)
+      !> The contacts, of which is known what is common to all kinds
+      class(activated_steady_type), intent(inout) :: self
+      !> The other numbers: columns and rows, rate and force of activation
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or wrong, or there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
+
+      call set_up_lists(self, parameters, error)
+      if (allocated(error)) return
+      allocate (self%next(next_length, self%parameters%count), source=0.0_wp, stat=stat)
+      if (stat /= 0) call raise(error, status_memory, "not enough memory for lives of contacts")
+   end subroutine set_up_steady
+
+   !> See whether the motion is uniform now, and to it that contacts are ordered for that.
+   subroutine follow_motion(self, pose)
+      !> The contacts
+      class(activated_steady_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      logical :: is_steady
+
+      is_steady = pose%is_uniform .and. self%hazard%slope * abs(pose%velocity) &
+         & >= min_velocity_ratio * self%hazard%rate
+      if (self%is_steady) then
+         if (is_steady .and. .not. abs(pose%velocity - self%velocity) > 0.0_wp) return
+         call self%end_steady(pose)
+      end if
+      if (is_steady) call self%begin_steady(pose)
+   end subroutine follow_motion
+
+   !> Order contacts by where they break in a uniform motion.
+   subroutine begin_steady(self, pose)
+      class(activated_steady_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+
+      self%is_steady = .true.
+      self%velocity = pose%velocity
+      self%direction = sign(1.0_wp, pose%velocity)
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         call self%settle_deviate(contact)
+         self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
+            & self%direction * (pose%displacement - self%record(row_origin, contact)), &
+            & self%life(life_left, contact))
+      end do
+      call self%rebuild(pose%displacement)
+   end subroutine begin_steady
+
+   !> Order contacts by the clocks again: what is left of their deviates follows from the distance
+   !> to where they would break.
+   subroutine end_steady(self, pose)
+      class(activated_steady_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stretch, growth
+      integer :: contact
+
+      self%is_steady = .false.
+      do contact = 1, clocks
+         call self%order(contact)%clear()
+         call self%order(motions + contact)%clear()
+      end do
+      self%ahead = merge(1, 2, self%direction > 0.0_wp)
+      self%members = 0
+      self%behind = -huge(1.0_wp)
+      self%hazard%reference = pose%displacement
+      self%hazard%reading = 0.0_wp
+      self%hazard%max_exponent = 0.0_wp
+      do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         stretch = pose%displacement - self%record(row_origin, contact)
+         associate (limit => self%record(row_limit, contact), life => self%life(:, contact))
+            growth = grown(self%hazard%slope, limit, life(life_key)) &
+               & - grown(self%hazard%slope, limit, self%direction * stretch)
+            life(life_left) = max(0.0_wp, growth) * self%hazard%rate &
+               & / (self%hazard%slope * abs(self%velocity))
+            if (.not. abs(stretch) > 0.0_wp) stretch = self%direction
+            life(life_clock) = merge(1.0_wp, 2.0_wp, stretch > 0.0_wp)
+         end associate
+         call self%put(contact)
+      end do
+   end subroutine end_steady
+
+   !> Hazard from no force to a stretch, negative for negative ones, in units of
+   !> omega_0 f_T/(k v).
+   pure function grown(slope, limit, stretch)
+      !> One over the stretch that belongs to f_T [1/m], stretch at the threshold and stretch [m]
+      real(wp), intent(in) :: slope, limit, stretch
+      real(wp) :: grown
+
+      grown = sign(exp(slope * (abs(stretch) - limit)) - exp(-slope * limit), stretch)
+   end function grown
+
+   !> Stretch at which the hazard of a contact has grown to its deviate.
+   pure function breaking_stretch(self, limit, stretch, left) result(breaking)
+      class(activated_steady_type), intent(in) :: self
+      !> Stretch at the threshold, and now, along the motion [m]
+      real(wp), intent(in) :: limit, stretch
+      !> What is left of the deviate
+      real(wp), intent(in) :: left
+      real(wp) :: breaking
+
+      real(wp) :: wanted, none
+
+      associate (slope => self%hazard%slope)
+         wanted = left * (slope * abs(self%velocity) / self%hazard%rate)
+         if (stretch >= 0.0_wp) then
+            wanted = exp(slope * (stretch - limit)) + wanted
+            breaking = limit + log(max(wanted, tiny(1.0_wp))) / slope
+            return
+         end if
+         none = exp(-slope * limit)
+         wanted = wanted + grown(slope, limit, stretch)
+         breaking = sign(limit + log(max(abs(wanted) + none, tiny(1.0_wp))) / slope, wanted)
+      end associate
+   end function breaking_stretch
+
+   !> Find a contact that is due in a uniform motion.
+   subroutine find_due(self, pose, contact)
+      !> The contacts
+      class(activated_steady_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Number of the contact, 0 if none is due
+      integer, intent(out) :: contact
+
+      call self%order(self%ahead)%due(self%direction * pose%displacement, contact)
+   end subroutine find_due
+
+   !> Put a contact that has attached in a uniform motion into the order of breaking.
+   subroutine join_steadily(self, contact, pose)
+      !> The contacts
+      class(activated_steady_type), intent(inout) :: self
+      !> Number of the contact, of which the deviate is known
+      integer, intent(in) :: contact
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stretch
+
+      stretch = pose%displacement - self%record(row_origin, contact)
+      ! The same as in a schedule, to the last digit.
+      if (.not. allocated(self%births%force)) stretch = pose%direction &
+         & * self%parameters%back_force_ratio * self%parameters%static_force &
+         & / self%record(row_stiffness, contact)
+      self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)
+      self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
+         & self%direction * stretch, self%life(life_left, contact))
+      call self%place(contact)
+   end subroutine join_steadily
+
+   !> Write a schedule of a uniform motion: the next breaks, and about as many attachments.
+   subroutine plan_steadily(self, pose, limit, schedule)
+      !> The contacts
+      class(activated_steady_type), intent(inout) :: self
+      !> Where the slider is
+      type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks, and of attachments
+      integer, intent(in) :: limit
+      !> The schedule; at its end if there is none
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: number, event, contact(max_events)
+
+      schedule%is_over = .true.
+      if (self%track%columns > 0) return
+      call self%order(self%ahead)%preview(min(limit, max_events), self%steady_listed, &
+         & schedule%break_coordinate, number)
+      if (number == 0) return
+      do event = 1, number
+         schedule%break_origin(event) = self%record(row_origin, self%steady_listed(event))
+      end do
+      schedule%break_stiffness(:number) = self%parameters%stiffness
+      schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
+      schedule%has_clocks = .false.
+      schedule%breaks = number
+      schedule%broken = 0
+      schedule%moments = 0
+      schedule%direction = self%direction
+      schedule%behind = -huge(1.0_wp)
+      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, &
+         & schedule, contact)
+      call self%draw_deviates(contact(:schedule%attachments), 0_i8)
+      call self%list_next(contact(:schedule%attachments), schedule%attach_stretch, &
+         & schedule%attach_limit)
+      call self%list_births(self%steady_listed(:number), 0, pose%direction, schedule)
+      if (schedule%has_births) then
+         call self%draw_deviates(self%steady_listed(:number), 1_i8)
+         call self%list_next(self%steady_listed(:number), schedule%birth_stretch, &
+            & schedule%birth_limit)
+      end if
+      schedule%is_over = .false.
+   end subroutine plan_steadily
+
+   !> List where contacts will break that are born in a uniform motion.
+   subroutine list_next(self, contact, stretch, limit)
+      class(activated_steady_type), intent(inout) :: self
+      !> Numbers of the contacts, of which the deviates are known
+      integer, intent(in) :: contact(:)
+      !> Stretches when they attach [m]
+      real(wp), intent(in) :: stretch(:)
+      !> Stretches at their thresholds, then those at which they break [m]
+      real(wp), intent(inout) :: limit(:)
+
+      real(wp) :: breaking
+      integer :: event
+
+      do event = 1, size(contact)
+         breaking = self%breaking_stretch(limit(event), self%direction * stretch(event), &
+            & self%life(life_next, contact(event)))
+         self%next(:, contact(event)) = [limit(event), breaking]
+         limit(event) = min(limit(event), breaking)
+      end do
+   end subroutine list_next
+
+   !> Keep the books of a schedule of a uniform motion.
+   subroutine settle_steadily(self, schedule)
+      !> The contacts
+      class(activated_steady_type), intent(inout) :: self
+      !> The schedule, as far as the slider came
+      type(schedule_type), intent(in) :: schedule
+
+      real(wp) :: key
+      integer :: event, attached(max_events)
+
+      do event = 1, schedule%broken
+         call self%take_out(self%steady_listed(event))
+         self%life(:life_key, self%steady_listed(event)) = 0.0_wp
+      end do
+      call self%detach_listed(self%steady_listed(:schedule%broken), schedule)
+      call self%attach_listed(schedule, attached)
+      do event = 1, schedule%attached
+         associate (contact => attached(event))
+            self%record(row_limit, contact) = self%next(next_limit, contact)
+            key = self%next(next_key, contact)
+            ! As for a contact that attaches outside a schedule, the force of which is not known.
+            if (allocated(self%births%force)) key = self%breaking_stretch(self%next(next_limit, &
+               & contact), self%direction * (schedule%attach_displacement(event) &
+               & - self%record(row_origin, contact)), self%life(life_next, contact))
+            self%life(:, contact) = [merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp), 0.0_wp, &
+               & key, 0.0_wp]
+            call self%place(contact)
+         end associate
+      end do
+   end subroutine settle_steadily
+
+end module mesoslip_contacts_activated_steady

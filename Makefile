@@ -38,7 +38,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
-  claims campaign docs bench fuzz mutants reference lint wheel test-wheel test-sdist clean
+  claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -102,9 +102,15 @@ lint: $(INSTALLED) ## Check the style of all sources
 	$(VENV)/bin/fortitude check fortran tests/fortran
 	$(VENV)/bin/codespell
 
-# Every warning is an error, and what browsers would load from elsewhere is one.
-docs: $(INSTALLED) $(DOCUMENTATION) test-formats ## Build the documentation into out/docs, and run its long pages
+# Examples and pages at the same time, as most of either takes one processor. Every warning is an
+# error, and what browsers would load from elsewhere is one.
+docs: $(INSTALLED) $(DOCUMENTATION) $(FORMATS) ## Build the documentation into out/docs, and run its long pages
+	@$(MAKE) --no-print-directory --output-sync -j2 docs-examples docs-pages
+
+docs-examples: test-formats
 	$(VENV)/bin/pytest -q -m long tests/python/test_documentation.py
+
+docs-pages: $(INSTALLED) $(DOCUMENTATION)
 	$(VENV)/bin/python -m sphinx -b html -W --keep-going -q -d build/docs docs out/docs
 	$(VENV)/bin/python tools/self-contained out/docs
 

@@ -125,6 +125,9 @@ def test_commands_import_what_they_need(short, tmp_path, command):
     """Large packages that each of several commands adds to those imported before."""
     output = tmp_path / "short.nc"
     command("run", short, "-o", output, "--quiet")
+    steps = tmp_path / "steps.nc"
+    fewer = ("--set", "contacts.count=200")
+    command("run", ROOT / "runs" / "velocity-step.toml", *fewer, "-o", steps, "--quiet")
     study = tmp_path / "study.toml"
     study.write_text(
         'base = "short.toml"\n[sweep]\nmeasures = ["mean_force"]\n'
@@ -137,13 +140,14 @@ def test_commands_import_what_they_need(short, tmp_path, command):
         ["slips", str(output)],
         ["regime", str(output)],
         ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
+        ["response", str(steps)],
         ["plot", str(output), "-o", str(tmp_path / "short.png")],
     ]
     code = f"""
 import json, sys
 from mesoslip.command_line.main import main
 large = ["dask", "matplotlib", "netCDF4", "pandas", "pint", "xarray"]
-large += [f"scipy.{{one}}" for one in ("interpolate", "linalg", "optimize", "special", "stats")]
+large += [f"scipy.{{one}}" for one in ("integrate", "interpolate", "optimize", "special", "stats")]
 stdout, found = sys.stdout, []
 for arguments in {commands}:
     before, sys.argv = set(sys.modules), ["mesoslip", *arguments]
@@ -164,6 +168,7 @@ json.dump(found, stdout)
         [],
         [],
         ["pandas", "xarray"],
+        ["scipy.integrate", "scipy.optimize", "scipy.special"],
         ["matplotlib"],
     ]
 

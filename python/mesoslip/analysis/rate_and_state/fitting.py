@@ -200,7 +200,7 @@ def _result(
     record: Record, found: Any, law: RateAndState, stiffness: float, free: bool, bound: Array
 ) -> Fit:
     """The result of the search, with errors and tests of the residuals."""
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     # From logarithms to the parameters themselves.
     factor = np.array([record.force_scale, law.a, law.b, law.slip_distance] + [stiffness] * free)
@@ -210,7 +210,7 @@ def _result(
     independent = count**2 / float(np.sum(record.correlation**2))
     square = float(np.mean(found.fun**2))
     freedom = max(independent - factor.size, 1.0)
-    p_value = float(chi2.sf(square * independent, freedom)) if record.has_noise else math.nan
+    p_value = float(chdtrc(freedom, square * independent)) if record.has_noise else math.nan
     if not record.has_noise or p_value < MIN_P_VALUE:
         covariance = covariance * square * independent / freedom
     names = ("reference force", "a", "b", "D_c", "stiffness")

@@ -49,6 +49,18 @@ def test_without_temperature_stability_is_that_of_contacts_without(klein, ageing
         assert found.critical_stiffness == pytest.approx(expected.critical_stiffness, rel=1e-4)
 
 
+@pytest.mark.parametrize(("layers", "damping"), [(2, 1e-3), (4, 10.0), (16, 1e-3), (16, 10.0)])
+def test_unstable_modes_of_layers_with_temperature(klein, layers, damping):
+    """As many as without where there is hardly any; hot contacts feed the slowest mode alone."""
+    chain = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": layers}
+    changes = {"slider": chain | {"layer_damping": damping}, "drive__velocity": 1e-6}
+    expected = sliding_of(sliding(klein, **changes)).unstable_count
+    assert expected > 2
+    assert sliding_of(sliding(klein, **changes, contacts__thermal=COLD)).unstable_count == expected
+    hot = sliding_of(sliding(klein, **changes, contacts__thermal=HOT | {"force_ratio": 0.05}))
+    assert hot.unstable_count == 2
+
+
 @pytest.mark.parametrize(
     ("contacts", "velocity"),
     [

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from mesoslip.theory.activated_lives import ActivatedLives
 from mesoslip.theory.activated_response import MAX_TURN, ActivatedResponse, Motion
 from mesoslip.theory.linear_stability import LinearStability, Parts
+from mesoslip.theory.sliders import mode_frequencies
 from mesoslip.theory.thermal import steady_force, steady_slope
 
 Array = NDArray[np.float64]
@@ -42,6 +43,9 @@ SLOW = 1e-3
 # stiffness is sought with fewer points.
 POINTS_A_DECADE = 15
 SMOOTH_FROM, THINNING = 1.5, 3
+# Points of the path from a frequency of a chain with free contacts to the next one with clamped
+# contacts, and back.
+POINTS_A_MODE = 2
 
 
 class RateAndState(NamedTuple):
@@ -163,7 +167,13 @@ class ActivatedSliding(LinearStability):
         low = 1e-3 * min(self._scale, 1 / turn)
         last = 3 * max(own, self._scale)
         count = math.ceil(POINTS_A_DECADE * math.log10(last / low))
-        return np.concatenate([[0.0], np.geomspace(low, last, count)])
+        path = np.concatenate([[0.0], np.geomspace(low, last, count)])
+        # Each mode of a chain turns the argument by half a turn.
+        modes = np.array(mode_frequencies(self.config.slider))
+        places = np.arange(0, len(modes), 1 / POINTS_A_MODE)
+        between = np.interp(places, np.arange(len(modes)), modes) if modes.size else modes
+        resolved: Array = np.union1d(path, between[between < last])
+        return resolved
 
     @property
     def is_passive(self) -> bool:

@@ -97,6 +97,23 @@ def chain_stiffness(slider: LayeredSlider, rate: Any, stiffness: Any) -> tuple[C
 
 
 @singledispatch
+def mode_frequencies(slider: SliderTable) -> list[float]:  # noqa: ARG001
+    """Frequencies of layers with free contacts and with clamped ones, ascending [1/s].
+
+    Between a free one and the next clamped one lies one frequency of layers on undamped springs,
+    whatever their stiffness.
+    """
+    return []
+
+
+@mode_frequencies.register
+def _chain_frequencies(slider: LayeredSlider) -> list[float]:
+    n = slider.layers
+    clamped = (2 * n * slider.omega_s * math.sin(j * math.pi / (2 * n)) for j in range(1, n))
+    return sorted([*slider.frequencies, *clamped])
+
+
+@singledispatch
 def loading_rate(slider: SliderTable, config: Config) -> float | None:  # noqa: ARG001
     """D1 = v_d √(KM)/F_s (S46); None if the drive stands, or without spring or mass."""
     return None

@@ -469,6 +469,12 @@ def test_nothing_collides_in_a_column_of_a_journal(runs, name):
     assert overlapping(figure) == []
 
 
+def test_a_legend_leaves_the_width_to_the_curves(runs):
+    figure = mesoslip.plot(runs["layered"], view="layers", width=0.086, font_size=8)
+    figure.draw_without_rendering()
+    assert all(axes.get_position().width > 0.5 for axes in figure.axes[:2])
+
+
 def test_fonts_are_embedded_as_truetype(runs, tmp_path):
     for ending, wanted, refused in (
         ("pdf", b"/FontFile2", b"/Type3"),

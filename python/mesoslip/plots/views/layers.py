@@ -18,6 +18,7 @@ from mesoslip.plots.curves import about_realizations, curve, draw_curves
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.movie import Movie, chosen_frames, time_bar
+from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
@@ -48,7 +49,8 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
             curve(tree, "spring_force", near, **SPRING | {"label": "force at the drive"}),
         ]
         draw_curves(force, curves, "spring_force", time_since(window), "force")
-        legend_above(force)
+        # In a column of a journal the colours take the width of a second entry.
+        legend_above(force, columns=1 if is_narrow(figure) else 3)
     return figure
 
 

@@ -61,8 +61,10 @@ def test_statistics_are_in_the_units_of_the_table(command):
     printed = command("slips", OLD)[1]
     assert "SI" not in printed
     catalogue = mesoslip.slips(OLD)
-    line = next(line for line in printed.splitlines() if line.startswith("force drop (µN)"))
-    mean = float(re.search(r"mean ([\d.e+-]+)", line).group(1))
+    head, rows = "mean  standard deviation", printed.splitlines()
+    start = next(number for number, line in enumerate(rows) if line.strip().startswith(head))
+    row = next(line for line in rows[start:] if line.strip().startswith("force drop (µN)"))
+    mean = float(row.split("(µN)")[1].split()[0])
     assert mean == pytest.approx(1e6 * catalogue["force_drop"].values.mean(), rel=1e-4)
 
 

@@ -19,6 +19,7 @@ from mesoslip.command_line.options import (
     quantity,
     show,
 )
+from mesoslip.command_line.progress import progress_shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,6 +67,7 @@ def cycle(
     ] = None,
     changes: SetOption = None,
     as_json: JsonOption = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
 ) -> None:
     """Compute the settled cycle of the master equation, and which motions are possible."""
     from mesoslip.cycles.cycle import cycle as settled_cycle
@@ -79,9 +81,10 @@ def cycle(
             "computed without [interaction]: the master equation has no neighbours", err=True
         )
     if continued is not None:
-        _follow(checked, continued, start, output, as_json=as_json)
+        _follow(checked, continued, start, output, as_json=as_json, quiet=quiet)
         return
-    found = settled_cycle(checked, start=start)
+    with progress_shown(quiet) as progress:
+        found = settled_cycle(checked, start=start, progress=progress)
     if output is not None:
         writing.write(found.to_tree(), output)
     if as_json:
@@ -91,7 +94,13 @@ def cycle(
 
 
 def _follow(
-    config: Config, text: str, start: str | None, output: Path | None, *, as_json: bool
+    config: Config,
+    text: str,
+    start: str | None,
+    output: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     """Follow the motion over a key; write and print its branches."""
     import xarray as xr
@@ -102,7 +111,8 @@ def _follow(
     if start is not None:
         config = config.replace({"contacts.initial": start})
     key, values = _values(text)
-    data = branches(config, key, values)
+    with progress_shown(quiet) as progress:
+        data = branches(config, key, values, progress=progress)
     if output is not None:
         writing.write(xr.DataTree(data), output)
     if as_json:

@@ -134,6 +134,53 @@ def test_the_critical_spring_of_layers_is_where_stability_ends(klein, layers, da
     assert not sliding_of(delayed).has_critical_stiffness
 
 
+@pytest.mark.parametrize(
+    ("damping", "delay", "velocity", "width", "drag", "law"),
+    [
+        (0.0, 0.0274, 2e-5, 0.3, 4e11, "fixed"),
+        (1.0, 2e-5, 1e-5, 0.02, 8e10, "exponential"),
+        (1.0, 2e-4, 2e-6, 0.1, 2e9, "fixed"),
+    ],
+)
+def test_the_critical_spring_with_delay_is_the_stiffest_one(
+    klein, damping, delay, velocity, width, drag, law
+):
+    """No growth with stiffer springs, also of a slider with hardly any damping of its own."""
+    config = sliding(
+        klein,
+        slider={"mass": 1.47e-3, "stiffness": 97.0, "damping": damping},
+        contacts__delay=delay,
+        contacts__delay_law=law,
+        contacts__drag_rate=drag,
+        contacts__threshold__relative_width=width,
+        drive__velocity=velocity,
+    )
+    found = sliding_of(config)
+    assert found.critical_stiffness is not None
+    for factor in (1.1, 1.5, 3.0, 10.0, 100.0):
+        stiffness = factor * found.critical_stiffness[0]
+        assert sliding_of(config.replace({"slider.stiffness": stiffness})).is_stable
+    # Softer springs have ranges of stability, one between two turns of the response.
+    near = config.replace({"slider.stiffness": 0.9995 * found.critical_stiffness[0]})
+    assert not sliding_of(near).is_stable
+
+
+def test_there_is_no_critical_spring_beyond_what_can_be_resolved(klein):
+    """Without damping, and with hardly any drag, fixed delays feed any stiff spring."""
+    config = sliding(
+        klein,
+        slider={"mass": 1.47e-3, "stiffness": 97.0, "damping": 0.0},
+        contacts__delay=1.5e-2,
+        contacts__drag_rate=3.4e7,
+        contacts__threshold__relative_width=0.3,
+        drive__velocity=3.75e-7,
+    )
+    found = sliding_of(config)
+    assert not found.has_critical_stiffness
+    assert found.critical_stiffness is None
+    assert found.limit is None
+
+
 @pytest.mark.parametrize(("growth", "ratio"), [(0.05, 0.01), (0.02, 0.01)])
 def test_the_critical_spring_of_contacts_is_near_that_of_rate_and_state(klein, growth, ratio):
     """Within a third while the limit grows a hundredfold with the mass; one state is not all."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mesoslip.theory.activated_lives import ActivatedLives
 from mesoslip.theory.activated_response import MAX_TURN, ActivatedResponse, Motion
-from mesoslip.theory.linear_stability import LinearStability, Parts
+from mesoslip.theory.linear_stability import AVERAGED_OUT, LinearStability, Parts
 from mesoslip.theory.sliders import mode_frequencies
 from mesoslip.theory.thermal import steady_force, steady_slope
 
@@ -39,8 +39,8 @@ PANELS_A_UNIT = 50.0
 MAX_THRESHOLD_PANELS = 400
 # Rate over that of breaking at which the response is nearly linear.
 SLOW = 1e-3
-# Points of the path for a decade of frequencies. From a frequency over k v/f_T on, the critical
-# stiffness is sought with fewer points.
+# Points of the path for a decade of frequencies. From a frequency over k v/f_T on, lives do not
+# turn the response, and without delay the critical stiffness is sought with fewer points.
 POINTS_A_DECADE = 15
 SMOOTH_FROM, THINNING = 1.5, 3
 # Points of the path from a frequency of a chain with free contacts to the next one with clamped
@@ -209,12 +209,23 @@ class ActivatedSliding(LinearStability):
             a, a - net, (area + a * self.velocity / self._breaking_rate) / (a - net)
         )
 
-    @property
-    def _search_path(self) -> Array:
-        # Faster than contacts break, the response has no cycles of births any more.
+    @cached_property
+    def _search_path(self) -> Array | None:
         path = super()._search_path
+        if self.delay > 0 or path is None:
+            return path
         is_slow = path < SMOOTH_FROM * self._breaking_rate
         return np.concatenate([path[is_slow], path[~is_slow][::THINNING]])
+
+    @property
+    def _alike(self) -> tuple[float, float]:
+        lives = self.lives
+        # ⟨∫ a S da⟩, half of the mean square of lives, by the force.
+        half_square = (lives.work - lives.back * lives.life) / lives.speed
+        spread = math.sqrt(max(2 * half_square - lives.life**2, 1e-12 * lives.life**2))
+        # Faster than contacts break, the response has no cycles of births any more.
+        until = min(AVERAGED_OUT / spread, SMOOTH_FROM * self._breaking_rate)
+        return lives.life + self.delay, until
 
     @property
     def work(self) -> int:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.theory import ageing
-from mesoslip.theory.linear_stability import LinearStability, Parts
+from mesoslip.theory.linear_stability import AVERAGED_OUT, LinearStability, Parts
 from mesoslip.theory.thresholds import threshold_quadrature
 
 Array = NDArray[np.float64]
@@ -125,9 +125,13 @@ class AgeingSliding(LinearStability):
 
     @cached_property
     def _path(self) -> Array:
+        return self._resolved_path()
+
+    @property
+    def _alike(self) -> tuple[float, float]:
         ends = self._ends
         spread = math.sqrt(max(0.0, float(ends.weight @ (ends.age - self._life) ** 2)))
-        return self._resolved_path(self._life + self.delay, spread)
+        return self._life + self.delay, AVERAGED_OUT / spread
 
     @property
     def is_passive(self) -> bool:

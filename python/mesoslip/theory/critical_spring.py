@@ -22,6 +22,8 @@ from mesoslip.theory.sliders import chain_stiffness
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
+# Growth rate over the frequency of the slider, Ω_S/π, below which a perturbation does not grow.
+NO_GROWTH = 1e-7
 # Rounds of the search for a critical frequency, and points of each.
 ROUNDS, POINTS_A_ROUND = 3, 12
 # Doublings and halvings of an interval in which the stiffness of a chain is sought.
@@ -85,6 +87,24 @@ def critical_spring(
     return found
 
 
+def outweighed_from(slider: SliderTable, frequency: Array, free: Complex, fed: Array) -> float:
+    """Frequency from which on the damping of the slider is stronger than what contacts feed [1/s].
+
+    Infinite if that is not so up to the last one. ``free`` is the part of Λ(iω) without births, and
+    ``fed`` the maximum of the rest [N/m], at ascending frequencies.
+    """
+    _, excess = balancing_spring(slider, frequency, free - 1j * fed)
+    weak = np.flatnonzero(excess <= 0)
+    if weak.size == 0:
+        return float(frequency[0])
+    return math.inf if weak[-1] == len(frequency) - 1 else float(frequency[weak[-1] + 1])
+
+
+def _hidden(mass: float, frequency: Array) -> Array:
+    """Damping that hides a growth which does not count [N/m]."""
+    return 2 * NO_GROWTH / math.pi * mass * frequency**2
+
+
 def _changes_of_sign(values: Array) -> list[int]:
     """Places before which and behind which values have different signs; NaN has none."""
     change = np.diff(np.sign(values))
@@ -128,7 +148,7 @@ def _of_rigid_slider(
             stiffness = needed
         rate = math.sqrt(square / slider.mass) * np.sqrt(np.maximum(stiffness, 0.0))
     damping = slider.mass * rate * frequency**3 / (rate**2 + frequency**2)
-    return stiffness, response.imag + damping
+    return stiffness, response.imag + damping + _hidden(slider.mass, frequency)
 
 
 @balancing_spring.register
@@ -162,6 +182,7 @@ def _of_layered_slider(
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
     numerator, denominator = chain_stiffness(slider, rate, high)
     excess = np.imag(numerator / denominator) + response.imag
+    excess += _hidden(slider.mass, frequency)
     # With strong damping of the layers, or a single one, there may be no such spring.
     has_root = low > resonant
     return np.where(has_root, high, math.nan), np.where(has_root, excess, math.nan)

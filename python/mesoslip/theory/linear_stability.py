@@ -18,7 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
-from mesoslip.theory.critical_spring import critical_spring, has_critical_spring
+from mesoslip.theory.critical_spring import (
+    NO_GROWTH,
+    critical_spring,
+    has_critical_spring,
+    outweighed_from,
+)
 from mesoslip.theory.sliders import dynamic_stiffness
 
 if TYPE_CHECKING:
@@ -37,9 +42,7 @@ MAX_TURN = 0.8
 MAX_HALVINGS = 40
 # Maximum number of points of the path.
 MAX_POINTS = 400_000
-# Growth rate over the frequency of the slider below which a perturbation does not grow, and its
-# maximum.
-NO_GROWTH = 1e-7
+# Maximum growth rate over the frequency of the slider.
 MAX_GROWTH = 1e6
 # Steps of Newton's method, and relative change at which a root is found.
 STEPS, ROOT_TOLERANCE = 25, 1e-10
@@ -47,6 +50,11 @@ STEPS, ROOT_TOLERANCE = 25, 1e-10
 REAL = 1e-9
 # Maximum number of starts of Newton's method on the path.
 MAX_CANDIDATES = 40
+# Points of the search for the frequency up to which contacts may feed the slider, and maximum
+# number of points of the search for a critical spring.
+SEARCH_POINTS, MAX_SEARCH_POINTS = 60, 20_000
+# Standard deviation of lives, over the period, at which they do not turn the response.
+AVERAGED_OUT = 12.0
 # Maximum number of layers whose frequencies the points of the path resolve.
 MAX_LAYERS = 16
 
@@ -218,8 +226,9 @@ class LinearStability(abc.ABC):
         rate = np.array([1j * self._scale])
         return dynamic_stiffness(self.config.slider, rate) is not None
 
-    def _resolved_path(self, turn: float, spread: float) -> Array:
-        """A path that resolves lives of a mean with delay, and of a standard deviation [s]."""
+    def _resolved_path(self) -> Array:
+        """A path that resolves the lives of contacts."""
+        turn, until = self._alike
         # Beyond the last frequency the slider outweighs any response of the contacts.
         coarse = self._scale * np.geomspace(1e-2, 1e6, 1500)
         rate = 1j * coarse
@@ -238,7 +247,7 @@ class LinearStability(abc.ABC):
         unlike = np.flatnonzero(np.abs(turn_left) > UNLIKE_POWER)
         last = 1.5 * max(last, coarse[unlike[-1]] if unlike.size else coarse[0])
         # Fast factors: e^(-s l) while lives are alike enough for it not to average out.
-        alike = min(last, 12 / spread)
+        alike = min(last, until)
         fine = _spaced(0.0, alike, 2 * math.pi / (POINTS_A_TURN * turn))
         late = 2 * math.pi / (POINTS_A_TURN * max(self.delay, 1e-300))
         rest = _spaced(alike, last, late)
@@ -381,19 +390,52 @@ class LinearStability(abc.ABC):
         angular frequency of the oscillation there [1/s].
 
         None if it is stable with any spring, or none is known, as for layers on a base or with a
-        delay of the contacts.
+        delay of the contacts, or where a delay feeds a slider without damping too fast.
 
         Of a layered slider it is the static stiffness, with which all its springs go. The damping
         is that of the configuration, which grows with the spring where it is a ratio.
         """
         if self.is_passive or not self.has_critical_stiffness:
             return None
-        return critical_spring(self.config.slider, self.response, self._search_path)
+        path = self._search_path
+        assert path is not None
+        return critical_spring(self.config.slider, self.response, path)
+
+    @cached_property
+    def _search_path(self) -> Array | None:
+        """Frequencies between which critical ones are sought, of any spring.
+
+        None if contacts feed a slider with stiff springs too fast for a path to resolve it.
+        """
+        path = self._path[1:]
+        if self.delay == 0:
+            return path
+        frequency = self._scale * np.geomspace(1e-2, 1e6, SEARCH_POINTS)
+        parts = self._parts(1j * frequency)
+        fed = np.abs(parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
+        last = outweighed_from(self.config.slider, frequency, parts.free, fed)
+        # Fixed delays turn the response at all frequencies, lives while they are alike.
+        late = self.delay if self.config.contacts.delay_law == "fixed" else 0.0
+        alike = min(last, self._alike[1])
+        count = POINTS_A_TURN * (alike * self._alike[0] + last * late) / (2 * math.pi)
+        if not count < MAX_SEARCH_POINTS:
+            return None
+        return np.unique(
+            np.concatenate(
+                [
+                    path[path <= last],
+                    np.geomspace(path[-1], max(last, path[-1]), SEARCH_POINTS),
+                    _spaced(path[0], alike, 2 * math.pi / (POINTS_A_TURN * self._alike[0])),
+                    _spaced(path[0], last, 2 * math.pi / (POINTS_A_TURN * max(late, 1e-300))),
+                ]
+            )
+        )
 
     @property
-    def _search_path(self) -> Array:
-        """Frequencies between which critical ones are sought."""
-        return self._path[1:]
+    @abc.abstractmethod
+    def _alike(self) -> tuple[float, float]:
+        """Mean time from birth to birth [s], and the frequency up to which lives are alike enough
+        for the response to turn with it [1/s]."""
 
     @property
     def _mass(self) -> float:
@@ -454,7 +496,8 @@ class LinearStability(abc.ABC):
     @property
     def has_critical_stiffness(self) -> bool:
         """Whether the slider has a spring of which the critical one is known."""
-        return has_critical_spring(self.config.slider, self.delay)
+        known = has_critical_spring(self.config.slider, self.delay)
+        return known and (self.is_passive or self._search_path is not None)
 
     @property
     def limit(self) -> str | None:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
 from mesoslip.theory.linear_stability import (
+    AVERAGED_OUT,
     OUT_OF_STEP,
     LinearStability,
     Parts,
@@ -122,9 +123,12 @@ class SteadySliding(LinearStability):
 
     @cached_property
     def _path(self) -> Array:
+        return self._resolved_path()
+
+    @property
+    def _alike(self) -> tuple[float, float]:
         lives = self.lives
-        turn = lives.mean_life / self._rate + self.delay
-        return self._resolved_path(turn, lives.spread / self._rate)
+        return lives.mean_life / self._rate + self.delay, AVERAGED_OUT * self._rate / lives.spread
 
     @property
     def is_passive(self) -> bool:

@@ -74,6 +74,26 @@ FURTHER: dict[str, dict[str, Any]] = {
     "rigid-newborn": SLIDERS["rigid"] | {"contacts__newborn_width": 0.05},
     "rigid-table": SLIDERS["rigid"]
     | {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}},
+    "rigid-stiffnesses": SLIDERS["rigid"]
+    | {
+        "contacts__coupling": "table",
+        "contacts__threshold": {
+            "law": "table",
+            "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0],
+            "stiffnesses": [3.0, 2.0, 4.0, 2.5, 5.0, 1.5],
+        },
+    },
+    "rigid-thermal-ageing": SLIDERS["rigid"] | CONTACTS["thermal"] | {"contacts__ageing": RELAX},
+    "prescribed-thermal-ageing-log": SLIDERS["prescribed"]
+    | CONTACTS["thermal"]
+    | {"contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03}},
+    "rigid-thermal-newborn": SLIDERS["rigid"]
+    | CONTACTS["thermal"]
+    | {
+        "contacts__delay_law": "exponential",
+        "contacts__newborn_width": 0.05,
+        "contacts__threshold__relative_width": 0.2,
+    },
     "force": FORCE,
 }
 

@@ -14,6 +14,7 @@ from mesoslip import ConfigError, SteadySliding
 from mesoslip.analysis.regime import STICK_SLIP
 from mesoslip.quantities import with_unit
 from mesoslip.theory.force_curve import ForceCurve
+from mesoslip.theory.lives import newborn_stretch, scales
 from mesoslip.theory.sliders import dynamic_stiffness
 from mesoslip.theory.steady_sliding import stability_boundary, stable_stiffness
 from scipy import special
@@ -162,17 +163,48 @@ def test_frequencies_of_a_chain_are_those_of_its_formula(klein):
         assert values[1] < 1e-6 * values[0]
 
 
-def test_engine_answers_as_reported():
+NEWBORN = {
+    "coupling": "equal",
+    "newborn_width": 0.1,
+    "threshold": {"law": "gaussian", "relative_width": 0.2},
+}
+
+
+@pytest.mark.parametrize(
+    ("contacts", "bound"),
+    [({"threshold": {"law": "gaussian", "relative_width": 0.3}}, 0.02), (NEWBORN, 5e-3)],
+)
+def test_engine_answers_as_reported(contacts, bound):
+    """With newborn contacts of different forces it is another answer, by a tenth."""
     module = study()
-    config = module.tables(contacts={"threshold": {"law": "gaussian", "relative_width": 0.3}})
+    config = module.tables(contacts=contacts)
     sliding = SteadySliding(
         mesoslip.Config.from_dict(
             {**config, "run": {"engine": "me", "duration": 1.0}, "drive": {"velocity": 1e-6}}
         )
     )
-    contacts = {"threshold": {"law": "gaussian", "relative_width": 0.3}}
-    found = module.shaken_response(1e-6, 600.0, 1e-10, 0.1, periods=8, contacts=contacts)
-    assert found == pytest.approx(complex(sliding.response(600.0)), rel=0.02)
+    periods = 4 if contacts is NEWBORN else 8
+    found = module.shaken_response(1e-6, 600.0, 1e-10, 0.1, periods=periods, contacts=contacts)
+    assert found == pytest.approx(complex(sliding.response(600.0)), rel=bound)
+
+
+@pytest.mark.parametrize(
+    ("law", "width", "newborn_width"),
+    [("gaussian", 0.1, 0.05), ("uniform", 0.2, 0.01), ("weibull", 0.3, 0.05)],
+)
+def test_averages_over_newborn_forces_are_those_of_the_renewal_equation(
+    klein, law, width, newborn_width
+):
+    """Means over lives, here and in the kernel of the force curve."""
+    config = klein(
+        contacts__coupling="equal",
+        contacts__threshold={"law": law, "relative_width": width},
+        contacts__newborn_width=newborn_width,
+    )
+    lives, expected = SteadySliding(config).lives, scales(config, newborn_stretch(config))
+    assert lives.mean_life == pytest.approx(expected.mean_life, rel=1e-8)
+    assert lives.newborn_force == pytest.approx(expected.newborn_force, abs=1e-8)
+    assert lives.work / lives.mean_life == pytest.approx(expected.steady_force, rel=1e-8)
 
 
 def test_boundary_is_where_growth_begins(klein):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
@@ -28,6 +29,9 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 PANELS, POINTS = 100, 10
 # Probability beyond either end of the quadrature over a threshold law.
 LEFT_OUT = 1e-16
+# Where newborn contacts bear different forces thresholds are summed between normal deviates of this
+# size, in panels of some width of forces over that of thresholds, of which there are so many.
+DEVIATES, PANEL_WIDTH, SUMMED_PANELS = 8.2, 1.0, (20, 400)
 # Arguments beyond which integrals of a panel come from a recurrence, and points of the rule that
 # they come from otherwise, which is exact to rounding there.
 LARGE, QUADRATURE_POINTS = 12.0, 26
@@ -95,6 +99,8 @@ class LifeTransforms:
         table = self._table
         if table is None:
             first, last = self._life(self._law.quantile([1 - LEFT_OUT, LEFT_OUT]))
+            spread = DEVIATES * self.config.contacts.newborn_width
+            first, last = (first, last) if not spread else (max(0.0, first - spread), last + spread)
         else:
             first, last = np.min(table.lives[0]), np.max(table.lives[1])
         edges = np.linspace(first, last, PANELS + 1)
@@ -102,7 +108,7 @@ class LifeTransforms:
         middle = (edges[1:] + edges[:-1]) / 2
         if table is not None:
             return middle, half, table.projected(edges, POINTS)
-        if LAWS[self._law.law].is_sampled:
+        if LAWS[self._law.law].is_sampled and not self.config.contacts.newborn_width:
             return middle, half, self._projected(edges)
         point, weight = np.polynomial.legendre.leggauss(POINTS)
         lives = middle[:, None] + half * point
@@ -122,7 +128,7 @@ class LifeTransforms:
         return table_lives(self.config)
 
     def _life(self, threshold: Array) -> Array:
-        """Life x_s - x_b of contacts of a threshold."""
+        """Life x_s - x_b of contacts of a threshold, where x_b is the mean one."""
         contacts = self.config.contacts
         back = contacts.back_force_ratio
         if contacts.coupling == "equal":
@@ -133,6 +139,8 @@ class LifeTransforms:
         """Density of lives, and 1, stiffness, force at breaking and mass of contacts of a life."""
         contacts = self.config.contacts
         back = contacts.back_force_ratio
+        if contacts.newborn_width:
+            return self._at_lives_of_any_newborn(lives)
         if contacts.coupling == "scaled":
             root = (lives + np.sqrt(lives**2 + 4 * back)) / 2
             threshold, stretch, stiffness, mass = root**2, root, root, root**2
@@ -145,6 +153,32 @@ class LifeTransforms:
         return density, np.stack(
             [np.ones_like(lives), stiffness, stiffness * stretch, mass], axis=-1
         )
+
+    def _at_lives_of_any_newborn(self, lives: Array) -> tuple[Array, Array]:
+        """The same where newborn contacts bear forces of a normal law, cut off at the threshold:
+        sums over thresholds u, those of a life l having attached with the force u - l."""
+        contacts = self.config.contacts
+        width = contacts.newborn_width
+        panels = 2 * DEVIATES * self.relative_width / (PANEL_WIDTH * width)
+        panels = int(np.clip(math.ceil(panels), *SUMMED_PANELS))
+        node, weight = np.polynomial.legendre.leggauss(POINTS)
+        edges = np.linspace(-DEVIATES, DEVIATES, panels + 1)
+        deviate = (edges[:-1, None] + (1 + node) * DEVIATES / panels).ravel()
+        threshold = self._law.quantile(special.ndtr(deviate))
+        share = np.tile(weight, panels) * np.exp(-0.5 * deviate**2)
+        flat = lives.ravel()
+        density, mean = np.empty_like(flat), np.empty_like(flat)
+        for start in range(0, flat.size, 200):
+            force = threshold - flat[start : start + 200, None]
+            found = share * np.exp(-0.5 * ((force - contacts.back_force_ratio) / width) ** 2)
+            found = np.where(np.abs(force) < threshold, found, 0.0)
+            density[start : start + 200] = found.sum(axis=1)
+            mean[start : start + 200] = found @ threshold
+        with np.errstate(invalid="ignore", divide="ignore"):
+            broken = np.where(density > 0, mean / density, flat)
+        one = np.ones_like(flat)
+        values = np.stack([one, one, broken, one], axis=-1)
+        return density.reshape(lives.shape), values.reshape(*lives.shape, -1)
 
     def _projected(self, edges: Array) -> Array:
         """Coefficients of panels for a law whose density is constant in cells: integrals over the
@@ -175,8 +209,11 @@ class LifeTransforms:
             + 4 / 15 * half**2 * coefficients[:, 2, 0].sum()
         )
         life = float(linear[0])
-        # k x_b = k x_s - k l, and k (x_s² - x_b²)/2 = k x_s l - k l²/2; k x_b is the back force.
+        # k (x_s² - x_b²)/2 = k x_s l - k l²/2. The force k x_b is the back force; where newborn
+        # contacts bear different ones, all have one stiffness, and x_b = x_s - l.
         back = self.config.contacts.back_force_ratio
+        if self.config.contacts.newborn_width:
+            back = float(mean[2]) - life
         quadratic = (
             2 * (middle**2 + half**2 / 3) @ coefficients[:, 0, 1]
             + 4 / 3 * half * middle @ coefficients[:, 1, 1]

@@ -65,8 +65,8 @@ OTHER_MOTION = "A large oscillation may be possible too"
 NO_AMPLITUDE = "Linear theory gives no amplitude"
 
 WITHOUT_NEWBORN_WIDTH = (
-    "has no linear stability theory here: contacts must attach with one force; `mesoslip curve` "
-    "gives the steady force of contacts of one stiffness"
+    "has no linear stability theory for contacts that age or break by thermal activation: they "
+    "must attach with one force"
 )
 
 
@@ -98,8 +98,6 @@ class LinearStability(abc.ABC):
     def __init__(self, config: Config, velocity: float | None = None) -> None:
         contacts = config.contacts
         problems = list(self._problems(config))
-        if contacts.newborn_width > 0:
-            problems.append(Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH))
         if not contacts.reattach:
             problems.append(
                 Problem("", "contacts.reattach", "without it there is no steady sliding", False)
@@ -121,9 +119,10 @@ class LinearStability(abc.ABC):
         self._drag = contacts.count * contacts.contact_drag if self.delay > 0 else 0.0
 
     @classmethod
-    def _problems(cls, config: Config) -> Iterator[Problem]:  # noqa: ARG003
+    def _problems(cls, config: Config) -> Iterator[Problem]:
         """What else of a configuration the theory does not have."""
-        yield from ()
+        if config.contacts.newborn_width > 0:
+            yield Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)
 
     @property
     @abc.abstractmethod

@@ -27,6 +27,7 @@ from mesoslip.theory.linear_stability import (
     LinearStability,
     Parts,
 )
+from mesoslip.theory.lives import newborn_stretch
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -41,6 +42,12 @@ WITHOUT_AGEING = "has a response of its own: use mesoslip.theory.ageing_sliding.
 
 WITHOUT_ACTIVATION = (
     "has a response of its own: use mesoslip.theory.activated_sliding.ActivatedSliding"
+)
+
+
+WITHOUT_NEWBORN_WIDTH = (
+    'has a linear stability theory for coupling = "equal" only, with thresholds of which hardly '
+    "any is below the width"
 )
 
 
@@ -83,6 +90,8 @@ class SteadySliding(LinearStability):
             yield Problem("", "contacts.ageing", WITHOUT_AGEING)
         if config.contacts.thermal is not None:
             yield Problem("", "contacts.thermal", WITHOUT_ACTIVATION)
+        if newborn_stretch(config) is None:
+            yield Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)
 
     @property
     def lives(self) -> Lives:

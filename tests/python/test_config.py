@@ -676,8 +676,8 @@ def test_numbers_of_many_digits(value):
         ),
         (
             {
-                "interaction": LATTICE | {"columns": 10_000, "rows": 10_000},
-                "contacts__count": 100_000_000,
+                "interaction": LATTICE | {"columns": 40_000, "rows": 10_000},
+                "contacts__count": 400_000_000,
             },
             ["contacts.count", "GiB"],
         ),

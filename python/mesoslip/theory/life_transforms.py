@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
@@ -157,6 +156,9 @@ class LifeTransforms:
     def _at_lives_of_any_newborn(self, lives: Array) -> tuple[Array, Array]:
         """The same where newborn contacts bear forces of a normal law, cut off at the threshold:
         sums over thresholds u, those of a life l having attached with the force u - l."""
+        # It takes long to import, and few need it.
+        from scipy import special
+
         contacts = self.config.contacts
         width = contacts.newborn_width
         panels = 2 * DEVIATES * self.relative_width / (PANEL_WIDTH * width)

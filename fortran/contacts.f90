@@ -24,7 +24,7 @@ contains
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Their kind
       character(len=*), intent(in) :: kind
-      !> What they are made of, each number by its name
+      !> Parameters of the contacts, each number by its name
       type(parameters_type), intent(inout) :: parameters
       !> Key of the random numbers
       integer(i8), intent(in) :: seed, realization

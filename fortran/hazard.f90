@@ -47,7 +47,7 @@ module mesoslip_hazard
       !> Exponent of the factor between a deviate and what the clock goes on by, and the key
       procedure, non_overridable :: life_exponent
       procedure, non_overridable :: key
-      !> What is left of the deviate of a contact
+      !> Remaining deviate of a contact
       procedure, non_overridable :: left
    end type hazard_type
 
@@ -57,9 +57,9 @@ contains
    pure subroutine offer(self, displacement, clock)
       !> The clocks
       class(hazard_type), intent(in) :: self
-      !> Where the slider is [m]
+      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> What it lets go on
+      !> The part that goes on
       type(hazard_clock_type), intent(inout) :: clock(clocks)
 
       integer :: number
@@ -165,7 +165,7 @@ contains
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number
-      !> What is left of the deviate of the contact
+      !> Remaining deviate of the contact
       real(wp), intent(in) :: left
       !> Stretch at the threshold, and displacement at which the stretch is zero [m]
       real(wp), intent(in) :: limit, origin
@@ -178,7 +178,7 @@ contains
       if (exponent <= max_key_exponent) key = self%reading(number) + left * exp(exponent)
    end function key
 
-   !> What is left of the deviate of a contact now.
+   !> Remaining deviate of a contact now.
    pure function left(self, number, key, deviate, limit, origin)
       !> The clocks
       class(hazard_type), intent(in) :: self

@@ -1,5 +1,5 @@
-!> What contacts offer a slider, a linear law of the contact force and clocks, and what they learn
-!> of it.
+!> The law that contacts offer a slider, linear in displacement and velocity, with clocks, and the
+!> motion of the slider that contacts are given.
 module mesoslip_interface_law
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -23,7 +23,7 @@ module mesoslip_interface_law
       real(wp) :: drag = 0.0_wp
       !> Rate of the force by what attaches, none where contacts are counted one by one [N/s]
       real(wp) :: rate = 0.0_wp
-      !> Force below which the law does not tell oscillation from rest [N]
+      !> Force below which oscillation is not distinguished from rest [N]
       real(wp) :: tolerance = 0.0_wp
    end type interface_law_type
 
@@ -61,9 +61,9 @@ module mesoslip_interface_law
       real(wp) :: slope = 0.0_wp
       !> Rate of the clock where the slider is [1/s]
       real(wp) :: rate = 0.0_wp
-      !> What is left until the next contact breaks; huge if none does
+      !> Remaining deviate until the next contact breaks; huge if none does
       real(wp) :: left = huge(1.0_wp)
-      !> What was added in the last advance
+      !> Increase in the last advance
       real(wp) :: elapsed = 0.0_wp
       !> Whether the last advance ended where nothing was left
       logical :: is_due = .false.

@@ -1,10 +1,10 @@
-!> What will happen while a motion goes on forward: the next breaks and attachments in their order.
+!> The events of a motion that goes on forward: the next breaks and attachments in their order.
 !>
 !> Contacts write a schedule; a slider runs through it and it notes when and where each event came;
 !> contacts read that afterwards and keep their books for many events at once. It knows nothing
 !> but what each event does to the law of the contact force, so that sliders need not know contacts.
 !>
-!> A schedule is never wrong, only short: it ends before anything that it does not know of, and the
+!> A schedule is never wrong, only short: it ends before anything unforeseen, and the
 !> numbers of a run do not depend on its length.
 !>
 !> With clocks of thermally activated breaking a contact may be in two lists, that of coordinates
@@ -302,7 +302,7 @@ contains
    end subroutine attach_due
 
    !> The same with clocks: contacts break by their clock, then at coordinates, then others attach.
-   !> What else may be due where the schedule ends is left to the contacts.
+   !> Other events that are due where the schedule ends are left to the contacts.
    subroutine pass_clocks(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement

@@ -15,7 +15,7 @@ module mesoslip_boundary_handles
 
    public :: open_handle, close_handle, find_simulation, report
 
-   !> What every simulation is stamped with, besides its address
+   !> Stamp of every simulation, besides its address
    integer(i8), parameter :: stamp = int(z'6D65736F736C6970', i8)
 
    !> A simulation with its stamp.
@@ -81,7 +81,7 @@ contains
          & "the simulation lacks contacts, a slider, a drive, or what is to be recorded")
    end subroutine find_simulation
 
-   !> What a handle points to; null if that is no simulation.
+   !> The simulation of a handle; null if there is none.
    subroutine find(handle, stamped)
       integer(i8), intent(in) :: handle(2)
       type(stamped_type), pointer, intent(out) :: stamped

@@ -1,4 +1,4 @@
-! What Python calls of the random numbers, wrapped by f2py.
+! The random numbers as Python calls them, wrapped by f2py.
 
 !> Philox 4x32-10, for its tests and for whoever wants the same numbers elsewhere.
 subroutine philox(length, counter, key, word)

@@ -1,4 +1,4 @@
-! What Python calls of a simulation: flat subroutines with explicit shapes, wrapped by f2py.
+! A simulation as Python calls it: flat subroutines with explicit shapes, wrapped by f2py.
 !
 ! A simulation lives here; Python holds its handle, two numbers that only these procedures read.
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
@@ -36,7 +36,7 @@ subroutine set_contacts(handle, kind, length, names, values, words, seed, realiz
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Kind of the contacts, and what they are made of: parameters by name, numbers or words
+   !> Kind of the contacts, and their parameters by name, numbers or words
    character(len=*), intent(in) :: kind
    integer, intent(in) :: length
    character(len=32), intent(in) :: names(length), words(length)
@@ -68,7 +68,7 @@ subroutine set_slider(handle, kind, length, names, values, words, status, messag
    use mesoslip_sliders, only: make_slider
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Kind of the slider, and what it is made of: parameters by name, numbers or words
+   !> Kind of the slider, and its parameters by name, numbers or words
    character(len=*), intent(in) :: kind
    integer, intent(in) :: length
    character(len=32), intent(in) :: names(length), words(length)
@@ -375,7 +375,7 @@ subroutine ask_energy(handle, energy, status, message)
    call report(error, status, message)
 end subroutine ask_energy
 
-!> What each contact is: origin [m], stiffness [N/m], breaking stretch [m], renewals.
+!> State of each contact: origin [m], stiffness [N/m], breaking stretch [m], renewals.
 subroutine ask_contacts(handle, count, values, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: find_simulation, report

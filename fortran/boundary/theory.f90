@@ -1,4 +1,4 @@
-! What Python calls of the theory: flat subroutines with explicit shapes, wrapped by f2py.
+! The theory as Python calls it: flat subroutines with explicit shapes, wrapped by f2py.
 !
 ! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
 
@@ -10,7 +10,7 @@ subroutine contact_scales(length, names, values, words, scales, status, message)
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    implicit none
-   !> What the contacts are made of: parameters by name, numbers or words
+   !> Parameters of the contacts by name, numbers or words
    integer, intent(in) :: length
    character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)
@@ -42,7 +42,7 @@ subroutine force_curve(length, names, values, words, start, width, panels, point
    use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
    implicit none
-   !> What the contacts are made of: parameters by name, numbers or words
+   !> Parameters of the contacts by name, numbers or words
    integer, intent(in) :: length
    character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)
@@ -143,7 +143,7 @@ subroutine evaluate_threshold_law(length, names, values, words, minimum, what, p
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
-   !> What the law is made of: parameters by name, numbers or words
+   !> Parameters of the threshold law by name, numbers or words
    integer, intent(in) :: length
    character(len=32), intent(in) :: names(length), words(length)
    real(8), intent(in) :: values(length)

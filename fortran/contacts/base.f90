@@ -1,7 +1,7 @@
-!> What every model of the contacts can do: offer a slider a law, and respond to its motion.
+!> Interface of every model of the contacts: offer a slider a law, and respond to its motion.
 !>
-!> Contacts know nothing about sliders but where they are. Displacements are relative to an origin
-!> that the caller moves along (see shift_origin).
+!> Contacts are independent of sliders, and are given only their positions. Displacements are
+!> relative to an origin that the caller moves along (see shift_origin).
 module mesoslip_contacts_base
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -38,7 +38,7 @@ module mesoslip_contacts_base
       & "origin", "stiffness", "break_stretch", "renewals"]
    integer, parameter :: contact_record_length = size(contact_columns)
 
-   !> What the contacts are made of.
+   !> Parameters of the contacts.
    type :: contact_parameters_type
       !> Number of contacts N
       integer :: count = 0
@@ -67,7 +67,7 @@ module mesoslip_contacts_base
 
    !> The contacts of an interface: what is common to all models of them.
    type, abstract :: contacts_type
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type) :: parameters
       !> Number of contacts that are detached, and breaks so far
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
@@ -111,7 +111,7 @@ module mesoslip_contacts_base
       procedure :: individual_count
       !> How the contacts are
       procedure :: snapshot
-      !> What each contact is
+      !> State of each contact
       procedure :: records
    end type contacts_type
 
@@ -142,11 +142,11 @@ module mesoslip_contacts_base
          implicit none
          !> The contacts
          class(contacts_type), intent(inout) :: self
-         !> Where the slider is
+         !> Pose of the slider
          type(pose_type), intent(in) :: pose
          !> The law
          type(interface_law_type), intent(out) :: law
-         !> Where it holds
+         !> Range in which it holds
          type(window_type), intent(out) :: window
       end subroutine offer_interface
 
@@ -207,11 +207,11 @@ module mesoslip_contacts_base
 
 contains
 
-   !> Write a schedule of what comes next: nothing unless a kind of contacts knows.
+   !> Write a schedule of what comes next: nothing unless a kind of contacts can.
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
       class(contacts_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
@@ -227,7 +227,7 @@ contains
       class(contacts_type), intent(inout) :: self
       !> The schedule, as far as the slider came; moments in which contacts broke may be added
       type(schedule_type), intent(inout) :: schedule
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
    end subroutine settle
@@ -264,7 +264,7 @@ contains
       values = 0.0_wp
    end subroutine snapshot
 
-   !> What each contact is; nothing for contacts that are not kept one by one.
+   !> State of each contact; nothing for contacts that are not kept one by one.
    pure subroutine records(self, time, values)
       !> The contacts
       class(contacts_type), intent(in) :: self
@@ -293,9 +293,9 @@ contains
       call archive%exchange("cost", self%cost)
    end subroutine exchange_contacts
 
-   !> Take what all kinds of contacts are made of.
+   !> Take the parameters that all kinds of contacts have.
    subroutine take_contact_parameters(self, parameters, seed, realization, error)
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(out) :: self
       !> Named numbers
       type(parameters_type), intent(inout) :: parameters

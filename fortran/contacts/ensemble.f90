@@ -1,7 +1,7 @@
-!> N contacts that know nothing of each other, in the order in which they break.
+!> N independent contacts, in the order in which they break.
 !>
 !> The earthquake-like model without interaction. Contacts are queued for one direction of motion;
-!> what breaks on the way back is bounded, and the queue is ordered anew when the slider turns.
+!> what breaks on the way back is bounded, and the queue is rebuilt when the slider turns.
 module mesoslip_contacts_ensemble
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
@@ -49,7 +49,7 @@ contains
    subroutine new_contact_ensemble(self, parameters, columns, rows, error)
       !> The ensemble
       type(contact_ensemble_type), intent(out) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Columns and rows of a lattice of which contacts have sites; no columns for none
       integer, intent(in) :: columns, rows
@@ -72,7 +72,7 @@ contains
    subroutine make_contact_ensemble(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: columns and rows
       type(parameters_type), intent(inout) :: parameters
@@ -99,18 +99,18 @@ contains
       integer, intent(in) :: state
 
       call self%draw(state)
-      call self%order_anew(0.0_wp)
+      call self%rebuild_queue(0.0_wp)
    end subroutine initialize
 
    !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds; a contact may break at its lower end if the motion is forward
+      !> Range in which it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
       law = total_law(self)
@@ -121,7 +121,7 @@ contains
    subroutine respond(self, before, after)
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       call self%break_due(after%displacement, after%time)
@@ -133,7 +133,7 @@ contains
    subroutine plan(self, pose, limit, schedule)
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
@@ -169,7 +169,7 @@ contains
       class(contact_ensemble_type), intent(inout) :: self
       !> The schedule, as far as the slider came
       type(schedule_type), intent(inout) :: schedule
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       integer :: event, contact(max_events)
@@ -182,7 +182,7 @@ contains
             & ahead_coordinate(self%record(:, contact(event)), self%direction))
       end do
       self%behind = schedule%behind
-      ! What broke a moment ago and attaches at once was not in the schedule.
+      ! A contact that broke a moment ago and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
@@ -193,7 +193,7 @@ contains
       class(contact_ensemble_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: origin, limit
@@ -216,7 +216,7 @@ contains
          self%behind = self%max_behind()
          if (self%direction * displacement <= self%behind) then
             self%direction = -self%direction
-            call self%order_anew(displacement)
+            call self%rebuild_queue(displacement)
          end if
       end if
       if (self%queue%first_key > self%direction * displacement) return
@@ -227,7 +227,7 @@ contains
       end do
    end subroutine break_due
 
-   !> Order the queue anew, from the records.
+   !> Rebuild the queue from the records.
    subroutine rebuild(self, displacement)
       !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self

@@ -33,8 +33,8 @@ module mesoslip_contacts_lattice
    !> of all, unless these are fewer for each than the last. A cascade is not cut into segments.
    real(wp), parameter :: max_breaks = 1000.0_wp, max_all_breaks = 1.0e7_wp, min_breaks = 20.0_wp
 
-   !> What the neighbours are to a pinned contact: sum over the pinned ones of how far their origins
-   !> are ahead of its own [m], and how many are detached
+   !> Influence of the neighbours on a pinned contact: the sum, over the pinned ones, of the lead of
+   !> their origins over its own [m], and the number of detached ones
    integer, parameter :: surroundings_length = 2, row_ahead = 1, row_free = 2
 
    !> How contacts act on each other.
@@ -53,7 +53,7 @@ module mesoslip_contacts_lattice
       real(wp), private :: bond = 0.0_wp
       !> One of the lattice_ codes, and the number of neighbours of each contact
       integer, private :: lattice = 0, sides = 0
-      !> What these are to it while it is pinned, shape (surroundings_length, count)
+      !> Their influence on it while it is pinned, shape (surroundings_length, count)
       real(wp), allocatable, private :: surroundings(:, :)
       !> Contacts that let go together
       integer, allocatable, private :: generation(:)
@@ -79,7 +79,7 @@ contains
    subroutine new_contact_lattice(self, parameters, interaction, error)
       !> The contacts
       type(contact_lattice_type), intent(out) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> How they act on each other
       type(interaction_type), intent(in) :: interaction
@@ -114,7 +114,7 @@ contains
    subroutine make_contact_lattice(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: bond, lattice, columns and rows
       type(parameters_type), intent(inout) :: parameters
@@ -144,7 +144,7 @@ contains
 
       call self%draw(state)
       call self%shift_order(0.0_wp)
-      call self%order_anew(0.0_wp)
+      call self%rebuild_queue(0.0_wp)
       call self%respond(pose_type(), pose_type())
       call self%track%clear()
       self%breaks = 0.0_wp
@@ -156,11 +156,11 @@ contains
    subroutine offer(self, pose, law, window)
       !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds; a contact may break at the end that is behind
+      !> Range in which it holds; a contact may break at the end that is behind
       type(window_type), intent(out) :: window
 
       law = total_law(self)
@@ -171,7 +171,7 @@ contains
    subroutine respond(self, before, after)
       !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       real(wp) :: breaks, limit
@@ -225,7 +225,7 @@ contains
       if (self%direction * pose%direction < 0.0_wp &
          & .and. self%direction * pose%displacement <= self%behind) then
          self%direction = -self%direction
-         call self%order_anew(pose%displacement)
+         call self%rebuild_queue(pose%displacement)
       end if
       number = 0
       do
@@ -312,7 +312,7 @@ contains
       class(contact_lattice_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: centre, limit

@@ -47,7 +47,7 @@ contains
    subroutine new_contact_populations(self, parameters, resolution, error)
       !> The populations
       type(contact_populations_type), intent(out) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Length of a step over the spread of the breaking stretches, positive
       real(wp), intent(in) :: resolution
@@ -71,7 +71,7 @@ contains
    subroutine make_contact_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other number: resolution
       type(parameters_type), intent(inout) :: parameters
@@ -93,7 +93,7 @@ contains
    subroutine make_ageing_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: resolution, and the law of ageing
       type(parameters_type), intent(inout) :: parameters
@@ -121,7 +121,7 @@ contains
    subroutine make_activated_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: resolution, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -146,7 +146,7 @@ contains
    subroutine make_activated_ageing_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: resolution, the law of ageing, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -208,11 +208,11 @@ contains
    subroutine offer(self, pose, law, window)
       !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds
+      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       call offer_step(self, pose, law, window)
@@ -222,7 +222,7 @@ contains
    subroutine respond(self, before, after)
       !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       call respond_to_motion(self, before, after)

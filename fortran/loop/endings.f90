@@ -22,7 +22,7 @@ module mesoslip_loop_endings
    character(len=*), parameter :: ending_names(0:7) = [character(len=name_length) :: "", "drive", &
       & "avalanches", "broken", "slides", "slips", "displacement", "steady"]
 
-   !> What stops a run: a number of slips, a displacement.
+   !> Conditions that end a run: a number of slips, a displacement.
    type :: stop_type
       !> Number of slips
       integer(i8) :: max_slips = huge(1_i8)
@@ -40,7 +40,7 @@ contains
 
    !> Whether a slider has come to the displacement.
    pure function is_reached(self, slider)
-      !> What stops the run
+      !> Conditions that end the run
       class(stop_type), intent(in) :: self
       !> The slider
       class(slider_type), intent(in) :: slider
@@ -53,7 +53,7 @@ contains
 
    !> Let a window end at the displacement.
    pure subroutine limit_window(self, window, origin)
-      !> What stops the run
+      !> Conditions that end the run
       class(stop_type), intent(in) :: self
       !> The window
       type(window_type), intent(inout) :: window
@@ -69,7 +69,7 @@ contains
 
    !> Let a schedule end before the displacement.
    pure subroutine limit_schedule(self, schedule, origin)
-      !> What stops the run
+      !> Conditions that end the run
       class(stop_type), intent(in) :: self
       !> The schedule
       type(schedule_type), intent(inout) :: schedule

@@ -41,7 +41,7 @@ module mesoslip_loop_state
       type(stage_recorder_type) :: stages
       !> Whether the state is steady, in the last part of the drive
       type(steady_recorder_type) :: steady
-      !> What stops the run before its drive ends
+      !> Conditions that end the run before its drive does
       type(stop_type) :: stop
       !> Advances of the slider so far
       integer(i8) :: advances = 0
@@ -52,7 +52,7 @@ module mesoslip_loop_state
       !> Maximum number of breaks, and of attachments, in a schedule; 0 for no schedules. The
       !> numbers of a run do not depend on it
       integer :: max_schedule = max_events
-      !> What comes next; between two segments it is over
+      !> The next events; between two segments it is empty
       type(schedule_type) :: schedule
       !> Advances since time or displacement changed; time [s], origin and displacement [m] then
       integer :: idle = 0
@@ -206,7 +206,7 @@ contains
       self%start_energy = self%start_energy + (self%slider%energy() - energy)
    end subroutine displace_drive
 
-   !> Put the state into an archive or take it out; a queue taken out is ordered anew.
+   !> Put the state into an archive or take it out; a queue taken out is rebuilt.
    subroutine exchange(self, archive)
       !> The state
       class(state_type), intent(inout) :: self

@@ -1,4 +1,4 @@
-!> What comes after an advance: the next part of the drive, the end of the run, another origin.
+!> The steps after an advance: the next part of the drive, the end of the run, another origin.
 module mesoslip_loop_transitions
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_loop_endings, only: ending_avalanches, ending_displacement, ending_drive, &
@@ -41,7 +41,7 @@ contains
    pure function is_broken(state, law, window)
       !> The state
       class(state_type), intent(in) :: state
-      !> What the contacts offer
+      !> The law that the contacts offer
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
       !> Whether none is

@@ -14,7 +14,7 @@ module mesoslip_numerics_accumulator
    type :: accumulator_type
       !> The sum as additions of doubles give it
       real(wp) :: high = 0.0_wp
-      !> What their rounding left out
+      !> Sum of their rounding errors
       real(wp) :: low = 0.0_wp
    contains
       !> Add one term
@@ -29,7 +29,7 @@ contains
    elemental subroutine add(self, term)
       !> The running total
       class(accumulator_type), intent(inout) :: self
-      !> What to add
+      !> Term to add
       real(wp), intent(in) :: term
 
       real(wp) :: sum, shadow

@@ -17,7 +17,7 @@ module mesoslip_numerics_errors
    !> An integrator gave up.
    integer, parameter :: status_failed = 4
 
-   !> What went wrong, and a sentence about it for the user.
+   !> Kind of a failure, and a sentence about it for the user.
    type :: error_type
       !> One of the status codes of this module
       integer :: status = status_ok
@@ -33,7 +33,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> One of the status codes of this module
       integer, intent(in) :: status
-      !> What is wrong and what would be right
+      !> The fault, and what would be right
       character(len=*), intent(in) :: message
 
       allocate (error)

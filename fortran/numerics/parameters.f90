@@ -216,7 +216,7 @@ contains
 
    !> The position of a word among some choices.
    subroutine choose(name, word, choices, position, error)
-      !> What is chosen, for the error
+      !> Name of the choice, for the error
       character(len=*), intent(in) :: name
       !> The word, and what it can be
       character(len=*), intent(in) :: word, choices(:)

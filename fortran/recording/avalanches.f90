@@ -32,7 +32,7 @@ module mesoslip_recording_avalanches
    !> Waiting avalanches, and numbers in snapshots, at which the run pauses to have them taken away
    integer, parameter :: pausing_avalanches = 100000, pausing_numbers = 6000000
 
-   !> What to record.
+!> Settings of the record.
    type :: avalanche_parameters_type
       !> Minimum size of an avalanche in the catalogue; 0 for no catalogue
       real(wp) :: min_size = 0.0_wp
@@ -44,7 +44,7 @@ module mesoslip_recording_avalanches
 
    !> Records avalanches and snapshots into tables that the caller empties.
    type :: avalanche_recorder_type
-      !> What to record
+!> Settings of the record
       type(avalanche_parameters_type) :: parameters
       !> Avalanches, when snapshots were taken, and the snapshots, all contacts of one in a row
       type(buffer_type) :: catalogue, events, snapshots
@@ -91,7 +91,7 @@ contains
    subroutine open(self, parameters, snapshot_time, contacts)
       !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
-      !> What to record
+!> Settings of the record
       type(avalanche_parameters_type), intent(in) :: parameters
       !> Times at which snapshots are taken, growing [s]
       real(wp), intent(in) :: snapshot_time(:)

@@ -1,4 +1,4 @@
-!> What happened within the last advance of a slider.
+!> Extremes and events within the last advance of a slider.
 module mesoslip_recording_last_advance
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_base, only: motion_type, slider_type

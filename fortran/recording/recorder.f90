@@ -1,4 +1,4 @@
-!> What is kept of a run: a trace at fixed intervals, a catalogue of slips, finer traces of them.
+!> The record of a run: a trace at fixed intervals, a catalogue of slips, finer traces of them.
 module mesoslip_recording_recorder
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_archive, only: archive_type
@@ -11,7 +11,7 @@ module mesoslip_recording_recorder
 
    public :: recorder_type, recorder_parameters_type
 
-   !> What to record.
+!> Settings of the record.
    type :: recorder_parameters_type
       !> Interval of the trace [s]
       real(wp) :: interval = 1.0_wp
@@ -19,13 +19,13 @@ module mesoslip_recording_recorder
       real(wp) :: duration = 0.0_wp
       !> Layers whose displacements go with the trace
       integer :: layers = 0
-      !> What to record of slips
+      !> Settings of the slip catalogue
       type(slip_parameters_type) :: slips
    end type recorder_parameters_type
 
    !> Records a run into tables that the caller empties.
    type :: recorder_type
-      !> What to record
+!> Settings of the record
       type(recorder_parameters_type) :: parameters
       !> Samples at fixed intervals
       type(trace_type) :: trace
@@ -52,7 +52,7 @@ contains
    subroutine open(self, parameters)
       !> The recorder
       class(recorder_type), intent(inout) :: self
-      !> What to record
+!> Settings of the record
       type(recorder_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters

@@ -50,7 +50,7 @@ module mesoslip_recording_slips
    !> Present state: neither fall nor slip, a fall that may come to be a slip, a slip
    integer, parameter :: phase_slow = 0, phase_fall = 1, phase_slip = 2
 
-   !> What to record.
+!> Settings of the record.
    type :: slip_parameters_type
       !> Velocity above the drive's that makes a slip [m/s]; zero for no slips
       real(wp) :: slip_velocity = 0.0_wp
@@ -119,7 +119,7 @@ contains
    subroutine open(self, parameters)
       !> The recorder
       class(slip_recorder_type), intent(inout) :: self
-      !> What to record
+!> Settings of the record
       type(slip_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters

@@ -1,4 +1,4 @@
-!> What the stages of a drive came to: where each started and ended, and the extremes and the mean
+!> Results of the stages of a drive: where each started and ended, and the extremes and the mean
 !> of the drive's force in it.
 !>
 !> All of it is exact from the motion. Sliders note the extremes of the force; the mean follows from

@@ -1,6 +1,6 @@
-!> What every slider can do: move under a linear law of the contact force, and say where it is.
+!> Interface of every slider: move under a linear law of the contact force, and say where it is.
 !>
-!> A slider has a drive, and knows nothing about contacts. Displacements are relative to an origin
+!> A slider has a drive, and is independent of contacts. Displacements are relative to an origin
 !> that moves along with the slider, so that they keep their digits however far it goes.
 module mesoslip_sliders_base
    use mesoslip_drive, only: drive_type
@@ -52,7 +52,7 @@ module mesoslip_sliders_base
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
       real(wp) :: direction = 1.0_wp
-      !> What drives it
+      !> The drive
       type(drive_type) :: drive
       !> Time at which the last advance started [s]
       real(wp) :: step_time = 0.0_wp
@@ -155,7 +155,7 @@ module mesoslip_sliders_base
 
 contains
 
-   !> Where the slider is.
+   !> Pose of the slider.
    pure function pose(self)
       !> The slider
       class(slider_type), intent(in) :: self

@@ -211,7 +211,7 @@ contains
       real(wp), intent(in) :: mean(0:)
       !> The last of them
       integer, intent(in) :: order
-      !> What is left, and what the clock would go on by in the step at its first rate
+      !> The remaining deviate, and the advance of the clock in the step at its first rate
       real(wp), intent(in) :: left, whole
       real(wp), intent(in) :: latest
       real(wp) :: time

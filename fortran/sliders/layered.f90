@@ -38,7 +38,7 @@ module mesoslip_sliders_layered
 
    !> An elastic slider.
    type, extends(slider_type) :: slider_layered_type
-      !> What it is made of
+      !> Parameters of the slider
       type(layered_parameters_type) :: parameters
       !> The system during the last advance
       type(system_type), pointer, private :: system => null()
@@ -76,7 +76,7 @@ contains
    subroutine make_slider_layered(slider, parameters, error)
       !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> What it is made of; no mass of the base for none
+      !> Parameters of the slider; a base of mass zero is none
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
@@ -107,7 +107,7 @@ contains
    subroutine new_slider_layered(self, parameters)
       !> The slider
       type(slider_layered_type), intent(inout) :: self
-      !> What it is made of
+      !> Parameters of the slider
       type(layered_parameters_type), intent(in) :: parameters
 
       integer :: term
@@ -155,7 +155,7 @@ contains
       self%system%law = law
    end subroutine start
 
-   !> Take note that the drive has changed: CVODE starts anew.
+   !> Take note that the drive has changed: CVODE restarts.
    subroutine adapt_to_drive(self)
       !> The slider
       class(slider_layered_type), intent(inout) :: self
@@ -164,7 +164,7 @@ contains
    end subroutine adapt_to_drive
 
    !> Whether a run that is put away now goes on to the bit: the history of CVODE cannot be put
-   !> away, so only where it starts anew.
+   !> away, so only where it restarts.
    pure function can_pause(self)
       !> The slider
       class(slider_layered_type), intent(in) :: self
@@ -245,7 +245,7 @@ contains
       end if
    end subroutine advance
 
-   !> Take the law of the contact force; CVODE starts anew if it is another one.
+   !> Take the law of the contact force; CVODE restarts if it is another one.
    subroutine take_law(self, law)
       class(slider_layered_type), intent(inout) :: self
       type(interface_law_type), intent(in) :: law
@@ -529,7 +529,7 @@ contains
       if (associated(self%system)) deallocate (self%system)
    end subroutine close
 
-   !> Put the state into an archive or take it out; CVODE starts anew.
+   !> Put the state into an archive or take it out; CVODE restarts.
    subroutine exchange(self, archive)
       !> The slider
       class(slider_layered_type), intent(inout) :: self

@@ -68,11 +68,11 @@ module mesoslip_theory_lives
    contains
       !> Breaks of newborns over displacement
       procedure, non_overridable :: newborn_rates
-      !> What is left of newborns
+      !> Survival of newborns
       procedure, non_overridable :: newborn_state
       !> Breaks of the first generation over displacement
       procedure, non_overridable :: first_rates
-      !> What is left of the first generation
+      !> Survival of the first generation
       procedure, non_overridable :: first_state
       !> Spread the lives of contacts of a table over a window
       procedure, non_overridable :: spread_table
@@ -277,7 +277,7 @@ contains
       end if
    end function newborn_rates
 
-   !> What is left of newborns.
+   !> Survival of newborns.
    pure function newborn_state(self, life) result(state)
       !> The contacts
       class(contact_lives_type), intent(in) :: self
@@ -421,7 +421,7 @@ contains
       end if
    end function first_rates
 
-   !> What is left of the first generation.
+   !> Survival of the first generation.
    pure function first_state(self, displacement) result(state)
       !> The contacts
       class(contact_lives_type), intent(in) :: self

@@ -75,7 +75,7 @@ module mesoslip_theory_rate_and_state
 
    !> A motion in a stage of the load point.
    type :: motion_type
-      !> What moves
+      !> The slider
       type(friction_type) :: friction
       !> Velocity of the load point at time 0, and its acceleration
       real(wp) :: velocity = 0.0_wp, acceleration = 0.0_wp

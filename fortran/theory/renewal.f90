@@ -134,7 +134,7 @@ contains
       end do
    end subroutine kernel_blocks
 
-   !> What the contacts bear: at the edges of the panels from all that attached, between by rates.
+   !> Force on the contacts: at the edges of the panels from all that attached, between by rates.
    subroutine bear(lives, start, width, weight, released, solution)
       type(contact_lives_type), intent(in) :: lives
       real(wp), intent(in) :: start, width

@@ -93,7 +93,7 @@ contains
       self%window = window
    end subroutine spread
 
-   !> What is left of contacts that attached together, and their breaks over displacement.
+   !> Survival of contacts that attached together, and their breaks over displacement.
    pure subroutine follow(moments, force, window, displacement, state, rates)
       type(life_moments_type), intent(in) :: moments
       !> Force at attaching, window of a life, displacement since
@@ -142,7 +142,7 @@ contains
       call follow(self%newborn, self%back_force, self%window, life, state, rates)
    end function newborn_rates
 
-   !> What is left of newborns.
+   !> Survival of newborns.
    pure function newborn_state(self, life) result(state)
       !> The contacts
       class(table_lives_type), intent(in) :: self
@@ -170,7 +170,7 @@ contains
       call follow(self%unforced, 0.0_wp, self%window, displacement, state, rates)
    end function relaxed_rates
 
-   !> What is left of contacts that were relaxed.
+   !> Survival of contacts that were relaxed.
    pure function relaxed_state(self, displacement) result(state)
       !> The contacts
       class(table_lives_type), intent(in) :: self
@@ -200,7 +200,7 @@ contains
          & / self%mean_life
    end function steady_rates
 
-   !> What is left of contacts of slow sliding: of a life l the part 1 - x/l.
+   !> Survival of contacts of slow sliding: of a life l the part 1 - x/l.
    pure function steady_state(self, displacement) result(state)
       !> The contacts
       class(table_lives_type), intent(in) :: self
@@ -235,7 +235,7 @@ contains
       rates = [moment(inverse_l), moment(k), moment(k_over_l)]
    end function uniform_rates
 
-   !> What is left of contacts of uniform stretches: the part 1 - x/x_s, uniform above x.
+   !> Survival of contacts of uniform stretches: the part 1 - x/x_s, uniform above x.
    pure function uniform_state(self, displacement) result(state)
       !> The contacts
       class(table_lives_type), intent(in) :: self

@@ -39,7 +39,7 @@ class Scale(NamedTuple):
     size: float
 
     def label(self, what: str) -> str:
-        """What is shown, with the unit in parentheses if it has one."""
+        """The label, with the unit in parentheses if it has one."""
         return f"{what} ({self.name})" if self.name else what
 
 

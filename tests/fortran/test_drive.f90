@@ -79,7 +79,7 @@ contains
       call check(is_right .and. .not. allocated(error), "a ramp to rest ends at its end")
    end subroutine comes_to_rest
 
-   !> Another origin changes neither work nor impulse; a stage counts its impulse anew.
+   !> Another origin changes neither work nor impulse; a stage counts its impulse from zero.
    subroutine keeps_value_and_work()
       type(drive_type) :: drive
       type(error_type), allocatable :: error

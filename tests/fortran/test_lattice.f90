@@ -91,7 +91,7 @@ contains
       is_right = .not. abs(tree%first() - place) > 0.0_wp
       if (place < huge(1.0_wp)) is_right = is_right .and. &
          & tree%due(place) == minloc(coordinate, dim=1)
-      call check(is_right, "the first contact of a tree made anew")
+      call check(is_right, "the first contact of a rebuilt tree")
    end subroutine breaks_first
 
    !> Neighbours of all sites, shape (neighbours, sites).

@@ -71,7 +71,7 @@ contains
    subroutine make_activated_ageing(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: the law of ageing, columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -112,11 +112,11 @@ contains
    subroutine offer(self, pose, law, window)
       !> The contacts
       class(contact_activated_ageing_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds
+      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       call offer_activated(self, pose, law, window)
@@ -127,7 +127,7 @@ contains
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
       class(contact_activated_ageing_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
@@ -143,7 +143,7 @@ contains
       class(contact_activated_ageing_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp]
@@ -211,7 +211,7 @@ contains
       class(contact_activated_ageing_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Whether it is the clock
       logical, intent(in) :: by_clock
@@ -259,7 +259,7 @@ contains
    subroutine renew_due(self, pose)
       !> The contacts
       class(contact_activated_ageing_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -271,7 +271,7 @@ contains
       end do
    end subroutine renew_due
 
-   !> Order all contacts anew, from the records, lives and ages.
+   !> Rebuild the queue from the records, lives and ages.
    subroutine rebuild(self, displacement)
       !> The contacts
       class(contact_activated_ageing_type), intent(inout) :: self
@@ -289,7 +289,7 @@ contains
       call self%order_renewal%arrange()
    end subroutine rebuild
 
-   !> What each contact is.
+   !> State of each contact.
    pure subroutine records(self, time, values)
       !> The contacts
       class(contact_activated_ageing_type), intent(in) :: self

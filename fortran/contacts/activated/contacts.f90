@@ -1,4 +1,4 @@
-!> N contacts that know nothing of each other, which break by thermal activation.
+!> N independent contacts, which break by thermal activation.
 !>
 !> A contact under the force f breaks at the rate omega_0 exp((abs(f) - f_s)/f_T), and at once where
 !> abs(f) = f_s (Bell's law). Contacts whose forces have one sign share a clock, the integral of
@@ -56,7 +56,7 @@ contains
    subroutine make_contact_activated(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -92,11 +92,11 @@ contains
    subroutine offer(self, pose, law, window)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds
+      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: ahead
@@ -116,7 +116,7 @@ contains
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
@@ -135,11 +135,11 @@ contains
    subroutine offer_activated(self, pose, law, window)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds
+      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: ahead
@@ -156,7 +156,7 @@ contains
    subroutine respond_activated(self, before, after)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       if (self%is_steady) then
@@ -259,7 +259,7 @@ contains
       class(contact_activated_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch
@@ -288,7 +288,7 @@ contains
       class(contact_activated_type), intent(inout) :: self
       !> The schedule, as far as the slider came; a moment in which contacts broke may be added
       type(schedule_type), intent(inout) :: schedule
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -314,13 +314,13 @@ contains
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
 
-   !> Prepare the life of a contact that has attached: nothing unless a kind has more to know.
+   !> Prepare the life of a contact that has attached: nothing unless a kind has more to prepare.
    subroutine prepare(self, contact, pose)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
    end subroutine prepare
@@ -332,7 +332,7 @@ contains
       class(contact_activated_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Whether it is the clock
       logical, intent(in) :: by_clock
@@ -346,7 +346,7 @@ contains
    subroutine renew_due(self, pose)
       !> The contacts
       class(contact_activated_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
    end subroutine renew_due

@@ -24,7 +24,7 @@ module mesoslip_contacts_activated_keys
    !> Stretch over the mean breaking stretch beyond zero at which the sign of a force changes: less
    !> than matters, and more than rounding
    real(wp), parameter :: tiny_stretch = 1.0e-12_wp
-   !> Maximum change of the exponents by which keys are rescaled, rather than found anew
+   !> Maximum change of the exponents up to which keys are rescaled rather than solved again
    real(wp), parameter :: max_rescaling = 310.0_wp
    !> Numbers of the life of a contact: the clock it goes by, none while it is detached, what was
    !> left of its deviate when its key was made, the key, and the deviate of its next life, or 0 if
@@ -272,7 +272,7 @@ contains
       if (.not. is_done) then
          call self%hazard%is_far(number, displacement, far)
          if (.not. far) return
-         ! What is left until a key changes by one factor for all.
+         ! The rest of the deviate until a key changes by one factor for all.
          if (abs(exponent) < max_rescaling) call self%order(motions + number)%rescale(reading, &
             & exp(-exponent), self%members(number), is_done)
          if (is_done) then
@@ -346,7 +346,7 @@ contains
       if (self%direction > 0.0_wp) call self%order(2)%rest()
    end subroutine turn_round
 
-   !> Order all contacts anew, from the records and lives.
+   !> Rebuild the queue from the records and lives.
    subroutine rebuild(self, displacement)
       !> The contacts
       class(activated_keys_type), intent(inout) :: self

@@ -107,7 +107,7 @@ contains
    subroutine plan_by_clocks(self, pose, limit, schedule)
       !> The contacts
       class(activated_lists_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit

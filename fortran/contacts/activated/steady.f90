@@ -29,7 +29,7 @@ module mesoslip_contacts_activated_steady
    !> the deviate is used up
    integer, parameter :: next_limit = 1, next_key = 2, next_length = 2
 
-   !> Contacts that break by thermal activation, and know where if the motion is uniform.
+   !> Activated contacts whose breaking displacements are known in advance if the motion is uniform.
    type, abstract, extends(activated_lists_type) :: activated_steady_type
       !> Contacts of the schedule that break
       integer, private :: steady_listed(max_events) = 0
@@ -50,7 +50,7 @@ module mesoslip_contacts_activated_steady
 
 contains
 
-   !> Set up contacts that know where they break in a uniform motion.
+   !> Set up contacts whose breaking displacements are known in a uniform motion.
    subroutine set_up_steady(self, parameters, error)
       !> The contacts, of which is known what is common to all kinds
       class(activated_steady_type), intent(inout) :: self
@@ -71,7 +71,7 @@ contains
    subroutine follow_motion(self, pose)
       !> The contacts
       class(activated_steady_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       logical :: is_steady
@@ -155,7 +155,7 @@ contains
       class(activated_steady_type), intent(in) :: self
       !> Stretch at the threshold, and now, along the motion [m]
       real(wp), intent(in) :: limit, stretch
-      !> What is left of the deviate
+      !> Remaining deviate
       real(wp), intent(in) :: left
       real(wp) :: breaking
 
@@ -178,7 +178,7 @@ contains
    subroutine find_due(self, pose, contact)
       !> The contacts
       class(activated_steady_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Number of the contact, 0 if none is due
       integer, intent(out) :: contact
@@ -192,7 +192,7 @@ contains
       class(activated_steady_type), intent(inout) :: self
       !> Number of the contact, of which the deviate is known
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch
@@ -212,7 +212,7 @@ contains
    subroutine plan_steadily(self, pose, limit, schedule)
       !> The contacts
       class(activated_steady_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit

@@ -116,7 +116,7 @@ contains
    subroutine order(self, contact, displacement, time)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Where the slider is [m], and when that is [s]
+      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
 
       real(wp) :: age, stretch
@@ -142,7 +142,7 @@ contains
       end associate
    end subroutine order
 
-   !> Solve anew where contacts break, of all that are not in the list of those that fall.
+   !> Solve again where contacts break, of all that are not in the list of those that fall.
    subroutine order_all(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -182,7 +182,7 @@ contains
          & self%stretch, time - self%life(life_birth, contact))
    end subroutine refresh
 
-   !> Order the queue anew, from the records.
+   !> Rebuild the queue from the records.
    subroutine rebuild(self, displacement)
       !> The contacts
       class(ageing_contacts_type), intent(inout) :: self
@@ -277,7 +277,7 @@ contains
       self%cost = self%cost + visits / visits_per_cost
    end subroutine count_visits
 
-   !> What each contact is.
+   !> State of each contact.
    pure subroutine records(self, time, values)
       !> The contacts
       class(ageing_contacts_type), intent(in) :: self

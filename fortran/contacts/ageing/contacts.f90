@@ -1,4 +1,4 @@
-!> N contacts that know nothing of each other, whose thresholds change with their age.
+!> N independent contacts, whose thresholds change with their age.
 !>
 !> A contact breaks at the first time at which its force is its threshold, while both move. Contacts
 !> are queued by where that happens if the slider keeps to a speed, which is solved once, at birth:
@@ -6,10 +6,10 @@
 !> - under a slider that moves steadily they break there, whether thresholds grow or fall;
 !> - where its velocity changes, that of twice its speed: a slower slider takes longer, and a
 !>   threshold that grows is then higher, so a contact does not break before. The first of the queue
-!>   are solved anew, until it is known which of them break next. These lead: where they do is
+!>   are solved again, until it is known which of them break next. These lead: where they do is
 !>   foreseen from the motion of the slider, and held back by what is not known of it. A slider that
 !>   comes to where a leader was to break finds it there, or a little ahead of it and foresees
-!>   again. When the slider becomes faster than the speed of the queue, all are solved anew;
+!>   again. When the slider becomes faster than the speed of the queue, all are solved again;
 !> - a threshold that falls is bounded by what it will be at the end of the window, which is where
 !>   and when the contact is foreseen to break, whether the slider moves or not. Few contacts do so
 !>   in most cases; of many, those are near that may break before the next scan.
@@ -69,7 +69,7 @@ contains
    subroutine make_contact_ageing(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> What all kinds of contacts are made of
+      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: the law of ageing, and whether the slider jumps
       type(parameters_type), intent(inout) :: parameters
@@ -128,18 +128,18 @@ contains
          self%life(life_limit, contact) = self%record(row_limit, contact)
          call self%assign(contact, 0.0_wp, 0.0_wp)
       end do
-      call self%order_anew(0.0_wp)
+      call self%rebuild_queue(0.0_wp)
    end subroutine initialize
 
    !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
       !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds; a contact may break at its lower end if the motion is forward
+      !> Range in which it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
       real(wp) :: upper, lower, end_time
@@ -165,7 +165,7 @@ contains
    subroutine respond(self, before, after)
       !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       real(wp) :: breaks
@@ -195,7 +195,7 @@ contains
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
@@ -215,14 +215,14 @@ contains
       class(contact_ageing_type), intent(inout) :: self
       !> The schedule, as far as the slider came
       type(schedule_type), intent(inout) :: schedule
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%now = pose%time
       self%duration = 0.0_wp
       self%acceleration_jump = 0.0_wp
       call settle_steady(self, schedule)
-      ! What broke a moment ago and attaches at once was not in the schedule.
+      ! A contact that broke a moment ago and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
@@ -269,7 +269,7 @@ contains
       class(contact_ageing_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%life(life_birth, contact) = pose%time
@@ -290,7 +290,7 @@ contains
    subroutine assign(self, contact, displacement, time)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Where the slider is [m], and when that is [s]
+      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
 
       self%kept(contact) = in_queue

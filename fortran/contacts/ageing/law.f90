@@ -35,7 +35,7 @@ module mesoslip_contacts_ageing_law
       real(wp) :: inverse_time = 1.0_wp
       !> Age of the contacts at the start of a run [s]
       real(wp) :: initial_age = 0.0_wp
-      !> What the young lack, over the mean: of the mean, and of each deviation from it
+      !> Deficit of young contacts, over the mean: of the mean, and of each deviation from it
       real(wp) :: mean_lack = 0.0_wp, width_lack = 0.0_wp
       !> Growth of the law `log` for each e-fold of the age
       real(wp) :: growth = 0.0_wp
@@ -44,7 +44,7 @@ module mesoslip_contacts_ageing_law
       procedure, non_overridable :: evaluate
       !> Threshold at an age
       procedure, non_overridable :: threshold
-      !> What the rate changes by in a second
+      !> Change of the rate in a second
       procedure, non_overridable :: bend
       !> Configured threshold of the contacts that break at an age under a force
       procedure, non_overridable :: configured
@@ -54,7 +54,7 @@ module mesoslip_contacts_ageing_law
       procedure, non_overridable :: acts
       procedure, non_overridable :: is_constant
       procedure, non_overridable :: is_old
-      !> What the threshold of a contact lacks at birth
+      !> Deficit of the threshold of a contact at birth
       procedure, non_overridable :: lack
    end type ageing_law_type
 
@@ -136,7 +136,7 @@ contains
       end if
    end subroutine evaluate
 
-   !> What the rate of a threshold changes by in a second.
+   !> Change of the rate of a threshold in a second.
    elemental function bend(self, rate, age)
       !> The law
       class(ageing_law_type), intent(in) :: self
@@ -149,13 +149,13 @@ contains
       if (self%kind == ageing_log) bend = -rate / (self%time + age)
    end function bend
 
-   !> What the threshold of a contact lacks at birth.
+   !> Deficit of the threshold of a contact at birth.
    elemental function lack(self, configured, mean)
       !> The law
       class(ageing_law_type), intent(in) :: self
       !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
-      !> What it lacks, in that unit
+      !> The deficit, in that unit
       real(wp) :: lack
 
       lack = self%mean_lack * mean + self%width_lack * (configured - mean)

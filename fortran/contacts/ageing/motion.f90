@@ -2,7 +2,7 @@
 !>
 !> Where the velocity of the slider changes, they are queued for twice its speed: a slower slider
 !> takes longer, and a threshold that grows is then higher, so that a contact does not break before.
-!> When the slider becomes faster than the speed of the queue, all are solved anew.
+!> When the slider becomes faster than the speed of the queue, all are solved again.
 module mesoslip_contacts_ageing_motion
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, safety
    use mesoslip_contacts_ageing_steady, only: begin_steady, end_steady
@@ -55,7 +55,7 @@ contains
          call self%order_all(pose)
       else if (self%solved > self%parameters%count &
          & .and. max_speed_ratio * max(abs(pose%velocity), least) < self%speed) then
-         ! What is queued for a higher speed is so for a lower one as well.
+         ! A contact that is queued for a higher speed is queued for a lower one as well.
          self%speed = max(set_ratio * abs(pose%velocity), least)
          self%solved = 0
       end if

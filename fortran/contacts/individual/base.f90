@@ -70,7 +70,7 @@ module mesoslip_contacts_individual_base
       !> Attach all contacts that are due
       procedure, non_overridable :: attach_due
       !> Sort all contacts again, from the records
-      procedure, non_overridable :: order_anew
+      procedure, non_overridable :: rebuild_queue
       !> Maximum coordinate at which any contact breaks after a reversal
       procedure, non_overridable :: max_behind
       !> Window between two coordinates
@@ -454,7 +454,7 @@ contains
    end subroutine attach_listed
 
    !> Sort all contacts again, from the records.
-   subroutine order_anew(self, displacement)
+   subroutine rebuild_queue(self, displacement)
       !> The contacts
       class(individual_contacts_type), intent(inout) :: self
       !> Displacement of the slider [m]
@@ -462,7 +462,7 @@ contains
 
       call self%rebuild(displacement)
       self%behind = self%max_behind()
-   end subroutine order_anew
+   end subroutine rebuild_queue
 
    !> Maximum coordinate at which any contact breaks after a reversal.
    pure function max_behind(self) result(coordinate)
@@ -508,7 +508,7 @@ contains
       end do
       call self%sum_totals()
       call self%shift_order(shift)
-      call self%order_anew(displacement)
+      call self%rebuild_queue(displacement)
    end subroutine shift_origin
 
    !> Shift the origin in the data of a kind other than the records; by default there are none.

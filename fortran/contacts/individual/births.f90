@@ -54,7 +54,7 @@ contains
    subroutine allocate_draws(self, parameters, error)
       !> The births
       class(births_type), intent(inout) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -75,7 +75,7 @@ contains
    subroutine draw_all(self, parameters, state, record)
       !> The births
       class(births_type), intent(inout) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> One of the initial_ codes
       integer, intent(in) :: state
@@ -157,7 +157,7 @@ contains
       class(births_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Records of the contacts, shape (record_length, count)
       real(wp), intent(inout), contiguous :: record(:, :)
@@ -176,7 +176,7 @@ contains
    subroutine draw(self, parameters, record)
       !> The births
       class(births_type), intent(inout) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Records of the contacts, shape (record_length, count)
       real(wp), intent(inout), contiguous :: record(:, :)
@@ -210,7 +210,7 @@ contains
 
    !> Stiffness and breaking stretch of a contact that is born with a relative threshold.
    pure subroutine bear(parameters, threshold, stiffness, limit)
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Relative threshold, or break stretch where stiffnesses are those of a table
       real(wp), intent(in) :: threshold
@@ -227,7 +227,7 @@ contains
 
    !> The same where the stiffness follows from the threshold.
    pure subroutine bear_by_rule(parameters, threshold, stiffness, limit)
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Relative threshold
       real(wp), intent(in) :: threshold
@@ -256,7 +256,7 @@ contains
    !>
    !> A contact whose force is not below its threshold could not attach: both are drawn again.
    subroutine draw_forces(parameters, key, renewal, threshold, force)
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Keys of the contacts, which count from 0, and numbers of their births; shape (contacts)
       integer(i8), intent(in), contiguous :: key(:), renewal(:)
@@ -300,7 +300,7 @@ contains
    !> Their number is proportional to u - b, and their forces are uniform in between. A threshold is
    !> drawn with the weight 2 u, and b; they are accepted with the probability (u - b)/(2 u).
    pure subroutine draw_sliding(parameters, carried, contact, threshold, force)
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Law of thresholds with the weight of the distance from no force to breaking
       type(carried_law_type), intent(in) :: carried
@@ -331,7 +331,7 @@ contains
 
    !> Drag of a contact while it is detached.
    pure function drag_of(parameters, stiffness) result(drag)
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Stiffness of the contact [N/m]
       real(wp), intent(in) :: stiffness

@@ -117,7 +117,7 @@ contains
    pure subroutine push_heap(self, contact, value)
       class(detached_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> What is kept for it
+      !> Its record
       real(wp), intent(in) :: value(length)
 
       integer :: place
@@ -132,7 +132,7 @@ contains
    pure subroutine push_sorted(self, contact, value)
       class(detached_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> What is kept for it
+      !> Its record
       real(wp), intent(in) :: value(length)
 
       integer :: place, number, moved

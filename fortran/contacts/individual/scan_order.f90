@@ -223,7 +223,7 @@ contains
    pure subroutine due(self, reading, contact)
       !> The order
       class(scan_order_type), intent(inout) :: self
-      !> What the key is not above
+      !> Upper bound of the key
       real(wp), intent(in) :: reading
       !> Number of the contact, which stays; 0 if none is due
       integer, intent(out) :: contact

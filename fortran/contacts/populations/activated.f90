@@ -1,4 +1,4 @@
-!> What breaks of pinned populations by thermal activation while the slider moves.
+!> Breaks of pinned populations by thermal activation while the slider moves.
 !>
 !> Contacts of all populations break all the time. What is left of a population follows from the
 !> maximum force on it and the level of its hazard, so that it does not depend on steps. Of what
@@ -34,7 +34,7 @@ module mesoslip_contacts_populations_activated
       !> Whether they do, and how
       logical :: is_activated = .false.
       type(activation_type) :: activation
-      !> What it leaves of contacts, and of those whose thresholds change with age
+      !> Fraction of contacts that survives it, and of those whose thresholds change with age
       type(survivors_type), private :: survivors
       type(threshold_nodes_type), private :: nodes
       !> Time in which contacts join a population [s]
@@ -83,7 +83,7 @@ contains
    subroutine try_motion(self, before, after, displacement, late, onset)
       !> The populations
       class(activated_populations_type), intent(inout) :: self
-      !> Where the slider is, and where it comes to
+      !> Pose of the slider, and where it comes to
       type(pose_type), intent(in) :: before, after
       !> Displacement until which contacts are found that come to their thresholds, not less far [m]
       real(wp), intent(in) :: displacement
@@ -176,7 +176,7 @@ contains
       !> Forces on the contacts before and after, and to which contacts are found that come to their
       !> thresholds
       real(wp), intent(in) :: forces(3)
-      !> What is left of its contacts without activation in the motion, and with it
+      !> Fraction of its contacts that survives the motion without activation, and with it
       real(wp), intent(out) :: cut, left
 
       real(wp) :: moments(moments_length)
@@ -249,7 +249,7 @@ contains
       end associate
    end function first_break_force
 
-   !> What is left of the contacts of a population over its weight.
+   !> Surviving contacts of a population over its weight.
    pure function number_left(self, row) result(left)
       class(activated_populations_type), intent(in) :: self
       integer, intent(in) :: row
@@ -327,7 +327,7 @@ contains
       integer, intent(in) :: row
       !> Where and when they attach [m] and [s], how many they are, and the force on them
       real(wp), intent(in) :: origin, birth, contacts, force
-      !> Where the slider is [m], and when that is [s]
+      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
       !> Elastic energy that is lost by giving all of them one origin [J]
       real(wp), intent(inout) :: energy

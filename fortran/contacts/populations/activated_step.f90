@@ -45,7 +45,7 @@ contains
    subroutine expect_motion(self, pose, expected, is_quiet)
       !> The populations
       class(population_state_type), intent(in) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The same, with the motion that is expected
       type(pose_type), intent(out) :: expected
@@ -70,14 +70,14 @@ contains
       & limit, births)
       !> The populations
       class(population_state_type), intent(inout) :: self
-      !> Where the slider is, and its expected motion
+      !> Pose of the slider, and its expected motion
       type(pose_type), intent(in) :: pose
       !> The direction in which the slider moves, and contacts that may attach in a step
       real(wp), intent(in) :: direction, max_births
       !> Duration of the step [s], expected displacement in it, displacement until which breaks at
       !> thresholds are found, and largest displacement of the step [m]
       real(wp), intent(inout) :: span, distance, reach, limit
-      !> What attaches in it
+      !> Contacts that attach in it
       type(expected_births_type), intent(inout) :: births
 
       real(wp) :: late, onset, part, heat, own, max_heat
@@ -119,13 +119,13 @@ contains
          may_end_early = .true.
       end do
       births%own_mass = births%own
-      ! What breaks and attaches by activation does so evenly in time.
+      ! Contacts break and attach by activation evenly in time.
       births%number = births%number + own * heat
       births%mass = births%mass + own * heat
 
    contains
 
-      !> Where the slider is expected at the end of the step.
+      !> Pose of the slider expected at the end of the step.
       pure function pose_after() result(after)
          type(pose_type) :: after
 

@@ -29,15 +29,15 @@ module mesoslip_contacts_populations_activation
       real(wp), private :: stretch = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
    contains
-      !> What a motion adds to levels
+      !> Increase of levels in a motion
       procedure, non_overridable :: growth
-      !> What a motion adds to a level, the level after it, and after a time under a force
+      !> Increase of a level in a motion, the level after it, and after a time under a force
       procedure, non_overridable :: added
       procedure, non_overridable :: level_after
       procedure, non_overridable :: newborn_level
    end type activation_type
 
-   !> What a motion of the slider adds to the levels of populations, over its force at the start.
+   !> Increase of the levels of populations in a motion of the slider, over its force at the start.
    type :: growth_type
       !> Of those under positive force, and under negative force
       real(wp), private :: level(2) = no_level
@@ -65,13 +65,13 @@ contains
       call gauss_legendre(self%point, self%weight)
    end function new_activation
 
-   !> What a motion adds to levels.
+   !> Increase of levels in a motion.
    pure function growth(self, before, after)
       !> How populations are activated
       class(activation_type), intent(in) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
-      !> What is added
+      !> The increase
       type(growth_type) :: growth
 
       real(wp) :: duration, exponent(points), hazard(points), place, most, sign
@@ -96,7 +96,7 @@ contains
 
    !> Mean time of the hazard in a motion, over its duration.
    elemental function mean_time(self, start_force, end_force) result(time)
-      !> What the motion adds
+      !> The increase
       class(growth_type), intent(in) :: self
       !> Forces on the contacts before and after
       real(wp), intent(in) :: start_force, end_force
@@ -108,11 +108,11 @@ contains
       end if
    end function mean_time
 
-   !> What a motion adds to the level of a population.
+   !> Increase of the level of a population in a motion.
    elemental function added(self, growth, start_force, end_force) result(more)
       !> How populations are activated
       class(activation_type), intent(in) :: self
-      !> What the motion adds
+      !> The increase
       type(growth_type), intent(in) :: growth
       !> Forces on the contacts before and after
       real(wp), intent(in) :: start_force, end_force
@@ -138,7 +138,7 @@ contains
    elemental function level_after(self, growth, level, start_force, end_force) result(after)
       !> How populations are activated
       class(activation_type), intent(in) :: self
-      !> What the motion adds
+      !> The increase
       type(growth_type), intent(in) :: growth
       !> Level before it, and forces on the contacts before and after
       real(wp), intent(in) :: level, start_force, end_force

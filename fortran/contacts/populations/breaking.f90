@@ -1,4 +1,4 @@
-!> What breaks of pinned populations until the slider comes to a displacement.
+!> Breaks of pinned populations until the slider comes to a displacement.
 !>
 !> It is tried first: the slider is offered a force by what will break. It breaks when the slider
 !> has come there.
@@ -25,7 +25,7 @@ module mesoslip_contacts_populations_breaking
    !> A gap that counts as none, over the length of a step.
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
-   !> What breaks until a displacement and time in a direction.
+   !> Breaks until a displacement and time in a direction.
    type :: trial_type
       !> The displacement [m], time [s] and direction
       real(wp) :: end = 0.0_wp, time = 0.0_wp, direction = 1.0_wp
@@ -52,7 +52,7 @@ module mesoslip_contacts_populations_breaking
    type, extends(population_rows_type) :: breaking_populations_type
       !> Maximum displacement in which one population attaches [m]
       real(wp) :: step = 0.0_wp
-      !> What was found to break
+      !> Contacts found to break
       type(trial_type) :: trial
    contains
       !> Find what breaks until the slider comes to a displacement, whether that is known, forget it
@@ -72,7 +72,7 @@ contains
    subroutine try(self, before, displacement, time, direction, late, onset)
       !> The populations
       class(breaking_populations_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: before
       !> Where it comes to [m] and when [s], and in which direction it goes
       real(wp), intent(in) :: displacement, time, direction
@@ -179,7 +179,7 @@ contains
    !> Sums over what breaks: contacts, mass, work and force.
    subroutine sum_breaks(self, before, column, late, onset)
       class(breaking_populations_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: before
       !> The column that is about the direction
       integer, intent(in) :: column

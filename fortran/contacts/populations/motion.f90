@@ -16,7 +16,7 @@ contains
 
    !> Time in which the slider will move by a distance, or turn round; huge if it does not move.
    pure function time_to_move(pose, direction, distance) result(time)
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The direction and the distance [m]
       real(wp), intent(in) :: direction, distance
@@ -38,7 +38,7 @@ contains
 
    !> Distance that the slider will move in a time, in its direction.
    pure function distance_in(pose, direction, time) result(distance)
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The direction and the time [s]
       real(wp), intent(in) :: direction, time
@@ -53,7 +53,7 @@ contains
 
    !> Mean displacement in a step above that of its ends [m].
    pure function excess_of_mean(before, after) result(excess)
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
       real(wp) :: excess
 
@@ -75,7 +75,7 @@ contains
 
    !> Where the slider was at a time of its last motion, by Hermite's interpolation [m].
    pure function position_at(before, after, time) result(displacement)
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
       !> The time [s]
       real(wp), intent(in) :: time

@@ -1,4 +1,4 @@
-!> What thermal activation leaves of contacts whose thresholds change with age, by threshold.
+!> Survival of contacts whose thresholds change with age under thermal activation, by threshold.
 !>
 !> A contact of the configured threshold u has the threshold a + b u at an age, with a and b that
 !> are those of its population. Its integrated hazard is a sum of exp((f - a - b u)/theta) over the
@@ -60,7 +60,7 @@ module mesoslip_contacts_populations_nodes
    contains
       !> How many contacts are left
       procedure, non_overridable :: left
-      !> What a motion leaves, and a time after attaching
+      !> Fraction that survives a motion, and a time after attaching
       procedure, non_overridable :: pass
       procedure, non_overridable :: pass_newborn
       procedure, non_overridable, private :: place_panels, panel_of, break_some, pass_ages
@@ -232,14 +232,14 @@ contains
       if (all > 0.0_wp) left = number * max(0.0_wp, min(1.0_wp, some / all))
    end function left
 
-   !> What a motion leaves of the contacts of a population.
+   !> Fraction of the contacts of a population that survives a motion.
    subroutine pass(self, activation, growth, before, after, birth, force, broken, kept)
       !> The nodes
       class(threshold_nodes_type), intent(in) :: self
       !> How contacts are activated, and what the motion adds to levels
       type(activation_type), intent(in) :: activation
       type(growth_type), intent(in) :: growth
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
       !> When the contacts attached [s], and the forces on them before and after
       real(wp), intent(in) :: birth, force(2)
@@ -267,7 +267,7 @@ contains
       end if
    end subroutine pass
 
-   !> What the time since they attached leaves of contacts.
+   !> Fraction of contacts that survives the time since they attached.
    subroutine pass_newborn(self, rate, duration, force, kept)
       !> The nodes
       class(threshold_nodes_type), intent(in) :: self

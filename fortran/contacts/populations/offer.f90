@@ -40,11 +40,11 @@ contains
    subroutine offer_step(self, pose, law, window)
       !> The populations
       class(population_state_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
       type(interface_law_type), intent(out) :: law
-      !> Where it holds
+      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack, growing
@@ -134,7 +134,7 @@ contains
 
    !> Let a window end where a step does, ahead and where the slider turns round.
    pure subroutine end_at_reach(pose, direction, reach, slack, breaks, is_quiet, window)
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The direction in which it goes, the largest displacement of the step, and by how much a
       !> slider that rests or hardly oscillates may go back [m]
@@ -281,7 +281,7 @@ contains
    !> which direction contacts break.
    pure function is_in_balance(self, pose, slack) result(is_balanced)
       class(population_state_type), intent(in) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Distance in which it may come to rest [m]
       real(wp), intent(in) :: slack
@@ -300,7 +300,7 @@ contains
    !> By how much a chord may lie above the true force at its start [N]: a slider that begins to
    !> move goes on, or it would turn round at once, again and again.
    pure function max_shift(pose, direction, distance) result(force)
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> In which direction it goes, and how far in the step [m]
       real(wp), intent(in) :: direction, distance
@@ -341,7 +341,7 @@ contains
    !> force has a kink: the displacement ends there.
    subroutine try(self, pose, direction, distance)
       class(population_state_type), intent(inout) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> In which direction it goes
       real(wp), intent(in) :: direction

@@ -28,7 +28,7 @@ module mesoslip_contacts_populations_packets
    !> Packets for which there is room at first
    integer, parameter :: initial_packets = 64
 
-   !> What is expected to attach in a step.
+   !> Contacts expected to attach in a step.
    type :: expected_births_type
       !> How many contacts, and their mass
       real(wp) :: number = 0.0_wp, mass = 0.0_wp
@@ -66,7 +66,7 @@ module mesoslip_contacts_populations_packets
       procedure, non_overridable :: add
       !> Whether none waits to attach
       procedure, non_overridable :: is_empty
-      !> What will attach in a step, and what part of what breaks in it
+      !> Contacts that will attach in a step, and the part of its breaks that attaches in it
       procedure, non_overridable :: expect
       procedure, non_overridable :: own_part
       !> Take out what is due to attach
@@ -82,7 +82,7 @@ contains
    subroutine new_detached_packets(self, parameters)
       !> The packets
       type(detached_packets_type), intent(out) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
 
       self%delay = parameters%delay
@@ -162,7 +162,7 @@ contains
       if (index == self%first) early = early + self%first_part * (late - early)
    end subroutine due_times
 
-   !> What will attach in a step, and until when it may last for it.
+   !> Contacts that will attach in a step, and how long it may last for that.
    subroutine expect(self, time, duration, max_births, breaks, births)
       !> The packets
       class(detached_packets_type), intent(in) :: self
@@ -172,7 +172,7 @@ contains
       real(wp), intent(in) :: max_births
       !> Whether contacts break in the step
       logical, intent(in) :: breaks
-      !> What is expected
+      !> The expectation
       type(expected_births_type), intent(out) :: births
 
       real(wp) :: early, late, until, left
@@ -196,14 +196,14 @@ contains
          call add_even(left, self%packet(row_mass, index) / self%packet(row_number, index))
          if (births%end_time < huge(1.0_wp)) return
          if (late >= time + duration) then
-            ! What is expected holds for about the time the slider is expected to take.
+            ! The expectation holds for about the time the slider is expected to take.
             births%end_time = max(time + patience * duration, nearest(time, 1.0_wp))
             return
          end if
          until = late
       end do
       if (self%reattach .and. self%delay < duration .and. breaks) then
-         ! What breaks in this step starts to attach in it.
+         ! Contacts that break in this step start to attach in it.
          births%end_time = min(births%end_time, max(time + patience * duration, &
             & nearest(time, 1.0_wp)))
       else if (births%number > 0.0_wp) then
@@ -240,7 +240,7 @@ contains
    subroutine take_due(self, before, after, births, moment, when)
       !> The packets
       class(detached_packets_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
       !> How many they are, and sums over them of the displacement [m] and of the time [s] at which
       !> they are due
@@ -297,7 +297,7 @@ contains
       end if
    end function own_part
 
-   !> What will attach in a step where delays are exponential; see expect.
+   !> Contacts that will attach in a step where delays are exponential; see expect.
    subroutine expect_random(self, time, duration, max_births, breaks, births)
       class(detached_packets_type), intent(in) :: self
       real(wp), intent(in) :: time, duration, max_births
@@ -335,7 +335,7 @@ contains
 
       duration = after%time - before%time
       ratio = duration / self%delay
-      ! What was detached at the start of the step, and what broke in it.
+      ! Contacts detached at the start of the step, and those that broke in it.
       part = [attached_part(ratio), own_attached_part(ratio)]
       time = before%time + duration * [mean_attached_time(ratio), mean_own_time(ratio)]
       number = part * [max(0.0_wp, self%number%total() - self%fresh(1)), self%fresh(1)]

@@ -59,7 +59,7 @@ contains
    subroutine new_pinned_populations(self, parameters, resolution)
       !> The populations
       type(pinned_populations_type), intent(out) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Length of a step over the spread of the breaking stretches, positive
       real(wp), intent(in) :: resolution
@@ -256,7 +256,7 @@ contains
       class(pinned_populations_type), intent(inout) :: self
       !> How many they are, the sum of their displacements [m], and the direction of their forces
       real(wp), intent(in) :: births, moment, direction
-      !> Where the slider is [m], when the contacts attached on average, and when that is [s]
+      !> Displacement [m], mean time at which the contacts attached, and time [s]
       real(wp), intent(in) :: displacement, birth, time
       !> Elastic energy that is lost as contacts join others [J]
       real(wp), intent(out) :: lost

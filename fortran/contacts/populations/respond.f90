@@ -1,4 +1,4 @@
-!> What populations do when the slider has moved: contacts break, and others attach.
+!> Response of populations to a motion of the slider: contacts break, and others attach.
 module mesoslip_contacts_populations_respond
    use mesoslip_contacts_populations_motion, only: excess_of_mean
    use mesoslip_contacts_populations_state, only: population_state_type
@@ -21,7 +21,7 @@ contains
    subroutine respond_to_motion(self, before, after)
       !> The populations
       class(population_state_type), intent(inout) :: self
-      !> Where the slider was, and where it is
+      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       type(pose_type) :: start, end

@@ -6,10 +6,11 @@
 !>
 !> Thresholds may change with the age of a population. What has broken of it is then given by the
 !> configured threshold of the last contact that did, as contacts of one age and force break in its
-!> order. It is found anew at the end of each step, from the force and the age.
+!> order. It is found again at the end of each step, from the force and the age.
 !>
-!> Of contacts with the stiffnesses of a table no threshold tells what has broken: a population
-!> remembers how far the slider was ahead of its origin and behind it, where it breaks next.
+!> With the stiffnesses of a table, the threshold alone does not determine which contacts have
+!> broken: a population keeps how far the slider was ahead of its origin and behind it, where it
+!> breaks next.
 !>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations_rows
@@ -74,7 +75,7 @@ module mesoslip_contacts_populations_rows
       !> Since when all contacts age that are attached [s]
       real(wp) :: last_birth = 0.0_wp
 
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type) :: parameters
       !> Distance of a mean threshold f_s/k [m]
       real(wp) :: stretch = 1.0_wp
@@ -124,7 +125,7 @@ contains
    subroutine new_population_rows(self, parameters)
       !> The populations
       class(population_rows_type), intent(inout) :: self
-      !> What the contacts are made of
+      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters
@@ -141,7 +142,7 @@ contains
       integer, intent(in) :: law
       !> Threshold below which they have broken before; distance up to which they have of a table
       real(wp), intent(in) :: broken
-      !> Where the slider is [m]: what is due to break there does so when the slider moves on
+      !> Displacement of the slider [m]: contacts due to break there do so when it moves on
       real(wp), intent(in) :: displacement
       !> When it attached, and when that is [s]
       real(wp), intent(in) :: birth, time
@@ -243,7 +244,7 @@ contains
    subroutine update_thresholds(self, displacement, time)
       !> The populations
       class(population_rows_type), intent(inout) :: self
-      !> Where the slider is [m], and when that is [s]
+      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
 
       real(wp) :: threshold, rate

@@ -1,4 +1,4 @@
-!> What populations of contacts consist of while a slider moves: pinned ones, detached ones, and the
+!> State of populations of contacts while a slider moves: pinned ones, detached ones, and the
 !> force that the slider was offered.
 module mesoslip_contacts_populations_state
    use mesoslip_contacts_base, only: contacts_type
@@ -53,7 +53,7 @@ contains
    pure function oscillation_rate(self, pose) result(rate)
       !> The populations
       class(population_state_type), intent(in) :: self
-      !> Where the slider is
+      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The rate, 0 for a slider of which the motion is prescribed
       real(wp) :: rate

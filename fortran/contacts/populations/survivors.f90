@@ -1,4 +1,4 @@
-!> What thermal activation leaves of contacts of all thresholds that have gone through the same.
+!> Survival of contacts of all thresholds under thermal activation, for one history.
 !>
 !> A contact of the relative threshold u has the integrated hazard exp((e - u)/theta), where theta
 !> is f_T/f_s and the level e is the same for all contacts of a population. It has broken at once
@@ -53,7 +53,7 @@ module mesoslip_contacts_populations_survivors
       real(wp) :: threshold(max_nodes) = 0.0_wp, share(max_nodes) = 0.0_wp, rest = 0.0_wp
    end type nodes_type
 
-   !> What activation leaves of contacts of a law.
+   !> Fraction of the contacts of a law that survives activation.
    type :: survivors_type
       !> f_T/f_s
       real(wp), private :: width = 1.0_wp
@@ -362,7 +362,7 @@ contains
       left = min(left, number)
    end function left
 
-   !> What is left of contacts that do not depend on b.
+   !> Survivors that do not depend on b.
    pure function free_share(self, level) result(share)
       class(survivors_type), intent(in) :: self
       real(wp), intent(in) :: level
@@ -409,7 +409,7 @@ contains
          & + t**2 * ((1.0_wp + 2.0_wp * s) * end_value - s * end_slope)
    end function cubic
 
-   !> What is left of those above b, by the table.
+   !> Survivors above b, by the table.
    pure function table_share(self, broken, level) result(share)
       class(survivors_type), intent(in) :: self
       real(wp), intent(in) :: broken, level
@@ -485,7 +485,7 @@ contains
       end if
    end function loss_above
 
-   !> What is left of contacts whose thresholds have a constant density in cells.
+   !> Survivors whose thresholds have a constant density in cells.
    pure function cell_share(self, broken, level) result(left)
       class(survivors_type), intent(in) :: self
       real(wp), intent(in) :: broken, level

@@ -1,8 +1,8 @@
-!> What is left of populations whose contacts have the stiffnesses of a table.
+!> Survival of populations whose contacts have the stiffnesses of a table.
 !>
 !> A population that attached with the force phi breaks forward in the order of x_s - phi/k, and
-!> backward in that of x_s + phi/k. These are two orders if stiffnesses differ, so that no threshold
-!> tells what is left: it depends on how far the slider was ahead of the origin and behind it.
+!> backward in that of x_s + phi/k. If stiffnesses differ these are two orders, so that no threshold
+!> separates the survivors: they depend on how far the slider was ahead of the origin and behind it.
 !> Dimensionless as in mesoslip_contacts_mechanics.
 module mesoslip_contacts_populations_table_lives
    use mesoslip_contacts_life_moments, only: life_moments_type, new_life_moments
@@ -32,7 +32,7 @@ module mesoslip_contacts_populations_table_lives
       type(life_moments_type) :: moments
    end type forced_type
 
-   !> What is left of populations.
+   !> Surviving fraction of populations.
    type :: table_lives_type
       !> By the law of the population
       type(forced_type), allocatable, private :: law(:)
@@ -150,13 +150,13 @@ contains
 
       real(wp) :: force
 
-      ! What is left has x_s > d + phi/k, and breaks in the other direction after x_s + phi/k.
+      ! Survivors have x_s > d + phi/k, and break in the other direction after x_s + phi/k.
       force = sign(1.0_wp, direction) * self%law(law)%force
       opposite_distance = distance + 2.0_wp * force &
          & / merge(self%max_stiffness, self%min_stiffness, force > 0.0_wp)
    end function min_opposite
 
-   !> What is left of a population.
+   !> Surviving fraction of a population.
    pure subroutine left(self, law, ahead, behind, moments)
       !> The lives
       class(table_lives_type), intent(in) :: self
@@ -189,7 +189,7 @@ contains
          & + force**2 * all(inverse_k), all(k_squared) / self%mean_square]
    end subroutine left
 
-   !> What is left of a population where some contacts depend on either direction.
+   !> Surviving fraction of a population where some contacts depend on either direction.
    pure subroutine sum_cells(self, law, ahead, behind, moments)
       class(table_lives_type), intent(in) :: self
       integer, intent(in) :: law

@@ -1,4 +1,4 @@
-!> What every threshold law offers: thresholds to draw, density and survival function.
+!> Interface of every threshold law: thresholds to draw, density and survival function.
 !>
 !> Thresholds are relative, u = f_si/f_s. A law has mean 1 before thresholds that could not attach,
 !> u <= minimum, are rejected. Rejecting is done by inversion: the law that is left is the same as
@@ -36,7 +36,7 @@ module mesoslip_contacts_threshold_laws_base
       !> proportional to squares
       real(wp) :: mean_square_stiffness = 1.0_wp
    contains
-      !> Take what the law is made of
+      !> Take the parameters of the law
       procedure(take_interface), deferred :: take
       !> Quantile, density and survival function before rejection
       procedure(function_interface), deferred :: plain_quantile
@@ -65,7 +65,7 @@ module mesoslip_contacts_threshold_laws_base
    end type threshold_law_type
 
    abstract interface
-      !> Take what the law is made of.
+      !> Take the parameters of the law.
       subroutine take_interface(self, parameters, error)
          import :: error_type, parameters_type, threshold_law_type
          implicit none

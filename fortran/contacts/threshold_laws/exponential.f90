@@ -20,7 +20,7 @@ module mesoslip_contacts_threshold_laws_exponential
 
 contains
 
-   !> Take what the law is made of.
+   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
       !> The law
       class(exponential_law_type), intent(inout) :: self

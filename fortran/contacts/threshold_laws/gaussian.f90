@@ -26,7 +26,7 @@ module mesoslip_contacts_threshold_laws_gaussian
 
 contains
 
-   !> Take what the law is made of.
+   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
       !> The law
       class(gaussian_law_type), intent(inout) :: self

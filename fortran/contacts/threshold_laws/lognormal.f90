@@ -25,7 +25,7 @@ module mesoslip_contacts_threshold_laws_lognormal
 
 contains
 
-   !> Take what the law is made of.
+   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
       !> The law
       class(lognormal_law_type), intent(inout) :: self

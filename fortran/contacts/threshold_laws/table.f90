@@ -41,7 +41,7 @@ module mesoslip_contacts_threshold_laws_table
 
 contains
 
-   !> Take what the law is made of.
+   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
       !> The law
       class(table_law_type), intent(inout) :: self

@@ -23,7 +23,7 @@ module mesoslip_contacts_threshold_laws_uniform
 
 contains
 
-   !> Take what the law is made of.
+   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
       !> The law
       class(uniform_law_type), intent(inout) :: self

@@ -22,7 +22,7 @@ module mesoslip_contacts_threshold_laws_weibull
 
 contains
 
-   !> Take what the law is made of.
+   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
       !> The law
       class(weibull_law_type), intent(inout) :: self

@@ -254,7 +254,7 @@ contains
       class(cvode_type), intent(inout) :: self
       !> Status that SUNDIALS returned
       integer(c_int), intent(in) :: status
-      !> What was done
+      !> The call
       character(len=*), intent(in) :: what
       type(error_type), allocatable, intent(inout) :: error
 
@@ -289,7 +289,7 @@ contains
       self%matrix = c_null_ptr
    end subroutine close
 
-   !> Version of the SUNDIALS library in use; empty if it does not tell.
+   !> Version of the SUNDIALS library in use; empty if unknown.
    function sundials_version() result(version)
       !> Such as 6.4.1
       character(len=:), allocatable :: version

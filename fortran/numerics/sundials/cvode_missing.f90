@@ -1,4 +1,4 @@
-!> What stands for CVODE in a build without SUNDIALS: it cannot be opened.
+!> Stand-in for CVODE in a build without SUNDIALS: it cannot be opened.
 module mesoslip_numerics_sundials_cvode
    use, intrinsic :: iso_c_binding, only: c_double, c_funptr, c_long, c_ptr
    use mesoslip_numerics_errors, only: error_type, raise, status_failed

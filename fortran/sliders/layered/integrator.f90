@@ -1,7 +1,7 @@
 !> CVODE for a chain of layers: the reference for the series, and for systems so stiff that the
 !> fastest rate has no part in the motion.
 !>
-!> It starts anew after each event, and events are found in the polynomial of each of its steps.
+!> It restarts after each event, and events are found in the polynomial of each of its steps.
 module mesoslip_sliders_layered_integrator
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
    use mesoslip_numerics_errors, only: error_type
@@ -15,13 +15,13 @@ module mesoslip_sliders_layered_integrator
 
    !> Half the bandwidth of the Jacobian, with displacements and velocities in turn.
    integer, parameter :: half_bandwidth = 3
-   !> Steps without an event after which it starts anew, so that a run can be put away: as many as
+   !> Steps without an event after which it restarts, so that a run can be put away: as many as
    !> take about a second with very many layers, within bounds
    integer, parameter :: min_steps = 200, max_steps = 2000, max_layer_steps = 1000000
 
    !> CVODE with a state of its own.
    type :: integrator_type
-      !> Whether it has to start anew
+      !> Whether it has to restart
       logical :: is_stale = .true.
       type(cvode_type), private :: cvode
       !> State in CVODE's order, and the time from which its time counts
@@ -29,7 +29,7 @@ module mesoslip_sliders_layered_integrator
       real(wp), private :: start_time = 0.0_wp
       !> CVODE's time, which has more digits than the time of the run
       real(wp), private :: local_time = 0.0_wp
-      !> Steps since it started anew
+      !> Steps since it restarted
       integer, private :: steps = 0
       !> Steps, evaluations and failed steps before the run was put away
       integer(i8), private :: counts_before(3) = 0_i8
@@ -38,7 +38,7 @@ module mesoslip_sliders_layered_integrator
       procedure, non_overridable :: step
       !> Take note that a step was used
       procedure, non_overridable :: end_step
-      !> Start anew at the next step, with counts of an earlier run
+      !> Restart at the next step, with counts of an earlier run
       procedure, non_overridable :: reset
       !> Free what it holds
       procedure, non_overridable :: close
@@ -95,7 +95,7 @@ contains
       self%local_time = reached
    end subroutine step
 
-   !> Start CVODE anew from the state.
+   !> Restart CVODE from the state.
    subroutine restart(self, system, state, time, error)
       class(integrator_type), intent(inout) :: self
       type(system_type), intent(in), target :: system
@@ -139,7 +139,7 @@ contains
       counts = self%counts_before + int(self%cvode%counts(), i8)
    end subroutine end_step
 
-   !> Start anew at the next step, with counts of an earlier run.
+   !> Restart at the next step, with counts of an earlier run.
    subroutine reset(self, counts)
       !> The integrator
       class(integrator_type), intent(inout) :: self

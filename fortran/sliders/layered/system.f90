@@ -16,7 +16,7 @@ module mesoslip_sliders_layered_system
    character(len=*), parameter :: solver_names(3) = [character(len=6) :: "series", "adams", "bdf"]
    integer, parameter :: solver_codes(3) = [solver_series, solver_adams, solver_bdf]
 
-   !> What the slider is made of.
+   !> Parameters of the slider.
    type :: layered_parameters_type
       !> Number of layers
       integer :: layers = 1
@@ -46,7 +46,7 @@ contains
 
    !> The system of a slider.
    pure function new_system(parameters) result(system)
-      !> What the slider is made of
+      !> Parameters of the slider
       type(layered_parameters_type), intent(in) :: parameters
       !> The system
       type(system_type) :: system

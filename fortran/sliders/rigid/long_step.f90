@@ -60,7 +60,7 @@ contains
       end if
 
       if (.not. step > 0.0_wp) then
-         ! What is observed of a step without length is its start.
+         ! A step without length is observed at its start.
          self%series = 0.0_wp
          self%series(:1) = [early%velocity, early%acceleration]
          self%start_acceleration = early%acceleration

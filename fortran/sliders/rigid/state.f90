@@ -51,7 +51,7 @@ module mesoslip_sliders_rigid_state
 
 contains
 
-   !> What in the equation of motion does not change with the contacts.
+   !> Terms of the equation of motion that do not change with the contacts.
    pure function constants(self) result(system)
       class(rigid_state_type), intent(in) :: self
       type(system_type) :: system
@@ -93,7 +93,7 @@ contains
       motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
    end function rates
 
-   !> What there is to note at the end of any step.
+   !> Observations at the end of any step.
    subroutine arrive(self, system, early, drive_gap, late)
       !> The slider, where it is at the end of the step
       class(rigid_state_type), intent(inout) :: self

@@ -1,1 +1,1 @@
-"""What is read off outputs: slips, avalanches, and their statistics."""
+"""Analysis of outputs: slips, avalanches, and their statistics."""

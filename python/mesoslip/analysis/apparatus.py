@@ -1,7 +1,7 @@
-"""What is known of the apparatus behind an output: its force, spring, period and drive.
+"""Known properties of the apparatus behind an output: its force, spring, period and drive.
 
-A run knows its whole configuration. A measured trace may know no more than a friction coefficient
-and the displacement of a load point.
+The output of a run has its whole configuration. A measured trace may have no more than a friction
+coefficient and the displacement of a load point.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STIFFNESSES = {"N": ("N/m", "97 N/m"), "1": ("1/m", "1.6e-3 1/um")}
 
 @dataclass(frozen=True)
 class Apparatus:
-    """What is known of an apparatus.
+    """Known properties of an apparatus.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Apparatus:
 
 
 def apparatus_of(tree: Tree, name: str = "the output") -> Apparatus:
-    """What an output says about its apparatus.
+    """Properties of the apparatus according to an output.
 
     Parameters
     ----------

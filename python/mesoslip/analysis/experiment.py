@@ -131,7 +131,7 @@ class Experiment:
     Attributes
     ----------
     apparatus
-        What is known of the apparatus.
+        Known properties of the apparatus.
     config
         Configuration of the run; None for a measured trace without one.
     name

@@ -314,7 +314,7 @@ def lyapunov(
 
 
 def summary(tree: xr.DataTree) -> str:
-    """What the sign of the largest exponent means."""
+    """Meaning of the sign of the largest exponent."""
     exponent, error = (float(tree[name]) for name in ("lyapunov_exponent", "lyapunov_error"))
     if not math.isfinite(error):
         return "too few distances in the range: a longer run or a smaller displacement is needed"

@@ -41,7 +41,7 @@ COLUMNS = (
 )
 
 
-# What the columns are that the group of an output does not have, and units of those that do not
+# Attributes of columns that the group of an output does not have, and units of those that do not
 # hang on that of the force.
 MEANINGS = {
     "duration": "duration of the slip",

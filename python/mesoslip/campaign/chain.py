@@ -23,7 +23,7 @@ BOTH = "up and down"
 def chain_problems(
     sweep: SweepTable, axes: Sequence[Axis], measures: Sequence[Measure], source: str
 ) -> Iterator[Problem]:
-    """What is wrong with `sweep.continue` before any run is looked at."""
+    """Errors of `sweep.continue` that show before any run."""
     key = sweep.continue_
     if key not in CONTINUED:
         message = (
@@ -51,7 +51,7 @@ def with_directions(axes: Sequence[Axis], sweep: SweepTable) -> tuple[Axis, ...]
 
 
 def unchained(combinations: Sequence[Combination], key: str, source: str) -> Iterator[Problem]:
-    """What keeps runs from going on from the end of another."""
+    """Why runs cannot go on from the end of another."""
     configs = [one.config for one in combinations]
     if key == "slider.stiffness":
         kind = next((one.slider.kind for one in configs if one.slider.oscillator is None), None)

@@ -100,7 +100,7 @@ def _common(
 
 
 def _with_numpy_only(command: Callable[..., None]) -> Callable[..., None]:
-    """A command in whose process xarray knows arrays of NumPy only."""
+    """A command in whose process xarray uses arrays of NumPy only."""
 
     @functools.wraps(command)
     def run(*arguments: Any, **options: Any) -> None:

@@ -134,7 +134,7 @@ def trace(
 
 
 def _summary(tree: xr.DataTree) -> list[str]:
-    """What the output has, in a few words."""
+    """Short description of an output."""
     from mesoslip.quantities import with_unit
 
     time, known = tree.to_dataset()["time"].values, tree.attrs

@@ -13,7 +13,7 @@ from mesoslip.configuration.tables import Curve, Run
 
 
 class Setting(base.Setting, Protocol):
-    """What is checked: a whole configuration."""
+    """A whole configuration to check."""
 
     @property
     def run(self) -> Run: ...
@@ -32,7 +32,7 @@ class Setting(base.Setting, Protocol):
 
 
 def drive_problems(config: Setting) -> Complaints:
-    """What is wrong with the drive and the length of the run."""
+    """Errors of the drive and the length of the run."""
     run, drive = config.run, config.drive
     if drive.force_rate is not None and not config.slider.driven_by_force:
         named = _named(kind for kind, table in SLIDERS.items() if table.driven_by_force)
@@ -86,7 +86,7 @@ def drive_problems(config: Setting) -> Complaints:
 
 
 def _stop_problems(config: Setting) -> Complaints:
-    """What is wrong with the conditions that end a run early."""
+    """Errors of the conditions that end a run early."""
     stop = config.run.stops
     if stop.slips is not None and config.slider.slip_velocity(config) == 0:
         yield Complaint(
@@ -110,7 +110,7 @@ def _stop_problems(config: Setting) -> Complaints:
 
 
 def output_problems(config: Setting) -> Complaints:
-    """What is wrong with [output], if the drive is right."""
+    """Errors of [output], if the drive is right."""
     if not (config.expected_duration > 0 and math.isfinite(config.expected_duration)):
         yield Complaint("drive", "too slow or too fast for a finite duration of the run")
         return
@@ -151,7 +151,7 @@ def output_problems(config: Setting) -> Complaints:
 
 
 def newborn_problems(config: Setting) -> Complaints:
-    """What is wrong with the width of the force at which contacts attach."""
+    """Errors of the width of the force at which contacts attach."""
     contacts = config.contacts
     width = contacts.newborn_width
     if width == 0:
@@ -167,7 +167,7 @@ def newborn_problems(config: Setting) -> Complaints:
 
 
 def curve_problems(config: Setting) -> Complaints:
-    """What is wrong with the force curve."""
+    """Errors that concern the force curve."""
     width, stretch = config.curve.newborn_width, config.contacts.break_stretch
     if width > 0.25 * stretch:
         yield Complaint(

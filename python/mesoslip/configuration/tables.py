@@ -91,7 +91,7 @@ class Run(Table):
 
 
 class Output(Table):
-    """What is recorded. Sliders without inertia have no slips, whatever ``slip_interval`` is."""
+    """Settings of the record. Without inertia there are no slips, whatever ``slip_interval`` is."""
 
     interval: Annotated[Time, Field(gt=0)] | None = None
     """Sampling interval of the trace; by default 1/10000 of the run."""

@@ -27,7 +27,7 @@ SAMPLES_OF_RINGING = 32
 CHUNK = 256
 # The level, and the one below which the force must fall before it, in parts of the range.
 LEVEL, RESET = 0.8, 0.5
-# Parts of the range between which a level may lie before it is chosen anew.
+# Parts of the range between which a level may lie before it is chosen again.
 MIN_LEVEL, MAX_LEVEL = 0.65, 0.93
 # Time in which the next passage is sought, in times of loading to the static force and periods of
 # the setup.

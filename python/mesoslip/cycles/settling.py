@@ -387,7 +387,7 @@ def multipliers(
         part = size / float(np.max(np.abs(basis[-1])))
         changed = coordinates.changed(settled.words, part * basis[-1])
         applied = (coordinates.of(changed) - start) / part
-        # What could not be applied, in empty cells, is left out of the basis too.
+        # Parts that could not be applied, in empty cells, are left out of the basis too.
         scale = float(np.linalg.norm(weigh(applied)))
         basis[-1] = applied / scale
         column = (image(changed) - end) / part / scale

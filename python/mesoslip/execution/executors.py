@@ -46,7 +46,7 @@ class Executor(ABC):
         Parameters
         ----------
         stop
-            What pieces on threads of this process check.
+            Flag that pieces on threads of this process check.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Dask(Executor):
             yield ClusterPool(self.cluster)
 
 
-# What users give: an executor, a number of workers, or nothing.
+# The choice of a user: an executor, a number of workers, or nothing.
 ExecutorLike = Union[Executor, int, None]  # noqa: UP007
 
 

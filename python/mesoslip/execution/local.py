@@ -166,7 +166,7 @@ class LocalPool(Pool):
             thread.join(None if end is None else max(0.0, end - time.monotonic()))
 
     def _serve(self) -> None:
-        """What a thread does: piece after piece, from some time on in a process."""
+        """Body of a thread: piece after piece, from some time on in a process."""
         process: WorkerProcess | None = None
         while (item := self._queue.get()) is not None:
             future, function, piece = item

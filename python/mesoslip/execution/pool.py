@@ -1,4 +1,4 @@
-"""What an executor opens: workers that take one piece of work each."""
+"""Pools that an executor opens: workers that take one piece of work each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mesoslip.execution.stop import Stop
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
-# What is done with a piece; it returns soon once the stop is set.
+# The function applied to a piece; it returns soon once the stop is set.
 Function = Callable[[Piece, Stop], Result]
 
 

@@ -6,7 +6,7 @@ from importlib.metadata import version
 
 from mesoslip import _build
 
-# What runs now, not what is installed later on.
+# The version that runs, not one installed later on.
 _VERSION = version("mesoslip")
 
 

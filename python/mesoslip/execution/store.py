@@ -32,7 +32,7 @@ class Folder:
     path
         Where it is; made when it is locked.
     kind
-        What it holds, such as "checkpoint".
+        Kind of its content, such as "checkpoint".
     names
         Pattern of the names of its files.
     shared
@@ -86,7 +86,7 @@ class Folder:
         return f"mesoslip {self.kind}\n".encode()
 
     def _mark(self) -> bytes | None:
-        """What the lock says, empty if there is none; None if it is not a regular file."""
+        """Content of the lock, empty if there is none; None if it is not a regular file."""
         try:
             number = self._open_lock(os.O_RDONLY)
         except FileNotFoundError:
@@ -297,9 +297,9 @@ class Store(Pieces):
     path
         Where it is; made if it is not there.
     kind
-        What its pieces are, such as "points".
+        Name of its pieces, such as "points".
     fingerprint
-        What all pieces belong to; empty if their names say so.
+        The work that all pieces belong to; empty if their names contain it.
 
     Raises
     ------
@@ -334,7 +334,7 @@ class Store(Pieces):
             self.close()
             raise FileError(
                 f"{self.path}: is of another configuration, trace or version; remove it to start "
-                "anew"
+                "again"
             )
 
     def __enter__(self) -> Self:

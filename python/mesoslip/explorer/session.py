@@ -42,7 +42,7 @@ class Session:
         Errors of the last change, by the key of the control that shows them. A change with errors
         is taken back, unless there was nothing yet that can be run.
     notes
-        What the last change brought about besides, by the key of the control that shows it.
+        Further consequences of the last change, by the key of the control that shows it.
     is_runnable
         Whether the start with the changes can be run.
     values

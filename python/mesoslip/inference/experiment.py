@@ -148,7 +148,7 @@ class Experiment:
     force
         The measured force as it is compared, shape (samples,) [N].
     taken_off
-        What was taken off the trace, a sentence each.
+        Corrections of the trace, a sentence each.
     """
 
     name: str

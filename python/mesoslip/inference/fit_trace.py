@@ -105,7 +105,7 @@ def as_plan(
     trees: Sequence[xr.DataTree],
     changes: Iterable[Change] = (),
 ) -> Plan:
-    """The plan of a fit from its file or from nested tables, with what the traces know.
+    """The plan of a fit from its file or from nested tables, completed from the traces.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def as_plan(
 
 
 def known_of(trees: Sequence[xr.DataTree]) -> Known:
-    """What traces say about their apparatus; of several the first says what is known."""
+    """Properties of the apparatus according to the first trace that has them."""
     tree = trees[0]
     traced = tomllib.loads(tree.attrs["configuration"])
     time = tree.to_dataset()["time"].values

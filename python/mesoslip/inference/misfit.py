@@ -27,7 +27,7 @@ def sentences(
     observed: Array,
     predicted: Array,
 ) -> Iterator[str]:
-    """What differs in the model, a sentence for each of the largest disagreements.
+    """The largest disagreements with the model, a sentence for each.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class Plan:
         overrides
             Changes of its keys.
         known
-            What the traces say about their apparatus, used where the file says nothing.
+            Properties of the apparatus according to the traces, used where the file has none.
 
         Raises
         ------
@@ -177,7 +177,7 @@ def _place(tables: dict[str, Any], one: FreeParameter) -> None:
 
 @dataclass(frozen=True)
 class Known:
-    """What traces say about their apparatus.
+    """Properties of the apparatus according to the traces.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     path
         The file.
     trace
-        What the file does not say.
+        Properties that the file does not contain.
 
     Raises
     ------

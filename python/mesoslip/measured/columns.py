@@ -64,7 +64,7 @@ class Used:
     size, offset
         A number of the file minus the offset, times the size, is the quantity in SI.
     guess
-        What could be wrong.
+        Doubts about it.
     """
 
     index: int
@@ -142,7 +142,7 @@ def _given(table: Table, headers: str) -> list[str]:
 
 
 def _explicit(table: Table, header: str) -> Heading:
-    """What a header of an option says, in which a displacement is the slider's."""
+    """Meaning of a header in an option, where a displacement is the slider's."""
     heading = read_header(header)
     name = re.sub(r"\s*[\[({].*", "", header).strip().lower().replace(" ", "_")
     quantity = name if name in QUANTITIES else OTHER_NAMES.get(name, heading.quantity)

@@ -132,7 +132,7 @@ class Columns(Table):
 
 
 class TraceDescription(Table):
-    """What a file of a measurement does not say by itself.
+    """Properties of a measurement that its file does not contain.
 
     Quantities are strings with units, as they were written; `si` has them in SI.
     """

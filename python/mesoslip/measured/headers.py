@@ -56,7 +56,7 @@ BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
 
 
 class Heading(NamedTuple):
-    """What a header says.
+    """Meaning of a header.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Heading(NamedTuple):
     unit
         The unit as it is written; None without one.
     guess
-        What could be wrong about that; otherwise empty.
+        Doubts about it; otherwise empty.
     """
 
     quantity: str | None
@@ -87,7 +87,7 @@ def meaning_of(name: str) -> str | None:
 
 
 def read_header(header: str, unit: str = "") -> Heading:
-    """What a header says, with the unit of a line of units below it.
+    """Meaning of a header, with the unit of a line of units below it.
 
     >>> read_header("Normal_stress(MPa)"), read_header("lp_disp_um")
     (Heading(quantity='normal_stress', unit='MPa', guess=''), \

@@ -49,7 +49,7 @@ class Order:
     time
         Their times [s].
     notes
-        What was found.
+        The result.
     """
 
     rows: Numbers

@@ -22,7 +22,7 @@ from mesoslip.output.variables import has_force
 if TYPE_CHECKING:
     import xarray as xr
 
-# What is built of a file.
+# Objects built from a file.
 T = TypeVar("T", bound=Tree)
 
 # Memory for chunks of each variable that is read; the library's own is 64 MB.
@@ -67,7 +67,7 @@ def opened_arrays(path: str | Path) -> Iterator[Tree]:
 
 @contextmanager
 def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator[T]:
-    """What is built of the groups of a file; see `opened`."""
+    """Objects built from the groups of a file; see `opened`."""
     path = Path(path)
     if is_directory(path):
         raise FileError(f"{path}: is a directory, not an output file")
@@ -89,7 +89,7 @@ def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator
 
 
 def _built(path: Path, stack: ExitStack, build: Callable[[netCDF4.Dataset], T]) -> T:
-    """What is built of a file, which has small chunk caches and is closed with a stack."""
+    """Objects built from a file, which has small chunk caches and is closed with a stack."""
     with LOCK:
         before = netCDF4.get_chunk_cache()
         netCDF4.set_chunk_cache(CHUNK_CACHE)

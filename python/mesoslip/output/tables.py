@@ -37,7 +37,7 @@ class PrintedTable:
     Attributes
     ----------
     title
-        What a row is.
+        Meaning of a row.
     head
         Headers, with units.
     rows

@@ -74,7 +74,7 @@ def check_layout(tree: Tree, path: Path) -> None:
     if variables.has_force(tree.data_vars):
         root, slips = ROOT_NEEDS, {"slips": SLIPS}
         if is_measured(tree):
-            # What was not measured is absent.
+            # A quantity that was not measured is absent.
             known = (*variables.TRACE, *variables.MEASURED)
             root = tuple(name for name in known if name in tree.data_vars)
             slips = {name: one for name, one in slips.items() if name in tree.children}

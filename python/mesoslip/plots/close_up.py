@@ -144,7 +144,7 @@ class Sampling(NamedTuple):
         return curve(tree, name, extent, **style)
 
     def note(self, tree: xr.DataTree, names: Sequence[str]) -> str:
-        """What is not resolved, and the key that helps; empty if all is."""
+        """The unresolved motions, and the key that helps; empty if all are resolved."""
         if all(self.resolves(one) for one in (*names, *OF_CONTACTS) if is_known(tree, one)):
             return ""
         text = f"dots: samples, {self.size} in the slip"

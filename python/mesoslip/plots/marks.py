@@ -29,7 +29,7 @@ def draw_marks(
     tree, name
         The output, and the variable with its force.
     extent, horizontal
-        What is shown of it.
+        The part of it that is shown.
 
     Returns
     -------

@@ -22,7 +22,7 @@ SYMBOLS = {
     "slider.stiffness": "$K$",
     "fit.wander": "wander",
 }
-# What the last part of a key does not say alone.
+# Names for keys whose last part is ambiguous.
 NAMES = {
     "contacts.stiffness": "stiffness of the contacts",
     "contacts.count": "number of contacts",

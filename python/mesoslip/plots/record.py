@@ -33,7 +33,7 @@ LABEL_WIDTH = 0.03
 
 
 def force_unit(experiment: Experiment) -> Scale:
-    """What forces are divided by in pictures, with the label of their axis."""
+    """The unit of forces in pictures, with the label of their axis."""
     if experiment.config is not None:
         return Scale("force over $F_s$", experiment.static_force)
     if experiment.apparatus.force_unit == "1":

@@ -164,7 +164,7 @@ def measured_method(tree: xr.DataTree) -> str:
     source = tree.attrs.get("measured_file", "a file")
     return (
         f"The measured trace ({source}) was analysed with mesoslip [@mesoslip]: slips are falls of "
-        "the force that stand out of the noise and of ringing, by a rule that knows no model."
+        "the force that stand out of the noise and of ringing, by a rule without a model."
     )
 
 
@@ -212,7 +212,7 @@ def _contacts(config: Config) -> Iterator[str]:
 
 
 def _lives(config: Config) -> str:
-    """What a contact does that breaks."""
+    """The sentence on breaking contacts."""
     contacts = config.contacts
     if not contacts.reattach:
         return "A contact that reaches its threshold breaks for good."

@@ -35,7 +35,7 @@ class Archive:
     Parameters
     ----------
     words
-        What `Kernel.save` gives.
+        The result of `Kernel.save`.
 
     Raises
     ------

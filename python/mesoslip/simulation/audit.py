@@ -1,4 +1,4 @@
-"""What a run promises, and whether it has kept it."""
+"""The promises of a run, and whether they were kept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Audited(Protocol):
-    """What an audit looks at of a realization."""
+    """Quantities of a realization that an audit checks."""
 
     @property
     def energy_residual(self) -> float: ...
@@ -22,7 +22,7 @@ class Audited(Protocol):
 
 
 def failed_promises(config: Config, realizations: Sequence[Audited]) -> list[str]:
-    """What a run should have kept and did not, with what would help; empty if all is well.
+    """Promises that a run did not keep, with the fix; empty if it kept all.
 
     Every run promises to balance its energy: to rounding, or as well as its solver does. The
     master equation promises besides that its steps do little work of their own, and estimates the

@@ -79,7 +79,7 @@ class Checkpoint:
     folder
         Where it is.
     config
-        What is run.
+        The configuration of the run.
     interval
         Wall time between two checkpoints [s]; 0: only when the run is stopped.
     resume
@@ -104,7 +104,7 @@ class Checkpoint:
         self._interval = interval
         self._resume = resume
         self._report = report
-        # What runs now, not what is installed by the time of a checkpoint.
+        # The version that runs, not one installed by the time of a checkpoint.
         self._program = _program()
         self._paths = {table: folder / f"{table}.rows" for table in TABLES}
         self._sizes = dict.fromkeys(TABLES, 0)
@@ -123,7 +123,7 @@ class Checkpoint:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # What the threads of realizations call.
+    # Called by the threads of realizations.
 
     def visit(self, realization: Realization) -> None:
         """Between two segments of a realization: save it if a checkpoint is due or it is over."""
@@ -136,7 +136,7 @@ class Checkpoint:
             if saved is not None:
                 self._saved[realization.number] = (self._epoch, saved)
 
-    # What the main thread calls.
+    # Called by the main thread.
 
     def look(self, realizations: Sequence[Realization]) -> None:
         """Now and then: begin a checkpoint when it is due, write it when all are saved."""
@@ -323,7 +323,7 @@ class Checkpoint:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
                 arrays = {name: file[name] for name in file.files if name != "header"}
-        # What a damaged archive has the libraries raise is not specified.
+        # The errors that libraries raise for a damaged archive are not specified.
         except Exception as error:
             raise DamagedError(str(error) or type(error).__name__) from error
         self._compare(header)

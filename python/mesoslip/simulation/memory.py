@@ -12,7 +12,7 @@ from mesoslip.errors import ConfigError, Problem
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# What a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
+# Memory that a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
 # snapshot [bytes].
 BYTES_PER_SAMPLE = 3 * 7 * 8
 BYTES_PER_SAMPLE_OF_SLIP = 3 * 10 * 8

@@ -109,7 +109,7 @@ class Realization:
     Parameters
     ----------
     config
-        What to run.
+        The configuration.
     number
         Number of the realization, from 0; each has its own random numbers.
     estimates_errors
@@ -142,7 +142,7 @@ class Realization:
     Attributes
     ----------
     config, number
-        What is run, and the number of the realization, from 0.
+        The configuration, and the number of the realization, from 0.
     time
         Time it has come to [s].
     ending
@@ -268,7 +268,7 @@ class Realization:
                 return
             errors = step_errors(self.trace, self.slips, coarse.trace, coarse.slips)
         except RunError:
-            # Steps too long to go on with tell nothing.
+            # Steps that were too long to go on with are no measure.
             errors = StepErrors(math.inf, math.inf)
         self.force_error, self.slip_time_error = errors
         self._lacks_errors = False
@@ -403,7 +403,7 @@ class Realization:
 
     @property
     def energy_residual(self) -> float:
-        """What the energy balance lacks, relative to the work of the drive or its largest term."""
+        """Residual of the energy balance, relative to the work of the drive or its largest term."""
         return self._part_of_work(self.energy[-1])
 
     @property
@@ -438,7 +438,7 @@ class Realization:
         )
 
     def rows(self, table: str) -> Rows | FirstRows | SnapshotRows:
-        """What was recorded of a table, see `TABLES`: without samples of what came to no slip."""
+        """Rows recorded in a table, see `TABLES`; no samples of motions that became no slip."""
         rows = self._tables.get(table) or Rows(len(COLUMNS[table]))
         if table == "slip_trace":
             return FirstRows(rows, self._slip_samples(rows))
@@ -447,7 +447,7 @@ class Realization:
         return rows
 
     def table(self, name: str) -> NDArray[np.void]:
-        """What was recorded in a table up to now, as a structured array with named columns.
+        """Rows recorded in a table up to now, as a structured array with named columns.
 
         Parameters
         ----------
@@ -528,7 +528,7 @@ class Realization:
         yield from list(self._tables.items())
 
     def save(self) -> Saved:
-        """What a checkpoint keeps of it; to be called between two segments."""
+        """Its part of a checkpoint; to be called between two segments."""
         words = None
         if not self.ending and (self._kernel is not None or self._words is not None):
             words = self._words if self._kernel is None else self._kernel.save()

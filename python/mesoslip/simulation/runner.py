@@ -55,7 +55,7 @@ def run_realizations(
     Parameters
     ----------
     config
-        What to run.
+        The configuration.
     executor
         Where realizations are computed, or how many threads compute them; on as many threads as
         there are processors by default.

@@ -1,4 +1,4 @@
-"""What a run records: tables of numbers, row by row, in memory or in the files of a checkpoint."""
+"""The record of a run: tables of numbers, row by row, in memory or in the files of a checkpoint."""
 
 from __future__ import annotations
 

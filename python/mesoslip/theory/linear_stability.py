@@ -60,7 +60,7 @@ MAX_LAYERS = 16
 
 # Relative width of thresholds with which contacts do not break in step.
 OUT_OF_STEP = 0.5
-# What linear theory leaves open, of a stable and of an unstable motion.
+# Statements that linear theory leaves open, for a stable and an unstable motion.
 OTHER_MOTION = "A large oscillation may be possible too"
 NO_AMPLITUDE = "Linear theory gives no amplitude"
 
@@ -120,7 +120,7 @@ class LinearStability(abc.ABC):
 
     @classmethod
     def _problems(cls, config: Config) -> Iterator[Problem]:
-        """What else of a configuration the theory does not have."""
+        """Further parts of a configuration that the theory does not have."""
         if config.contacts.newborn_width > 0:
             yield Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)
 
@@ -161,7 +161,7 @@ class LinearStability(abc.ABC):
     @property
     @abc.abstractmethod
     def _ingredients(self) -> str:
-        """What the theory has that the force curve does not, in words."""
+        """Parts of the theory that the force curve does not have, in words."""
 
     @abc.abstractmethod
     def _parts(self, rate: Complex) -> Parts:
@@ -468,7 +468,7 @@ class LinearStability(abc.ABC):
 
     @property
     def summary(self) -> str | None:
-        """What linear theory states, and what it leaves open; None for a slider without inertia."""
+        """The statement of linear theory and its limits; None for a slider without inertia."""
         if not self._has_motion:
             return None
         other = f"{OTHER_MOTION}: {shown_by(self.config)}"
@@ -522,8 +522,8 @@ class LinearStability(abc.ABC):
 
 
 def shown_by(config: Config) -> str:
-    """What shows the motion of a configuration: `mesoslip cycle` has no layers, no interaction,
-    no changes of the drive, and no contacts that do not attach again."""
+    """The command that shows the motion of a configuration: `mesoslip cycle` has no layers, no
+    interaction, no changes of the drive, and no contacts that do not attach again."""
     part = config.drive_parts[-1]
     is_constant = len(config.drive_parts) == 1 and part.start_velocity == part.end_velocity != 0
     has_cycle = config.slider.oscillator is not None and is_constant

@@ -1,4 +1,4 @@
-"""What follows from a slider's keys alone: its dynamic stiffness, and quantities in closed form.
+"""Quantities from a slider's keys alone: its dynamic stiffness, and others in closed form.
 
 Each function has a form for each kind of slider, chosen by the type of its table.
 """
@@ -206,7 +206,7 @@ def _layered_quantities(slider: LayeredSlider, config: Any) -> Iterator[Quantity
 
 
 def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator[Quantity]:
-    """What is known of the first slip without the force curve; ``film`` in 1/s."""
+    """Properties of the first slip without the force curve; ``film`` in 1/s."""
     contacts, omega_s = config.contacts, slider.omega_s
     d_1 = loading_rate(slider, config)
     if not d_1:

@@ -110,7 +110,7 @@ def p_value(tally: Tally, law: Law, replicas: int, generator: np.random.Generato
     """
 
     def misfit_of(sample: Tally) -> Misfit:
-        # What remains of very steep laws may be too little for a fit, and any law fits it.
+        # The tail of very steep laws may be too short for a fit, and any law fits it.
         if sample.is_degenerate:
             return Misfit(0.0, 0.0, 1.0)
         pure = uncut_law(sample, law.min_size, law.max_size)

@@ -25,7 +25,7 @@ CORRECTION_WIDTH = 1.0
 
 
 class Form(NamedTuple):
-    """What a law consists of besides s^-τ."""
+    """The factors of a law besides s^-τ."""
 
     cutoff_shape: float
     """c of the cutoff exp(-(s/s_c)^c): 1 exponential, 2 Gaussian; 0 for none."""

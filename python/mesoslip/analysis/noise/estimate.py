@@ -154,7 +154,7 @@ class TraceNoise:
         }
 
     def sentences(self, unit: str = "N") -> list[str]:
-        """What the noise is, a sentence each.
+        """Description of the noise, a sentence each.
 
         Parameters
         ----------

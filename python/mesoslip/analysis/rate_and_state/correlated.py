@@ -90,8 +90,8 @@ def estimate(
     jacobian: Array,
     floor: float,
 ) -> CorrelatedNoise:
-    """Noise from residuals by restricted maximum likelihood, which knows of the fitted parameters
-    (Patterson and Thompson, Biometrika 58, 545 (1971)).
+    """Noise from residuals by restricted maximum likelihood, which accounts for the fitted
+    parameters (Patterson and Thompson, Biometrika 58, 545 (1971)).
 
     Parameters
     ----------

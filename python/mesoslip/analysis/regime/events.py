@@ -1,6 +1,6 @@
 """The events of a motion: slips where they carry it, oscillations of the force elsewhere.
 
-The catalogue knows which falls of the force are ringing, at the frequencies of the setup, of pinned
+The catalogue marks which falls of the force are ringing, at the frequencies of the setup, of pinned
 contacts, of layers and base. Its slips carry the motion if their force drops add up to at least a
 part of the loading by the drive, K v t; or if they are most of the cycles of the force, and more
 regular, as they leave out the rebounds. Otherwise, as where each fall of an oscillation is regained

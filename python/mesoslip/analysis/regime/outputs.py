@@ -104,7 +104,7 @@ def _slips(tree: Tree) -> tuple[Array, Slips]:
 
 
 def _window(tree: Tree, number: int, apparatus: Apparatus) -> tuple[Scales, Array, Array, Array]:
-    """What a realization is compared with; time, force and velocity in its evaluated window."""
+    """Scales of a realization; time, force and velocity in its evaluated window."""
     root = tree.to_dataset()
     # The catalogue of an elastic slider is that of its mean force.
     name = "elastic_force" if "elastic_force" in root else apparatus.force_name

@@ -60,7 +60,7 @@ def classify(
     Parameters
     ----------
     scales
-        What it is compared with.
+        Its scales.
     time, force, velocity
         The evaluated window of the trace: time [s], force, velocity of the slider [m/s], NaN if it
         is unknown.

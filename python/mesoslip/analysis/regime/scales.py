@@ -1,4 +1,4 @@
-"""What a motion is compared with: the evaluated stage of the drive, noise, and scales."""
+"""Scales of a motion: the evaluated stage of the drive, noise, and scales."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Scales:
-    """What a motion is compared with.
+    """Scales of a motion.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Slips in sampled, noisy traces of a force, by a rule that knows no model.
+"""Slips in sampled, noisy traces of a force, by a rule without a model.
 
 The rule, explained in `docs/fit.md`:
 

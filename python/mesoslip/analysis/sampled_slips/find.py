@@ -74,7 +74,7 @@ def find_slips(
     force
         Force of the spring [N], or a friction coefficient, shape (samples,), finite.
     noise
-        What `estimate_noise` found; by default it is called. A number is the standard deviation of
+        The result of `estimate_noise`, called by default. A number is the standard deviation of
         white noise [N]: then nothing is taken off, and the minimum fall follows from it.
     period
         Period of the setup, 2 pi (M/K)^1/2 [s]; by default twice the duration of deep falls.

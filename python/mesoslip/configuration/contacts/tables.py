@@ -44,7 +44,7 @@ from mesoslip.errors import FileError
 
 Array = NDArray[np.float64]
 
-# Choices, by the names that the kernels know.
+# Choices, by the names that the kernels use.
 COUPLINGS = ("scaled", "equal", "table")
 SAMPLE_KEYS = ("samples", "weights", "stiffnesses")
 DELAY_LAWS = ("fixed", "exponential")
@@ -479,7 +479,7 @@ class Interaction(Table):
         return 3 * self.strength * contacts.contact_static_force / spacing
 
     def problems(self, contacts: Contacts) -> Complaints:
-        """What is wrong between the lattice and its contacts."""
+        """Conflicts between the lattice and its contacts."""
         sites = self.columns * self.rows
         if sites != contacts.count:
             yield Complaint(

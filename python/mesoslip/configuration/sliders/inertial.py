@@ -1,4 +1,4 @@
-"""What sliders with a mass have in common."""
+"""Keys that sliders with a mass have in common."""
 
 from __future__ import annotations
 

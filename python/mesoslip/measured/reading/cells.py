@@ -13,7 +13,7 @@ POINTED = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?
 WITH_COMMA = re.compile(r"[+-]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 NUMBERS = {".": POINTED, ",": WITH_COMMA}
 
-# What instruments and programs write where there is no number.
+# Entries that instruments and programs write where there is no number.
 MISSING = {
     *("", "-", "--", "---", "n/a", "na", "#n/a", "#value!", "nan", "+nan", "-nan", "1.#qnan"),
     *("-1.#ind", "1.#inf", "-1.#inf", "inf", "+inf", "-inf", "infinity", "+infinity"),
@@ -56,7 +56,7 @@ def is_missing(cell: str) -> bool:
 
 
 def hint_for(cell: str, decimal: str) -> str:
-    """What would be right instead of a cell that is not a number; empty if that is unknown."""
+    """The fix for a cell that is not a number; empty if that is unknown."""
     try:
         number_of(cell, decimal)
     except ValueError as error:

@@ -114,7 +114,7 @@ def find_layout(
     if found is None and not has_headers:
         _refuse_header(path, lines, data, guess)
     if found is None:
-        # What stands above the numbers is left out with a note, but for damaged rows.
+        # Lines above the numbers are left out with a note, except damaged rows.
         return Layout(guess.delimiter, guess.decimal, guess.count, 0, None, None, guess.is_numeric)
     first, headers, units = found
     return Layout(

@@ -17,7 +17,7 @@ from mesoslip.errors import FileError, shown
 
 # Maximum size of a file, and of what a compressed one becomes [bytes].
 MAX_BYTES = 2**31
-# Bytes that are looked at to tell encodings apart.
+# Bytes that are examined to distinguish encodings.
 HEAD = 4096
 # Maximum share of null characters in a damaged text.
 MAX_NULLS = 0.01

@@ -113,7 +113,7 @@ class _Body:
     def read(self) -> tuple[Array, Numbers]:
         """Numbers, shape (columns, rows), and the line of each row."""
         layout = self.layout
-        # What stands above the numbers may come again.
+        # Lines above the numbers may come again.
         self.above = {line.strip() for line in self.lines[: layout.first]}
         data = np.frombuffer("\n".join(self.lines[layout.first :]).encode() + b"\n", np.uint8)
         ends = np.flatnonzero(data == ord("\n"))

@@ -20,12 +20,15 @@ module mesoslip_sliders_hazard_series
    !> exponential function is below 1e-15 of it
    integer, parameter :: short_terms = 4, short_order = 6
    real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
-   !> A middling step has a longer series, the last coefficients of which say whether it is exact
-   integer, parameter :: series_order = 14, tail = 3
-   real(wp), parameter :: max_middling = 0.3_wp
+   !> A middling step has a longer series, the last coefficients of which show whether it is exact;
+   !> most of them, with a smaller change of the exponent, one of a lower order
+   integer, parameter :: series_order = 14, low_order = 10, tail = 3
+   real(wp), parameter :: max_middling = 0.3_wp, max_low = 0.12_wp
+   real(wp), parameter :: no_change = 1.0e-16_wp
+   real(wp), parameter :: max_tail(tail) = no_change, max_low_tail(tail) = no_change &
+      & * [1.0e4_wp, 1.0e2_wp, 1.0_wp]
    !> Bound on the mean of the exponential function over such a step, and one over it
    real(wp), parameter :: max_growth = 1.35_wp
-   real(wp), parameter :: no_change = 1.0e-16_wp
    !> Highest order of the exponent that changes the exponential function of a middling step
    integer, parameter :: middling_terms = 12
 
@@ -77,8 +80,14 @@ contains
          exponent(term) = series(term - 1) * inverse(term) * length
          change = change + abs(exponent(term))
       end do
+      exponent(terms + 1:middling_terms) = 0.0_wp
+      ! The order is a constant in each call: the compiler makes a copy for each.
+      is_done = change <= max_low
+      if (is_done) call go_middling(clock, exponent, low_order, max_low_tail, step, ended_by, &
+         & is_done)
+      if (is_done) return
       is_done = change <= max_middling
-      if (is_done) call go_middling(clock, exponent, min(terms, middling_terms), step, ended_by, &
+      if (is_done) call go_middling(clock, exponent, series_order, max_tail, step, ended_by, &
          & is_done)
    end subroutine try_series
 
@@ -113,31 +122,37 @@ contains
    end subroutine go_short
 
    !> Make a middling step, unless the series does not converge.
-   pure subroutine go_middling(clock, exponent, terms, step, ended_by, is_done)
+   pure subroutine go_middling(clock, exponent, order, max_last, step, ended_by, is_done)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
-      !> The exponent of the first clock, over a step of length 1, and its terms
-      real(wp), intent(in) :: exponent(:)
-      integer, intent(in) :: terms
+      !> The exponent of the first clock, over a step of length 1
+      real(wp), intent(in) :: exponent(max_terms)
+      !> Order of the series, and bounds on its last coefficients where it is exact
+      integer, intent(in) :: order
+      real(wp), intent(in) :: max_last(tail)
       real(wp), intent(inout) :: step
       integer, intent(out) :: ended_by
       !> Whether it was made; if not, nothing has changed
       logical, intent(out) :: is_done
 
-      real(wp) :: time, part, mean(0:series_order, clocks)
+      real(wp) :: time, part, direction, mean(0:series_order, clocks)
       integer :: number
 
       ended_by = 0
       time = 1.0_wp
       do number = 1, clocks
          if (.not. clock(number)%is_used) cycle
-         mean(:, number) = long_means(sign(1.0_wp, clock(number)%slope * clock(1)%slope) &
-            & * exponent(:terms), terms)
-         is_done = all(abs(mean(series_order - tail + 1:, number)) <= no_change)
+         direction = sign(1.0_wp, clock(number)%slope * clock(1)%slope)
+         if (order == low_order) then
+            mean(:low_order, number) = low_means(direction * exponent(:low_order))
+         else
+            mean(:, number) = long_means(direction * exponent(:middling_terms))
+         end if
+         is_done = all(abs(mean(order - tail + 1:order, number)) <= max_last)
          if (.not. is_done) then
             ended_by = 0
             return
          end if
-         part = time_of(mean(:, number), series_order, clock(number)%left, &
+         part = time_of(mean(:, number), order, clock(number)%left, &
             & clock(number)%rate * step, time)
          if (part > time) cycle
          time = part
@@ -146,7 +161,7 @@ contains
       is_done = .true.
       do number = 1, clocks
          if (clock(number)%is_used .and. number /= ended_by) clock(number)%elapsed &
-            & = clock(number)%rate * step * (time * horner(mean(:, number), series_order + 1, time))
+            & = clock(number)%rate * step * (time * horner(mean(:, number), order + 1, time))
       end do
       if (ended_by > 0) step = time * step
    end subroutine go_middling
@@ -177,26 +192,53 @@ contains
       end associate
    end function short_means
 
-   !> The same of a middling step: of g = exp(e), n g_n is the sum over j of j e_j g_(n-j).
-   pure function long_means(e, terms) result(mean)
+   !> The same of a middling step that changes the exponent little: of g = exp(e), n g_n is the sum
+   !> over j of j e_j g_(n-j). The last factors come last, as the others do not wait for them.
+   pure function low_means(e) result(mean)
       !> The exponent, over a step of length 1
-      real(wp), intent(in) :: e(:)
-      !> Its terms
-      integer, intent(in) :: terms
+      real(wp), intent(in) :: e(low_order)
+      real(wp) :: mean(0:low_order)
+
+      real(wp) :: s(low_order), g_1, g_2, g_3, g_4, g_5, g_6, g_7, g_8, g_9, g_10
+      integer :: term
+
+      s = [(real(term, wp), term=1, low_order)] * e
+      g_1 = s(1)
+      g_2 = inverse(2) * (s(2) + s(1) * g_1)
+      g_3 = inverse(3) * ((s(3) + s(2) * g_1) + s(1) * g_2)
+      g_4 = inverse(4) * ((s(4) + s(3) * g_1) + s(2) * g_2 + s(1) * g_3)
+      g_5 = inverse(5) * ((s(5) + s(4) * g_1) + s(3) * g_2 + s(2) * g_3 + s(1) * g_4)
+      g_6 = inverse(6) * ((s(6) + s(5) * g_1) + s(4) * g_2 + s(3) * g_3 + s(2) * g_4 + s(1) * g_5)
+      g_7 = inverse(7) * ((s(7) + s(6) * g_1) + s(5) * g_2 + s(4) * g_3 + s(3) * g_4 + s(2) * g_5 &
+         & + s(1) * g_6)
+      g_8 = inverse(8) * ((s(8) + s(7) * g_1) + s(6) * g_2 + s(5) * g_3 + s(4) * g_4 + s(3) * g_5 &
+         & + s(2) * g_6 + s(1) * g_7)
+      g_9 = inverse(9) * ((s(9) + s(8) * g_1) + s(7) * g_2 + s(6) * g_3 + s(5) * g_4 + s(4) * g_5 &
+         & + s(3) * g_6 + s(2) * g_7 + s(1) * g_8)
+      g_10 = inverse(10) * ((s(10) + s(9) * g_1) + s(8) * g_2 + s(7) * g_3 + s(6) * g_4 &
+         & + s(5) * g_5 + s(4) * g_6 + s(3) * g_7 + s(2) * g_8 + s(1) * g_9)
+      mean = [1.0_wp, inverse(2) * g_1, inverse(3) * g_2, inverse(4) * g_3, inverse(5) * g_4, &
+         & inverse(6) * g_5, inverse(7) * g_6, inverse(8) * g_7, inverse(9) * g_8, &
+         & inverse(10) * g_9, inverse(11) * g_10]
+   end function low_means
+
+   !> The same of any middling step, by the same recurrence.
+   pure function long_means(e) result(mean)
+      !> The exponent, over a step of length 1
+      real(wp), intent(in) :: e(middling_terms)
       real(wp) :: mean(0:series_order)
 
       real(wp) :: g(0:series_order), slope(middling_terms), rest
       integer :: n, term
 
-      do term = 1, terms
+      do term = 1, middling_terms
          slope(term) = term * e(term)
       end do
       g(0) = 1.0_wp
       mean(0) = 1.0_wp
       do n = 1, series_order
-         ! The last one comes last, as the others do not wait for it.
          rest = 0.0_wp
-         do term = min(n, terms), 2, -1
+         do term = min(n, middling_terms), 2, -1
             rest = rest + slope(term) * g(n - term)
          end do
          g(n) = inverse(n) * (rest + slope(1) * g(n - 1))

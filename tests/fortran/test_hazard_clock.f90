@@ -7,6 +7,7 @@ program test_hazard_clock
    implicit none
 
    real(wp), parameter :: turning(6) = [1.0_wp, -2.0_wp, 0.3_wp, 0.1_wp, -0.05_wp, 0.01_wp]
+   real(wp), parameter :: even(6) = [1.0_wp, 2.0e-2_wp, -1.0e-3_wp, 2.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
 
    call exercise(1.0e-2_wp, [1.0_wp, 0.1_wp, -0.01_wp, 0.0_wp, 0.0_wp, 0.0_wp], "short step")
    call exercise(1.0e-2_wp, turning * 0.5_wp, "short step with a turn")
@@ -19,7 +20,11 @@ program test_hazard_clock
    call exercise(1.0e-6_wp, [0.7_wp], "steady motion, nearly at rest")
    call exercise(-30.0_wp, [1.0_wp], "steady motion, a rate that falls")
    call exercise(1.0_wp, [0.0_wp], "rest")
-   call the_first_ends_the_step()
+   call the_first_ends_the_step(turning, 2.0_wp, "many parts")
+   call the_first_ends_the_step(turning, 0.3_wp, "long series")
+   call the_first_ends_the_step(turning, 2.0e-3_wp, "long series of a small change")
+   call the_first_ends_the_step(even, 0.11_wp, "series of a lower order")
+   call the_first_ends_the_step(even, 1.0e-2_wp, "short series")
    call finish()
 
 contains
@@ -56,33 +61,36 @@ contains
 
    !> Of two clocks the first to come to its reading ends the step, and the other goes on until
    !> then.
-   subroutine the_first_ends_the_step()
-      type(hazard_clock_type) :: clock(clocks)
-      real(wp) :: step, scale
-      logical :: is_ended
-      integer :: kind
+   subroutine the_first_ends_the_step(series, slope, name)
+      !> Coefficients of the velocity in a step of length 1
+      real(wp), intent(in) :: series(0:)
+      !> Change of the exponent of the first clock with the displacement; minus that of the second
+      real(wp), intent(in) :: slope
+      character(len=*), intent(in) :: name
 
-      do kind = 1, 2
-         scale = merge(1.0_wp, 1.0e-3_wp, kind == 1)
-         clock%is_used = .true.
-         clock%slope = [2.0_wp, -2.0_wp] * scale
-         clock%rate = [1.0_wp, 5.0_wp]
-         clock(1)%left = simpson(clock(1)%slope, turning, 0.6_wp)
-         clock(2)%left = 5.0_wp * simpson(clock(2)%slope, turning, 0.4_wp)
-         step = 1.0_wp
-         call advance_clocks(clock, turning, size(turning), step, is_ended)
-         call check(is_ended .and. clock(2)%is_due .and. .not. clock(1)%is_due, "the second is due")
-         call check_close(step, 0.4_wp, 1.0e-12_wp, "when it is due")
-         call check_close(clock(1)%elapsed, simpson(clock(1)%slope, turning, 0.4_wp), 1.0e-12_wp, &
-            & "reading of the other")
-         clock%is_due = .false.
-         clock%left = 1.0e3_wp
-         step = 0.5_wp
-         call advance_clocks(clock, turning, size(turning), step, is_ended)
-         call check(.not. is_ended, "none is due")
-         call check_close(clock(2)%elapsed, 5.0_wp * simpson(clock(2)%slope, turning, 0.5_wp), &
-            & 1.0e-12_wp, "reading of the second")
-      end do
+      type(hazard_clock_type) :: clock(clocks)
+      real(wp) :: step
+      logical :: is_ended
+
+      clock%is_used = .true.
+      clock%slope = [slope, -slope]
+      clock%rate = [1.0_wp, 5.0_wp]
+      clock(1)%left = simpson(slope, series, 0.6_wp)
+      clock(2)%left = 5.0_wp * simpson(-slope, series, 0.4_wp)
+      step = 1.0_wp
+      call advance_clocks(clock, series, size(series), step, is_ended)
+      call check(is_ended .and. clock(2)%is_due .and. .not. clock(1)%is_due, &
+         & name // ": the second is due")
+      call check_close(step, 0.4_wp, 1.0e-13_wp, name // ": when it is due")
+      call check_close(clock(1)%elapsed, simpson(slope, series, 0.4_wp), 1.0e-13_wp, &
+         & name // ": reading of the other")
+      clock%is_due = .false.
+      clock%left = 1.0e3_wp
+      step = 0.5_wp
+      call advance_clocks(clock, series, size(series), step, is_ended)
+      call check(.not. is_ended, name // ": none is due")
+      call check_close(clock(2)%elapsed, 5.0_wp * simpson(-slope, series, 0.5_wp), 1.0e-13_wp, &
+         & name // ": reading of the second")
    end subroutine the_first_ends_the_step
 
    !> Integral of exp(slope D(t)) by a fine rule.

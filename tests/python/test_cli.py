@@ -137,6 +137,7 @@ def test_commands_import_what_they_need(short, tmp_path, command):
         ["info", str(short)],
         ["run", str(short), "-o", str(tmp_path / "again.nc"), "--quiet"],
         ["slips", str(output), "--json"],
+        ["curve", str(short)],
         ["slips", str(output)],
         ["regime", str(output)],
         ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
@@ -165,10 +166,11 @@ json.dump(found, stdout)
         [],
         ["netCDF4"],
         [],
+        ["scipy.interpolate", "scipy.optimize", "scipy.special"],
         [],
         [],
         ["pandas", "xarray"],
-        ["scipy.integrate", "scipy.optimize", "scipy.special"],
+        ["scipy.integrate"],
         ["matplotlib"],
     ]
 

@@ -16,7 +16,7 @@ from mesoslip.theory import steady_curve
 from mesoslip.theory.activated_sliding import ActivatedSliding, RateAndState
 from mesoslip.theory.ageing_sliding import AgeingSliding
 from mesoslip.theory.critical_spring import critical_spring
-from mesoslip.theory.steady_sliding import sliding_of, stable_stiffness, steady_sliding
+from mesoslip.theory.steady_sliding import sliding_of, stability_boundary, steady_sliding
 from test_steady_sliding import study
 
 LOG = {"law": "log", "time": 1e-3, "growth": 0.05}
@@ -199,17 +199,32 @@ def test_the_critical_spring_of_contacts_is_near_that_of_rate_and_state(klein, g
         assert 0.75 < found.critical_stiffness[0] / expected < 1.35
 
 
-def test_the_critical_spring_is_where_stability_ends(klein):
+# The ends of a uniform law turn the response at frequencies far above those of contacts in step.
+UNIFORM = {"law": "uniform", "relative_width": 0.5}
+LIGHT = {"slider__mass": 7e-4, "slider__damping_ratio": 0.021}
+
+
+@pytest.mark.parametrize(
+    ("delay", "velocity", "changes"),
+    [
+        (1e-4, 1e-6, {}),
+        (2e-3, 1e-7, {}),
+        (5.9e-5, 1.24e-6, {"contacts__threshold": UNIFORM} | LIGHT),
+    ],
+)
+def test_the_critical_spring_is_where_stability_ends(klein, delay, velocity, changes):
     """With a damping that is a ratio, and grows with the spring: by counting roots instead."""
-    for delay, velocity in ((1e-4, 1e-6), (2e-3, 1e-7)):
-        config = klein(
-            contacts__delay=delay,
-            drive__velocity=velocity,
-            contacts__threshold__relative_width=0.2,
-        )
-        found = SteadySliding(config).critical_stiffness
-        assert found is not None
-        assert found[0] == pytest.approx(stable_stiffness(config), rel=2e-3)
+    config = klein(
+        contacts__delay=delay,
+        drive__velocity=velocity,
+        contacts__threshold__relative_width=0.2,
+        **changes,
+    )
+    found = SteadySliding(config).critical_stiffness
+    assert found is not None
+    # No softer or stiffer spring above it is unstable.
+    counted = stability_boundary(config, "slider.stiffness", 0.9 * found[0], 16 * found[0])
+    assert found[0] == pytest.approx(counted, rel=2e-3)
 
 
 def test_curve_and_info_report_stability_over_velocity(klein, tmp_path, command, monkeypatch):

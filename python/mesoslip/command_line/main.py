@@ -60,6 +60,7 @@ COMMANDS = (
 # Those that never import xarray, or only for what they are asked to open.
 WITHOUT_XARRAY = {
     run.run,
+    theory.curve,
     theory.info,
     mean_field.mean_field,
     explore.explore,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mesoslip.array_packages import import_xarray
 from mesoslip.command_line.options import (
     ConfigArgument,
     JsonOption,
@@ -71,7 +72,7 @@ def curve(
     age or break by thermal activation it is steady sliding over velocity instead: F(v), dF/d ln v,
     and the stiffness above which sliding is linearly stable.
     """
-    from mesoslip.output import targets, writing
+    from mesoslip.output import targets
     from mesoslip.theory.force_curve import SUMMARY, ForceCurve
     from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
 
@@ -79,11 +80,15 @@ def curve(
     if output is not None:
         targets.check_output(output, [config])
     _warn_of_interaction(checked)
+    if output is not None or depends_on_velocity(checked):
+        import_xarray()
     if depends_on_velocity(checked):
         _steady_curve(checked, output, as_json=as_json)
         return
     force_curve = ForceCurve(checked)
     if output is not None:
+        from mesoslip.output import writing
+
         writing.write(force_curve.to_tree(), output)
     summary = force_curve.summary()
     if as_json:

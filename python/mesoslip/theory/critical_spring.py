@@ -26,6 +26,8 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 NO_GROWTH = 1e-7
 # Rounds of the search for a critical frequency, and points of each.
 ROUNDS, POINTS_A_ROUND = 3, 12
+# Points of the search for a change of sign between the neighbours of a minimum.
+POINTS_A_MINIMUM = 16
 # Doublings and halvings of an interval in which the stiffness of a chain is sought.
 MAX_DOUBLINGS, HALVINGS = 8, 50
 
@@ -70,6 +72,10 @@ def critical_spring(
         for a slider of which no critical spring is known.
     """
     stiffness, excess = balancing_spring(slider, path, response(path))
+    added = _near_minima(path, excess)
+    if added.size:
+        path = np.union1d(path, added)
+        stiffness, excess = balancing_spring(slider, path, response(path))
     found = None
     for at in _changes_of_sign(excess):
         if max(stiffness[at], stiffness[at + 1]) <= 0:
@@ -93,7 +99,8 @@ def outweighed_from(slider: SliderTable, frequency: Array, free: Complex, fed: A
     Infinite if that is not so up to the last one. ``free`` is the part of Λ(iω) without births, and
     ``fed`` the maximum of the rest [N/m], at ascending frequencies.
     """
-    _, excess = balancing_spring(slider, frequency, free - 1j * fed)
+    # Real, the rest asks for a softer spring, with less damping.
+    _, excess = balancing_spring(slider, frequency, free + (1 - 1j) * fed)
     weak = np.flatnonzero(excess <= 0)
     if weak.size == 0:
         return float(frequency[0])
@@ -103,6 +110,19 @@ def outweighed_from(slider: SliderTable, frequency: Array, free: Complex, fed: A
 def _hidden(mass: float, frequency: Array) -> Array:
     """Damping that hides a growth which does not count [N/m]."""
     return 2 * NO_GROWTH / math.pi * mass * frequency**2
+
+
+def _near_minima(path: Array, excess: Array) -> Array:
+    """Points around minima above zero, of which the parabola through three points comes near it."""
+    before, here, after = excess[:-2], excess[1:-1], excess[2:]
+    with np.errstate(all="ignore"):
+        steps = np.diff(path)
+        slope_before, slope_after = (here - before) / steps[:-1], (after - here) / steps[1:]
+        bend = (slope_after - slope_before) / (path[2:] - path[:-2])
+        slope = (steps[1:] * slope_before + steps[:-1] * slope_after) / (path[2:] - path[:-2])
+        is_near = (here > 0) & (here <= before) & (here <= after) & (slope**2 > 2 * bend * here)
+    places = np.flatnonzero(is_near) + 1
+    return np.linspace(path[places - 1], path[places + 1], POINTS_A_MINIMUM).ravel()
 
 
 def _changes_of_sign(values: Array) -> list[int]:

@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize
 from scipy.interpolate import BPoly
@@ -31,6 +30,8 @@ from mesoslip.theory.steady_sliding import depends_on_velocity
 from mesoslip.theory.stretch_density import stretch_density
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from mesoslip.configuration.config import Config
 
 Array = NDArray[np.float64]
@@ -494,6 +495,9 @@ class ForceCurve:
         derived quantities as attributes. Groups: ``critical`` (all X_c), ``stretch_density``
         (Q at the displacements asked for).
         """
+        # It takes longer to import than a curve to compute.
+        import xarray as xr
+
         x = self.samples
         curves = {
             "contact_force": self.force(x),
@@ -530,6 +534,8 @@ class ForceCurve:
 
     def _densities(self) -> xr.Dataset:
         """Q(x; X) at the displacements that the configuration asks for."""
+        import xarray as xr
+
         width = self.newborn_width / self._stretch
         back = self.config.contacts.back_force_ratio
         low, high = min(0.0, back - 6 * width), self.scales.longest + back

@@ -20,6 +20,7 @@ from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.critical_spring import (
     NO_GROWTH,
+    balancing_spring,
     critical_spring,
     has_critical_spring,
     outweighed_from,
@@ -52,9 +53,18 @@ REAL = 1e-9
 MAX_CANDIDATES = 40
 # Points of the search for the frequency up to which contacts may feed the slider, and maximum
 # number of points of the search for a critical spring.
-SEARCH_POINTS, MAX_SEARCH_POINTS = 60, 20_000
-# Standard deviation of lives, over the period, at which they do not turn the response.
+SEARCH_POINTS, MAX_SEARCH_POINTS = 300, 20_000
+# Number of points that resolve each turn by lives, wherever contacts may feed the slider, from
+# which on only those turns are resolved that may matter.
+FEW_POINTS = 8000
+# Standard deviation of lives, times the frequency, at which they do not turn the response unless
+# their distribution has steps.
 AVERAGED_OUT = 12.0
+# Transform of the lives below which they turn nothing.
+NO_LIFE = 1e-6
+# Part of the response that turns with lives, over the rest of the imaginary part, that does not
+# change the sign of this.
+SMALL_TURN = 0.5
 # Maximum number of layers whose frequencies the points of the path resolve.
 MAX_LAYERS = 16
 
@@ -135,14 +145,19 @@ class LinearStability(abc.ABC):
         """dF/dv [N s/m]: below zero sliding is weaker the faster it is."""
 
     @cached_property
-    def is_stable_out_of_step(self) -> bool:
-        """Whether no perturbation grows for contacts whose lives differ by half a breaking stretch.
+    def out_of_step(self) -> LinearStability:
+        """Sliding of contacts whose lives differ by half a breaking stretch; itself if they do.
 
         A large oscillation itself spreads lives by as much. That an instability which needs
         contacts in step stays small is a heuristic, with exceptions (``docs/steady-sliding.md``).
         """
         wide = self._with_wide_thresholds()
-        return self.is_stable if wide is None else type(self)(wide, self.velocity).is_stable
+        return self if wide is None else type(self)(wide, self.velocity)
+
+    @property
+    def is_stable_out_of_step(self) -> bool:
+        """Whether no perturbation grows for contacts out of step; see `out_of_step`."""
+        return self.out_of_step.is_stable
 
     def _with_wide_thresholds(self) -> Config | None:
         """The configuration with thresholds out of step; None if they are as wide already."""
@@ -247,6 +262,9 @@ class LinearStability(abc.ABC):
         last = 1.5 * max(last, coarse[unlike[-1]] if unlike.size else coarse[0])
         # Fast factors: e^(-s l) while lives are alike enough for it not to average out.
         alike = min(last, until)
+        if POINTS_A_TURN * alike * turn > 2 * math.pi * FEW_POINTS:
+            rest = np.imag(slider.numerator / slider.denominator + parts.free + parts.fed)
+            alike = min(alike, _turned_until(coarse, _turning(parts), rest))
         fine = _spaced(0.0, alike, 2 * math.pi / (POINTS_A_TURN * turn))
         late = 2 * math.pi / (POINTS_A_TURN * max(self.delay, 1e-300))
         rest = _spaced(alike, last, late)
@@ -411,11 +429,18 @@ class LinearStability(abc.ABC):
             return path
         frequency = self._scale * np.geomspace(1e-2, 1e6, SEARCH_POINTS)
         parts = self._parts(1j * frequency)
-        fed = np.abs(parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
+        # The fed part itself turns with lives, by as much as it is.
+        fed = 2 * np.abs(parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
+        fed = np.maximum.accumulate(fed[::-1])[::-1]
         last = outweighed_from(self.config.slider, frequency, parts.free, fed)
         # Fixed delays turn the response at all frequencies, lives while they are alike.
         late = self.delay if self.config.contacts.delay_law == "fixed" else 0.0
         alike = min(last, self._alike[1])
+        if POINTS_A_TURN * alike * self._alike[0] > 2 * math.pi * FEW_POINTS:
+            # The softest spring, with the least damping, that turns make of the one without them.
+            turning, slider = _turning(parts), self.config.slider
+            _, rest = balancing_spring(slider, frequency, parts.free + parts.fed + turning)
+            alike = min(alike, _turned_until(frequency, turning, rest))
         count = POINTS_A_TURN * (alike * self._alike[0] + last * late) / (2 * math.pi)
         if not count < MAX_SEARCH_POINTS:
             return None
@@ -530,6 +555,24 @@ def shown_by(config: Config) -> str:
     if has_cycle and config.contacts.reattach and config.interaction is None:
         return "only a run or mesoslip cycle shows it"
     return "only a run shows it"
+
+
+def _turning(parts: Parts) -> Array:
+    """Bound on the part of Λ that turns with the lives, from each frequency on [N/m]."""
+    life = np.maximum.accumulate(parts.life[::-1])[::-1]
+    life[life < NO_LIFE] = 0.0
+    turning: Array = np.abs(parts.fed) * life / (1 - np.minimum(life, 1 - 1e-12))
+    return turning
+
+
+def _turned_until(frequency: Array, turning: Array, rest: Array) -> float:
+    """Frequency up to which lives that are alike may change the sign of the imaginary part.
+
+    ``rest`` is this part [N/m] without what turns, at ascending frequencies.
+    """
+    crossed = np.append(np.diff(np.sign(rest)) != 0, False)
+    turned = np.flatnonzero((turning > SMALL_TURN * np.abs(rest)) | (crossed & (turning > 0)))
+    return float(frequency[min(turned[-1] + 1, len(frequency) - 1)]) if turned.size else 0.0
 
 
 def _spaced(low: float, high: float, step: float) -> Array:

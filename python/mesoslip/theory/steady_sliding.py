@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
 from mesoslip.theory.linear_stability import (
-    AVERAGED_OUT,
     OUT_OF_STEP,
     LinearStability,
     Parts,
@@ -137,7 +136,7 @@ class SteadySliding(LinearStability):
     @property
     def _alike(self) -> tuple[float, float]:
         lives = self.lives
-        return lives.mean_life / self._rate + self.delay, AVERAGED_OUT * self._rate / lives.spread
+        return lives.mean_life / self._rate + self.delay, math.inf
 
     @property
     def is_passive(self) -> bool:
@@ -145,11 +144,10 @@ class SteadySliding(LinearStability):
         return self.delay == 0
 
     @cached_property
-    def is_stable_out_of_step(self) -> bool:
+    def out_of_step(self) -> SteadySliding:
         if self.relative_width >= OUT_OF_STEP:
-            return self.is_stable
-        other = SteadySliding(self.config, self.velocity, relative_width=OUT_OF_STEP)
-        return other.is_stable
+            return self
+        return SteadySliding(self.config, self.velocity, relative_width=OUT_OF_STEP)
 
     @property
     def _ingredients(self) -> str:
@@ -260,8 +258,9 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     """Stiffness of the spring above which steady sliding at the drive's velocity is stable [N/m].
 
     All other parameters are those of the configuration, the mass of the slider for example. It is
-    sought from `MAX_STIFFNESS` down to `MIN_STIFFNESS` times the stiffness of the contacts, with a
-    relative tolerance of a thousandth.
+    `LinearStability.critical_stiffness` where that is known. Otherwise, as for layers with a delay,
+    it is sought from `MAX_STIFFNESS` down to `MIN_STIFFNESS` times the stiffness of the contacts,
+    by factors of two, with a relative tolerance of a thousandth.
 
     Parameters
     ----------
@@ -273,10 +272,22 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     Returns
     -------
     float or None
-        None if sliding is stable with all of these springs, or unstable with the stiffest one.
+        None if sliding is stable with all springs, or unstable with one that is `MAX_STIFFNESS`
+        times as stiff as the contacts.
     """
-    key, max_stiffness = "slider.stiffness", MAX_STIFFNESS * config.contacts.stiffness
-    stiffness = max_stiffness
+    max_stiffness = MAX_STIFFNESS * config.contacts.stiffness
+    sliding = sliding_of(config)
+    if sliding.has_critical_stiffness:
+        critical = (sliding.out_of_step if out_of_step else sliding).critical_stiffness
+        return critical[0] if critical and critical[0] < max_stiffness else None
+    return _first_stable_stiffness(config, max_stiffness, out_of_step=out_of_step)
+
+
+def _first_stable_stiffness(
+    config: Config, max_stiffness: float, *, out_of_step: bool
+) -> float | None:
+    """The same by counting roots, from stiff springs to soft ones by factors of two."""
+    key, stiffness = "slider.stiffness", max_stiffness
     while stiffness > MIN_STIFFNESS * config.contacts.stiffness:
         if not _is_stable(config, key, stiffness, out_of_step=out_of_step):
             if stiffness == max_stiffness:

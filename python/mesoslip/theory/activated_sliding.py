@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from mesoslip.theory.activated_lives import ActivatedLives
 from mesoslip.theory.activated_response import MAX_TURN, ActivatedResponse, Motion
-from mesoslip.theory.linear_stability import AVERAGED_OUT, LinearStability, Parts
+from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
+from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.sliders import mode_frequencies
 from mesoslip.theory.thermal import steady_force, steady_slope
 
@@ -218,14 +219,14 @@ class ActivatedSliding(LinearStability):
         return np.concatenate([path[is_slow], path[~is_slow][::THINNING]])
 
     @property
-    def _alike(self) -> tuple[float, float]:
+    def _turns(self) -> Turns:
         lives = self.lives
         # ⟨∫ a S da⟩, half of the mean square of lives, by the force.
         half_square = (lives.work - lives.back * lives.life) / lives.speed
         spread = math.sqrt(max(2 * half_square - lives.life**2, 1e-12 * lives.life**2))
         # Faster than contacts break, the response has no cycles of births any more.
         until = min(AVERAGED_OUT / spread, SMOOTH_FROM * self._breaking_rate)
-        return lives.life + self.delay, until
+        return Turns(lives.life + self.delay, until, self._fixed_delay)
 
     @property
     def work(self) -> int:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.theory import ageing
-from mesoslip.theory.linear_stability import AVERAGED_OUT, LinearStability, Parts
+from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
+from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.thresholds import threshold_quadrature
 
 Array = NDArray[np.float64]
@@ -123,15 +124,11 @@ class AgeingSliding(LinearStability):
         out_of_step: NDArray[np.bool_] = np.abs(rate) * longest > MAX_TURN
         return out_of_step
 
-    @cached_property
-    def _path(self) -> Array:
-        return self._resolved_path()
-
     @property
-    def _alike(self) -> tuple[float, float]:
+    def _turns(self) -> Turns:
         ends = self._ends
         spread = math.sqrt(max(0.0, float(ends.weight @ (ends.age - self._life) ** 2)))
-        return self._life + self.delay, AVERAGED_OUT / spread
+        return Turns(self._life + self.delay, AVERAGED_OUT / spread, self._fixed_delay)
 
     @property
     def is_passive(self) -> bool:

@@ -11,7 +11,7 @@ import abc
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +20,15 @@ from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.critical_spring import (
     NO_GROWTH,
-    balancing_spring,
     critical_spring,
     has_critical_spring,
-    outweighed_from,
+)
+from mesoslip.theory.frequency_paths import (
+    MAX_POINTS,
+    Parts,
+    Turns,
+    counting_path,
+    search_path,
 )
 from mesoslip.theory.sliders import dynamic_stiffness
 
@@ -33,16 +38,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-# Points of the path along which roots are counted, for each turn of its fastest factor.
-POINTS_A_TURN = 10
-# Maximum angle between the slider's function and its leading power where the path ends.
-UNLIKE_POWER = 0.3
 # Maximum change of the argument between two points of the path along which roots are counted, and
 # maximum number of halvings of an interval.
 MAX_TURN = 0.8
 MAX_HALVINGS = 40
-# Maximum number of points of the path.
-MAX_POINTS = 400_000
 # Maximum growth rate over the frequency of the slider.
 MAX_GROWTH = 1e6
 # Steps of Newton's method, and relative change at which a root is found.
@@ -51,20 +50,6 @@ STEPS, ROOT_TOLERANCE = 25, 1e-10
 REAL = 1e-9
 # Maximum number of starts of Newton's method on the path.
 MAX_CANDIDATES = 40
-# Points of the search for the frequency up to which contacts may feed the slider, and maximum
-# number of points of the search for a critical spring.
-SEARCH_POINTS, MAX_SEARCH_POINTS = 300, 20_000
-# Number of points that resolve each turn by lives, wherever contacts may feed the slider, from
-# which on only those turns are resolved that may matter.
-FEW_POINTS = 8000
-# Standard deviation of lives, times the frequency, at which they do not turn the response unless
-# their distribution has steps.
-AVERAGED_OUT = 12.0
-# Transform of the lives below which they turn nothing.
-NO_LIFE = 1e-6
-# Part of the response that turns with lives, over the rest of the imaginary part, that does not
-# change the sign of this.
-SMALL_TURN = 0.5
 # Maximum number of layers whose frequencies the points of the path resolve.
 MAX_LAYERS = 16
 
@@ -78,15 +63,6 @@ WITHOUT_NEWBORN_WIDTH = (
     "has no linear stability theory for contacts that age or break by thermal activation: they "
     "must attach with one force"
 )
-
-
-class Parts(NamedTuple):
-    """Λ = fed/births + free, for each rate; ``life`` is |ψ e^(-λ τ_d)|."""
-
-    fed: Complex
-    births: Complex
-    free: Complex
-    life: Array
 
 
 class LinearStability(abc.ABC):
@@ -182,10 +158,10 @@ class LinearStability(abc.ABC):
     def _parts(self, rate: Complex) -> Parts:
         """Λ at rates [1/s], in parts."""
 
-    @property
-    @abc.abstractmethod
+    @cached_property
     def _path(self) -> Array:
         """Frequencies along which the argument of the characteristic function is computed."""
+        return counting_path(self.config.slider, self._parts, self._scale, self._turns)
 
     @property
     @abc.abstractmethod
@@ -205,6 +181,11 @@ class LinearStability(abc.ABC):
         values = np.asarray(rate, dtype=np.complex128)
         parts = self._parts(values.ravel())
         return ((parts.fed + parts.free * parts.births) / parts.births).reshape(values.shape)
+
+    @property
+    def _fixed_delay(self) -> float:
+        """Delay of all contacts [s]; 0 where each has its own, which do not turn the response."""
+        return self.delay if self.config.contacts.delay_law == "fixed" else 0.0
 
     def _late(self, rate: Complex) -> tuple[Complex, Complex]:
         """Average of e^(-λ t) over the delays t, and 1 less that to all digits."""
@@ -239,38 +220,6 @@ class LinearStability(abc.ABC):
         """Whether the slider has a motion of its own that the contacts may feed."""
         rate = np.array([1j * self._scale])
         return dynamic_stiffness(self.config.slider, rate) is not None
-
-    def _resolved_path(self) -> Array:
-        """A path that resolves the lives of contacts."""
-        turn, until = self._alike
-        # Beyond the last frequency the slider outweighs any response of the contacts.
-        coarse = self._scale * np.geomspace(1e-2, 1e6, 1500)
-        rate = 1j * coarse
-        slider = dynamic_stiffness(self.config.slider, rate)
-        assert slider is not None
-        parts = self._parts(rate)
-        whole = np.abs(slider.numerator + slider.denominator * parts.free)
-        upper = np.abs(slider.denominator * parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
-        weak = np.flatnonzero(whole < 3 * upper)
-        last = coarse[weak[-1]] if weak.size else coarse[0]
-        # There it grows as the power of λ, off the axis as well, where no part is real.
-        slanting = np.exp(0.25j * math.pi)
-        free = dynamic_stiffness(self.config.slider, slanting * coarse)
-        assert free is not None
-        turn_left = np.angle(free.numerator * slanting**-free.degree)
-        unlike = np.flatnonzero(np.abs(turn_left) > UNLIKE_POWER)
-        last = 1.5 * max(last, coarse[unlike[-1]] if unlike.size else coarse[0])
-        # Fast factors: e^(-s l) while lives are alike enough for it not to average out.
-        alike = min(last, until)
-        if POINTS_A_TURN * alike * turn > 2 * math.pi * FEW_POINTS:
-            rest = np.imag(slider.numerator / slider.denominator + parts.free + parts.fed)
-            alike = min(alike, _turned_until(coarse, _turning(parts), rest))
-        fine = _spaced(0.0, alike, 2 * math.pi / (POINTS_A_TURN * turn))
-        late = 2 * math.pi / (POINTS_A_TURN * max(self.delay, 1e-300))
-        rest = _spaced(alike, last, late)
-        own = np.geomspace(1e-3 * self._scale, last, max(400, 100 * slider.degree))
-        frequencies: Array = np.unique(np.concatenate([[0.0], fine, rest, own[own <= last]]))
-        return frequencies
 
     def _right_of(self, real: float) -> int:
         """Number of roots with a real part above a positive one, by the argument principle.
@@ -427,39 +376,12 @@ class LinearStability(abc.ABC):
         path = self._path[1:]
         if self.delay == 0:
             return path
-        frequency = self._scale * np.geomspace(1e-2, 1e6, SEARCH_POINTS)
-        parts = self._parts(1j * frequency)
-        # The fed part itself turns with lives, by as much as it is.
-        fed = 2 * np.abs(parts.fed) / (1 - np.minimum(parts.life, 1 - 1e-12))
-        fed = np.maximum.accumulate(fed[::-1])[::-1]
-        last = outweighed_from(self.config.slider, frequency, parts.free, fed)
-        # Fixed delays turn the response at all frequencies, lives while they are alike.
-        late = self.delay if self.config.contacts.delay_law == "fixed" else 0.0
-        alike = min(last, self._alike[1])
-        if POINTS_A_TURN * alike * self._alike[0] > 2 * math.pi * FEW_POINTS:
-            # The softest spring, with the least damping, that turns make of the one without them.
-            turning, slider = _turning(parts), self.config.slider
-            _, rest = balancing_spring(slider, frequency, parts.free + parts.fed + turning)
-            alike = min(alike, _turned_until(frequency, turning, rest))
-        count = POINTS_A_TURN * (alike * self._alike[0] + last * late) / (2 * math.pi)
-        if not count < MAX_SEARCH_POINTS:
-            return None
-        return np.unique(
-            np.concatenate(
-                [
-                    path[path <= last],
-                    np.geomspace(path[-1], max(last, path[-1]), SEARCH_POINTS),
-                    _spaced(path[0], alike, 2 * math.pi / (POINTS_A_TURN * self._alike[0])),
-                    _spaced(path[0], last, 2 * math.pi / (POINTS_A_TURN * max(late, 1e-300))),
-                ]
-            )
-        )
+        return search_path(self.config.slider, self._parts, self._scale, self._turns, path)
 
     @property
     @abc.abstractmethod
-    def _alike(self) -> tuple[float, float]:
-        """Mean time from birth to birth [s], and the frequency up to which lives are alike enough
-        for the response to turn with it [1/s]."""
+    def _turns(self) -> Turns:
+        """The times with which the response turns."""
 
     @property
     def _mass(self) -> float:
@@ -555,28 +477,3 @@ def shown_by(config: Config) -> str:
     if has_cycle and config.contacts.reattach and config.interaction is None:
         return "only a run or mesoslip cycle shows it"
     return "only a run shows it"
-
-
-def _turning(parts: Parts) -> Array:
-    """Bound on the part of Λ that turns with the lives, from each frequency on [N/m]."""
-    life = np.maximum.accumulate(parts.life[::-1])[::-1]
-    life[life < NO_LIFE] = 0.0
-    turning: Array = np.abs(parts.fed) * life / (1 - np.minimum(life, 1 - 1e-12))
-    return turning
-
-
-def _turned_until(frequency: Array, turning: Array, rest: Array) -> float:
-    """Frequency up to which lives that are alike may change the sign of the imaginary part.
-
-    ``rest`` is this part [N/m] without what turns, at ascending frequencies.
-    """
-    crossed = np.append(np.diff(np.sign(rest)) != 0, False)
-    turned = np.flatnonzero((turning > SMALL_TURN * np.abs(rest)) | (crossed & (turning > 0)))
-    return float(frequency[min(turned[-1] + 1, len(frequency) - 1)]) if turned.size else 0.0
-
-
-def _spaced(low: float, high: float, step: float) -> Array:
-    """Points between two limits, at most a step apart unless there would be too many."""
-    if high <= low:
-        return np.empty(0)
-    return np.linspace(low, high, min(math.ceil((high - low) / step) + 1, MAX_POINTS // 4))

@@ -20,12 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.theory.frequency_paths import Parts, Turns
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
-from mesoslip.theory.linear_stability import (
-    OUT_OF_STEP,
-    LinearStability,
-    Parts,
-)
+from mesoslip.theory.linear_stability import OUT_OF_STEP, LinearStability
 from mesoslip.theory.lives import newborn_stretch
 
 if TYPE_CHECKING:
@@ -129,14 +126,10 @@ class SteadySliding(LinearStability):
         free = dragging * lives.mass * (rate * self.delay + missing)
         return Parts(fed, births, free, np.abs(transforms.life * late))
 
-    @cached_property
-    def _path(self) -> Array:
-        return self._resolved_path()
-
     @property
-    def _alike(self) -> tuple[float, float]:
-        lives = self.lives
-        return lives.mean_life / self._rate + self.delay, math.inf
+    def _turns(self) -> Turns:
+        turn = self.lives.mean_life / self._rate + self.delay
+        return Turns(turn, math.inf, self._fixed_delay)
 
     @property
     def is_passive(self) -> bool:

@@ -176,9 +176,38 @@ contains
       real(wp) :: threshold
 
       threshold = self%coordinate%threshold(coordinate)
-      density = self%scale * self%law%density(threshold) * threshold**self%exponent &
+      density = self%scale * self%law%density(threshold) * power(threshold, self%exponent) &
          & * self%coordinate%slope(coordinate)
    end function density
+
+   !> A power of a threshold: by roots and products for small multiples of a half, as all are.
+   elemental function power(threshold, exponent)
+      real(wp), intent(in) :: threshold, exponent
+      real(wp) :: power
+
+      integer :: halves
+
+      halves = nint(2.0_wp * exponent)
+      if (abs(2.0_wp * exponent - halves) > 0.0_wp) halves = huge(halves)
+      select case (halves)
+      case (-2)
+         power = 1.0_wp / threshold
+      case (-1)
+         power = 1.0_wp / sqrt(threshold)
+      case (0)
+         power = 1.0_wp
+      case (1)
+         power = sqrt(threshold)
+      case (2)
+         power = threshold
+      case (3)
+         power = threshold * sqrt(threshold)
+      case (4)
+         power = threshold**2
+      case default
+         power = threshold**exponent
+      end select
+   end function power
 
    !> Moments above a threshold.
    pure function above(self, threshold) result(moment)

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import mesoslip
+import mutants
 import pytest
 from conftest import ROOT
 from mesoslip.configuration.sliders import SLIDERS
@@ -311,3 +312,11 @@ def test_every_file_in_fortran_is_listed():
         while not (folder / "meson.build").exists():
             name, folder = f"{folder.name}/{name}", folder.parent
         assert name in (folder / "meson.build").read_text(), path
+
+
+def test_mutants_are_of_these_sources():
+    """The text that each replaces stands once in its source, and its tests are there."""
+    for one in mutants.load(mutants.LIST):
+        assert not one.mistake(), one.label
+        for test in one.tests:
+            assert (ROOT / test.split("::")[0]).is_file(), test

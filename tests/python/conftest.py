@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import gc
 import signal
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from mesoslip import Config, MesoslipError, _core
 from mesoslip.command_line.main import main
 
@@ -22,6 +24,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # New objects between two looks for unused cycles: by default they take 7 % of the time of tests.
 COLLECTION_THRESHOLDS = (20_000, 20, 20)
+
+# Parsers of commands, which typer makes again for each command of a test: 20 ms each.
+typer.main.get_command = functools.cache(typer.main.get_command)
 
 
 def pytest_configure():

@@ -58,8 +58,8 @@ FORCE = {
 }
 
 ME = {"run__engine": "me"}
-# Steps twice as long as by default, for master equations that take a second or more.
-COARSE = ME | {"run__resolution": 0.5}
+# Steps four times as long as by default, for master equations that take some tenths of a second.
+COARSE = ME | {"run__resolution": 1.0}
 RANDOM = {"contacts__delay_law": "exponential"}
 NEWBORN = {"contacts__newborn_width": 0.05}
 TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
@@ -132,7 +132,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "layered, thermal": THERMAL | {"slider": LAYERED | {"base": BASE}},
     "layered, thermal, adams": THERMAL | {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "quasistatic, thermal": THERMAL | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
-    "rigid, thermal, me": THERMAL | ME,
+    "rigid, thermal, me": THERMAL | COARSE,
     "rigid, thermal, me, newborn width": THERMAL
     | NEWBORN
     | RANDOM
@@ -141,7 +141,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "prescribed, thermal, me, table": THERMAL
     | TABLE
     | {"run__engine": "me", "slider": {"kind": "prescribed"}},
-    "layered, thermal, me": THERMAL | {"run__engine": "me", "slider": LAYERED | {"base": BASE}},
+    "layered, thermal, me": THERMAL | COARSE | {"slider": LAYERED | {"base": BASE}},
     "force, thermal, me": FORCE | THERMAL | COARSE,
     "rigid, thermal, ageing": AGEING | THERMAL,
     "prescribed, thermal, ageing, log": AGEING

@@ -14,11 +14,13 @@ from mesoslip.configuration.config import Config
 from mesoslip.cycles.section import Level, Motion, Passage, Trace
 from mesoslip.cycles.settling import (
     MAX_CYCLES,
+    MAX_SPREAD,
     MIN_AMPLITUDE,
     TOLERANCE,
     Settled,
     multipliers,
     settle,
+    variation_after,
 )
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.inputs import ConfigLike, OutputLike, as_config, open_output
@@ -31,8 +33,9 @@ if TYPE_CHECKING:
 # Maximum work for the stability of steady sliding, some seconds.
 MAX_WORK = 400_000
 # Change of the state for multipliers, over N; steps, and error of the modulus of the leading one.
-# Changes much smaller see the steps of the solver.
 CHANGE, MAX_STEPS, MULTIPLIER_ERROR = 3e-3, 6, 0.02
+# Modulation of the density of contacts after which a cycle comes back, and cycles until then.
+MODULATION, CYCLES_AFTER = 0.01, 20
 # A duration without bound [s].
 LONG = 1e9
 # States to start from, by name.
@@ -49,7 +52,7 @@ SUMMARY = {
     "slip_share": ("", "part of the time in slips"),
     "peak_velocity": ("m/s", "maximum of the velocity"),
     "multiplier": ("", "factor of small changes from cycle to cycle, the leading modulus"),
-    "is_stable": ("", "whether the cycle is stable"),
+    "is_stable": ("", "whether period and peaks come back after a small change"),
     "smooth_stable": ("", "whether smooth sliding is linearly stable"),
 }
 
@@ -87,10 +90,14 @@ class Cycle:
     multipliers
         Leading multipliers of the cycle, by modulus: factors by which small changes of the state
         grow from cycle to cycle. Empty if they were not computed.
+    variation
+        Relative variation of period and peaks after a small change, where the leading multiplier is
+        1 or more; otherwise NaN.
     smooth_stable
         Whether smooth sliding is linearly stable; None without a theory.
     error
-        Estimated relative error of period and peaks by the iteration; NaN if not periodic.
+        Estimated relative error of period and peaks by the iteration, or their variation if that is
+        larger; NaN if not periodic.
     cycles
         Passages that were computed, with those for the multipliers.
     solver
@@ -112,6 +119,7 @@ class Cycle:
     slips: int
     slip_share: float
     multipliers: tuple[complex, ...]
+    variation: float
     smooth_stable: bool | None
     error: float
     cycles: int
@@ -132,10 +140,15 @@ class Cycle:
 
     @property
     def is_stable(self) -> bool | None:
-        """Whether the cycle is stable; None if it is not known, as without multipliers."""
+        """Whether period and peaks come back after a small change; None if it is not known, as
+        without multipliers.
+
+        Changes may grow in the fine structure of the distributions alone: the leading multiplier is
+        above 1, and period and peaks stay as they are.
+        """
         if not self.multipliers:
             return None
-        return abs(self.multipliers[0]) < 1
+        return abs(self.multipliers[0]) < 1 or self.variation < MAX_SPREAD
 
     @property
     def state(self) -> Words:
@@ -206,6 +219,11 @@ class Cycle:
             large = f"a cycle of {self.multiple} passages goes on, of {percent}"
         else:
             large = f"a cycle goes on, of {percent}"
+        if self.is_stable and abs(self.multipliers[0]) >= 1:
+            large += (
+                "; small changes grow in the fine structure of distributions alone: period and "
+                f"peaks vary by {100 * self.variation:.1g} %"
+            )
         both = "; both motions are possible" if self.smooth_stable else ""
         return f"from this start {large}; {smooth}{both}"
 
@@ -299,13 +317,16 @@ def settled_cycle(
         progress=progress,
     )
     found: tuple[complex, ...] = ()
-    steps = 0
+    steps, variation = 0, math.nan
     if find_multipliers and settled.motion == "periodic":
         leading, steps = multipliers(
             motion, settled, max_steps=MAX_STEPS, size=CHANGE, tolerance=MULTIPLIER_ERROR
         )
         found = tuple(leading)
-    return _cycle_of(config, settled, found, is_stable, steps)
+        if found and abs(found[0]) >= 1:
+            variation = variation_after(motion, settled, MODULATION, CYCLES_AFTER)
+            steps += CYCLES_AFTER
+    return _cycle_of(config, settled, found, is_stable, steps, variation)
 
 
 def _cycle_of(
@@ -314,6 +335,7 @@ def _cycle_of(
     found: tuple[complex, ...],
     is_stable: bool | None,
     steps: int,
+    variation: float,
 ) -> Cycle:
     passages = settled.passages if settled.motion != "smooth" else []
     periodic = settled.motion == "periodic"
@@ -345,8 +367,9 @@ def _cycle_of(
         slips=slips if periodic else round(slips / count),
         slip_share=math.fsum(one.slip_duration for one in passages) / total if passages else 0.0,
         multipliers=found,
+        variation=variation,
         smooth_stable=is_stable,
-        error=settled.error,
+        error=max(settled.error, variation) if variation < MAX_SPREAD else settled.error,
         cycles=settled.cycles + steps * settled.multiple,
         solver="iteration from section to section"
         + (f", {settled.extrapolations} extrapolations" if settled.extrapolations else ""),

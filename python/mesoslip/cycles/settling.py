@@ -338,6 +338,39 @@ class _Settling:
         )
 
 
+def variation_after(motion: Motion, settled: Settled, part: float, cycles: int) -> float:
+    """Maximum relative change of period and peaks in cycles after a change of the state.
+
+    Parameters
+    ----------
+    motion, settled
+        The motion and its settled cycle.
+    part
+        Part by which the density of pinned contacts over their stretch is modulated at first.
+    cycles
+        Number of cycles, of which the second half counts.
+    """
+    assert settled.level is not None
+    coordinates = Coordinates(motion.config, motion.velocity)
+    words = coordinates.changed(settled.words, coordinates.modulation(settled.words, part))
+    found = []
+    for _ in range(cycles):
+        passages = []
+        for _ in range(settled.multiple):
+            passage = motion.next_passage(words, settled.level)
+            if passage is None:
+                return math.inf
+            words = passage.words
+            passages.append(passage)
+        found.append(_period_and_peak(passages))
+    late, before = np.array(found[cycles // 2 :]), np.array(_period_and_peak(settled.passages))
+    return float(np.max(np.abs(late / before - 1)))
+
+
+def _period_and_peak(passages: Sequence[Passage]) -> tuple[float, float]:
+    return math.fsum(one.period for one in passages), max(one.peak for one in passages)
+
+
 def multipliers(
     motion: Motion, settled: Settled, *, max_steps: int, size: float, tolerance: float
 ) -> tuple[Sequence[complex], int]:

@@ -108,7 +108,7 @@ docs: $(INSTALLED) $(DOCUMENTATION) $(FORMATS) ## Build the documentation into o
 	@$(MAKE) --no-print-directory --output-sync -j2 docs-examples docs-pages
 
 docs-examples: test-formats
-	$(VENV)/bin/pytest -q -m long tests/python/test_documentation.py
+	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -n 2 --dist worksteal -q -m long tests/python/test_documentation.py
 
 docs-pages: $(INSTALLED) $(DOCUMENTATION)
 	$(VENV)/bin/python -m sphinx -b html -W --keep-going -q -d build/docs docs out/docs

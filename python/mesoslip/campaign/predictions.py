@@ -67,15 +67,21 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
     return float(waiting.mean() * oscillator.damping)
 
 
-# Realizations of a configuration come one after another.
-@lru_cache(maxsize=16)
 def _critical_stiffness_ratio(config: Config) -> float:
-    from mesoslip.theory.force_curve import ForceCurve
-
     spring = config.series_stiffness
     contacts = config.contacts
     depends_on_time = contacts.ageing is not None or contacts.thermal is not None
     if not 0 < spring < math.inf or depends_on_time:
         return math.nan
-    length = CURVE_LENGTH * config.contacts.break_stretch
-    return ForceCurve(config.replace({"curve.length": length})).K_star[0] / spring
+    length = CURVE_LENGTH * contacts.break_stretch
+    # F(X) depends on neither, which many maps vary.
+    alike = {"slider.kind": "prescribed", "contacts.delay": 0.0, "curve.length": length}
+    return _critical_stiffness(config.replace(alike)) / spring
+
+
+@lru_cache(maxsize=16)
+def _critical_stiffness(config: Config) -> float:
+    """K* of a force curve [N/m]."""
+    from mesoslip.theory.force_curve import ForceCurve
+
+    return ForceCurve(config).K_star[0]

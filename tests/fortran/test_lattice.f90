@@ -253,7 +253,7 @@ contains
 
    !> Without a delay, and with bonds that keep nearly all force in the lattice, a cascade ends.
    subroutine ends_cascade()
-      integer, parameter :: columns = 4, rows = 4, number = columns * rows
+      integer, parameter :: columns = 4, rows = 4
       type(contact_lattice_type) :: contacts
 
       call build(contacts, columns, rows, 1.0e5_wp, 0.0_wp)

@@ -599,7 +599,8 @@ def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
     assert data.attrs["failures"].count("too much") == 2
     status, _, printed = command("sweep", path, "-o", output, "--pool", "threads")
     assert (status, "0 points computed, 2 read from the store, 2 failed" in printed) == (1, True)
-    status, _, printed = command("sweep", sweep_file(SIMPLE.replace("mean_force", "own.py:text")))
+    path = sweep_file(SIMPLE.replace("mean_force", "own.py:text"))
+    status, _, printed = command("sweep", path, "-o", tmp_path / "text.nc")
     assert status == 1
     assert "returned 'much', not a number" in printed
 

@@ -114,7 +114,7 @@ contains
       !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
-      integer :: length, number
+      integer :: length
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return

@@ -91,7 +91,7 @@ contains
       real(wp), intent(out) :: late, onset
 
       type(growth_type) :: growth
-      real(wp) :: direction, edge, max_breaks, start, end, last, broken, cut, left, heat, squares
+      real(wp) :: direction, edge, max_breaks, start, end, last, cut, left, heat, squares
       integer :: row, column
 
       direction = sign(1.0_wp, displacement - before%displacement)

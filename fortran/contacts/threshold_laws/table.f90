@@ -128,7 +128,7 @@ contains
       !> The cells; their probabilities add up to 1
       type(stretch_cells_type) :: cells
 
-      cells%low = self%low(:self%cells)
+      allocate (cells%low, source=self%low(:self%cells))
       cells%high = self%edge(2:self%cells + 1)
       cells%share = self%above(:self%cells) - self%above(2:self%cells + 1)
       cells%stiffness = self%stiffness(:self%cells)

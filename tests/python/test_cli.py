@@ -140,9 +140,9 @@ def test_commands_import_what_they_need(short, tmp_path, command):
         ["curve", str(short)],
         ["slips", str(output)],
         ["regime", str(output)],
+        ["plot", str(output), "-o", str(tmp_path / "short.png")],
         ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
         ["response", str(steps)],
-        ["plot", str(output), "-o", str(tmp_path / "short.png")],
     ]
     code = f"""
 import json, sys
@@ -169,9 +169,9 @@ json.dump(found, stdout)
         ["scipy.interpolate", "scipy.optimize", "scipy.special"],
         [],
         [],
+        ["matplotlib"],
         ["pandas", "xarray"],
         ["scipy.integrate"],
-        ["matplotlib"],
     ]
 
 

@@ -13,6 +13,7 @@ import xarray as xr
 from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
+from mesoslip.output import files
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.output.writing import write
 from mesoslip.plots import lines
@@ -93,6 +94,25 @@ def test_views_are_complete():
         assert view.options <= options, view.name
         assert (view.compare is None) == (view.compare_panel is None), view.name
         assert view.summary, view.name
+
+
+NAMES_OF_RUNS = ["several", "layered", "quasistatic", "no slip", "me", "two samples"]
+
+
+@pytest.mark.parametrize("options", [{}, {"x": "drive", "end": 0.09}])
+@pytest.mark.parametrize("name", NAMES_OF_RUNS)
+def test_the_picture_of_a_file_is_that_of_its_tree(runs, name, options, tmp_path, monkeypatch):
+    """A file is read without xarray where the view needs no more."""
+    write(runs[name], tmp_path / "run.nc")
+    wanted = mesoslip.plot(runs[name], **options)
+    monkeypatch.setattr(files, "_tree", None)
+    drawn = mesoslip.plot(tmp_path / "run.nc", **options)
+    for axes, twin in zip(drawn.axes, wanted.axes, strict=True):
+        assert axes.get_title(loc="left") == twin.get_title(loc="left")
+        assert axes.get_xlabel() == twin.get_xlabel()
+        for line, other in zip(axes.lines, twin.lines, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
+            assert line.get_label() == other.get_label()
 
 
 def test_views_of_one_name_are_for_different_outputs(runs):

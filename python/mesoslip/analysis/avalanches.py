@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from mesoslip.analysis.avalanche_sizes import (
@@ -22,6 +21,9 @@ from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.tables import PrintedTable, write_table
 from mesoslip.quantities import column
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 NO_AVALANCHES = (
     "the output has no avalanches: they are recorded with [interaction] or "

@@ -67,6 +67,7 @@ WITHOUT_XARRAY = {
     example.example,
     catalogues.slips,
     catalogues.regime,
+    pictures.plot,
 }
 
 # How to install the libraries that the kernels are linked to.

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperOption
 
+from mesoslip.array_packages import hidden
 from mesoslip.command_line.options import OutputsArgument, quantity_or_none, time_of
 
 # Endings of pictures and movies.
@@ -132,21 +133,22 @@ def plot(
     there = [one for one in outputs if is_file(one)]
     if there:
         targets.check_writable(path, there)
-    plots.plot(
-        outputs,
-        path,
-        view=view,
-        snapshot=snapshot,
-        realization=realization,
-        x=None if x is None else x.value,
-        start=-math.inf if start is None else time_of(start, "--from"),
-        end=math.inf if end is None else time_of(end, "--to"),
-        width=quantity_or_none(width, "--width", "m", "8.6 cm", positive=True),
-        font_size=font_size,
-        title=title,
-        letters=letters,
-        style=style,
-    )
+    with hidden():
+        plots.plot(
+            outputs,
+            path,
+            view=view,
+            snapshot=snapshot,
+            realization=realization,
+            x=None if x is None else x.value,
+            start=-math.inf if start is None else time_of(start, "--from"),
+            end=math.inf if end is None else time_of(end, "--to"),
+            width=quantity_or_none(width, "--width", "m", "8.6 cm", positive=True),
+            font_size=font_size,
+            title=title,
+            letters=letters,
+            style=style,
+        )
     typer.echo(str(path), err=True)
 
 

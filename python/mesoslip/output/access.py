@@ -17,7 +17,7 @@ def is_measured(tree: Tree) -> bool:
     return bool(tree.attrs.get("origin") == "measured")
 
 
-def config_of(tree: xr.DataTree, name: str = "the output") -> Config:
+def config_of(tree: Tree, name: str = "the output") -> Config:
     """The configuration of an output.
 
     Raises

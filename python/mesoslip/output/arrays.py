@@ -29,17 +29,27 @@ ENCODINGS = {"missing_value", "scale_factor", "add_offset", "_Unsigned"}
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable in a file, whose values are read when they are needed, or a part of one."""
+    """A variable in a file, whose values are read when they are needed, or a part of one.
+
+    Attributes
+    ----------
+    stored
+        The whole variable.
+    attrs
+        Its attributes.
+    part
+        What is left of dimensions, as NumPy indexes them, by their names.
+    """
 
     stored: netCDF4.Variable[Any]
     attrs: Mapping[str, Any]
-    part: Any = ...
+    part: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of its dimensions."""
-        dimensions: tuple[str, ...] = self.stored.dimensions
-        return dimensions
+        """Names of its dimensions, without those of which one index is left."""
+        names = self.stored.dimensions
+        return tuple(one for one in names if not isinstance(self.part.get(one), int | np.integer))
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -50,12 +60,22 @@ class Variable:
     @cached_property
     def values(self) -> Array:
         """Its values."""
+        index = tuple(self.part.get(one, slice(None)) for one in self.stored.dimensions)
         with LOCK:
-            return np.asarray(self.stored[self.part])
+            # A variable without dimensions takes no empty index.
+            return np.asarray(self.stored[index or ...])
 
-    def __getitem__(self, part: Any) -> Variable:
-        """A part of a whole variable, as NumPy indexes it."""
-        return Variable(self.stored, self.attrs, part)
+    def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Variable:
+        """A part of it, by indices along dimensions that are whole."""
+        part = {**(part or {}), **by_name}
+        assert not self.part.keys() & part.keys()
+        own = {name: index for name, index in part.items() if name in self.stored.dimensions}
+        return Variable(self.stored, self.attrs, {**self.part, **own})
+
+    def __getitem__(self, index: Any) -> Variable:
+        """A part along the first dimension, or along the first ones with several indices."""
+        indices = index if isinstance(index, tuple) else (index,)
+        return self.isel(dict(zip(self.dims, indices, strict=False)))
 
 
 @dataclass(frozen=True)
@@ -89,6 +109,17 @@ class Arrays(Mapping[str, Variable]):
     def to_dataset(self) -> Arrays:
         """The group itself."""
         return self
+
+    def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Arrays:
+        """A part of all variables, by indices along dimensions that are whole."""
+        part = {**(part or {}), **by_name}
+        sizes = {}
+        for name, size in self.sizes.items():
+            left = np.arange(size)[part.get(name, slice(None))]
+            if left.ndim:
+                sizes[name] = left.size
+        variables = {name: one.isel(part) for name, one in self.variables.items()}
+        return Arrays(variables, sizes, self.attrs)
 
 
 # An output of which no more is used than both have.

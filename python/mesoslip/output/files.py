@@ -12,7 +12,7 @@ import netCDF4
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError
-from mesoslip.output.arrays import Tree, arrays_of
+from mesoslip.output.arrays import Arrays, Tree, arrays_of
 from mesoslip.output.file_locks import lock_held
 from mesoslip.output.hdf5 import LOCK, check_links
 from mesoslip.output.old_names import renamed
@@ -56,12 +56,24 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
 
 @contextmanager
 def opened_arrays(path: str | Path) -> Iterator[Tree]:
-    """An output of ``mesoslip run`` without xarray, for what `Arrays` has; see `opened`.
+    """An output of ``mesoslip run`` without xarray, for what `Arrays` has; see `opened_for`."""
+    with opened_for(path, lambda _: True) as tree:
+        check_run(tree, path)
+        yield tree
+
+
+@contextmanager
+def opened_for(path: str | Path, is_enough: Callable[[Arrays], bool]) -> Iterator[Tree]:
+    """An output of any command without xarray, if `Arrays` is enough; see `opened`.
 
     A file whose values must be decoded is read by xarray.
     """
-    with _opened(path, lambda file: arrays_of(file) or _tree(file)) as tree:
-        check_run(tree, path)
+
+    def build(file: netCDF4.Dataset) -> Tree:
+        found = arrays_of(file)
+        return found if found is not None and is_enough(found) else _tree(file)
+
+    with _opened(path, build) as tree:
         yield tree
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
@@ -14,6 +14,8 @@ from mesoslip.errors import ConfigError, FileError, Problem, shown
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mesoslip.output.arrays import Arrays
 
 ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
 OutputLike: TypeAlias = "PathLike | xr.DataTree | xr.Dataset"
@@ -112,15 +114,30 @@ def several(output: OutputLike | Sequence[OutputLike]) -> Sequence[OutputLike]:
     return output
 
 
-def opened(outputs: Sequence[OutputLike], stack: ExitStack) -> tuple[list[xr.DataTree], list[str]]:
-    """Outputs of any command, read when used, and their names."""
+def opened(
+    outputs: Sequence[OutputLike],
+    stack: ExitStack,
+    is_enough: Callable[[Arrays], bool] = lambda _: False,
+) -> tuple[list[xr.DataTree], list[str]]:
+    """Outputs of any command, read when used, and their names.
+
+    Parameters
+    ----------
+    outputs
+        The outputs.
+    stack
+        Closes files.
+    is_enough
+        Whether no more is used of an output in a file than `Arrays` has; it is read so then.
+    """
     from mesoslip.output import files
 
     trees, names = [], []
     for number, one in enumerate(outputs):
         if isinstance(one, str | os.PathLike):
             names.append(str(one))
-            trees.append(stack.enter_context(files.opened(Path(one))))
+            tree = stack.enter_context(files.opened_for(Path(one), is_enough))
+            trees.append(cast("xr.DataTree", tree))
         else:
             tree = _tree(one)
             trees.append(tree)

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import xarray as xr
-
 from mesoslip.errors import FileError
+from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import has_force
 
 
@@ -19,7 +18,7 @@ class Kind(NamedTuple):
     """A kind of output: its name with an article, and whether an output is of it."""
 
     description: str
-    is_of: Callable[[xr.DataTree], bool]
+    is_of: Callable[[Tree], bool]
 
 
 # The kind of an output is the first that fits.
@@ -38,7 +37,7 @@ KINDS = {
 }
 
 
-def kind_of(tree: xr.DataTree) -> str:
+def kind_of(tree: Tree) -> str:
     """The kind of an output, a name in `KINDS`.
 
     Raises
@@ -53,7 +52,7 @@ def kind_of(tree: xr.DataTree) -> str:
     raise FileError(f"the output is neither {', '.join(others)} nor {last}: it has no picture")
 
 
-def kind_of_all(trees: Sequence[xr.DataTree], names: Sequence[str]) -> str:
+def kind_of_all(trees: Sequence[Tree], names: Sequence[str]) -> str:
     """The kind of outputs that go into one picture, or on one page.
 
     Raises

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from mesoslip.output.access import group_of
+from mesoslip.output.arrays import Arrays, Tree
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 
 
-def times_of(tree: xr.DataTree) -> Array:
+def times_of(tree: Tree) -> Array:
     """Times of the trace [s]."""
     times: Array = tree.to_dataset()["time"].values
     return times
@@ -23,7 +27,7 @@ def times_of(tree: xr.DataTree) -> Array:
 class Samples:
     """Samples of a realization in order of time [s]; those in a file are read when needed."""
 
-    data: xr.Dataset
+    data: xr.Dataset | Arrays
     dimension: str
     times: Array
     start: int = 0
@@ -42,7 +46,7 @@ class Samples:
         return values
 
 
-def samples(tree: xr.DataTree, realization: int = 0) -> list[Samples]:
+def samples(tree: Tree, realization: int = 0) -> list[Samples]:
     """Samples of a realization: those of the trace, and the finer ones of its slips."""
     root = tree.to_dataset().isel(realization=realization)
     parts = [Samples(root, "time", root["time"].values)]
@@ -58,7 +62,7 @@ def samples(tree: xr.DataTree, realization: int = 0) -> list[Samples]:
 
 
 def series(
-    tree: xr.DataTree,
+    tree: Tree,
     name: str,
     realization: int = 0,
     window: tuple[float, float] = (-np.inf, np.inf),

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.errors import FileError
+from mesoslip.output.arrays import Tree
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line, max_size
 from mesoslip.plots.trace import UNITS, is_known
@@ -36,7 +36,7 @@ class HorizontalAxis:
             axes.set_xlim(*self.limits)
 
 
-def horizontal_axis(trees: Sequence[xr.DataTree], extent: Extent) -> HorizontalAxis:
+def horizontal_axis(trees: Sequence[Tree], extent: Extent) -> HorizontalAxis:
     """The horizontal axis of the part of outputs that is drawn.
 
     Raises

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
-from mesoslip.analysis.slips import slips
+from mesoslip.analysis.slips import catalogue_of
 from mesoslip.output.access import config_of, is_measured
+from mesoslip.output.arrays import Tree
 from mesoslip.output.samples import samples, times_of
 from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import Curve, curve, draw_curves
@@ -18,32 +18,35 @@ from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.style import BLUE, CONTACT, RED, SPRING, legend_above
 from mesoslip.plots.trace import NAMES, driving_force_of, force_of, is_known
 
+# A slip: its columns of the catalogue, in SI.
+Slip = Mapping[str, float]
 
-def largest_slip(tree: xr.DataTree, extent: Extent = EVERYTHING) -> xr.Dataset | None:
+
+def largest_slip(tree: Tree, extent: Extent = EVERYTHING) -> Slip | None:
     """The slip with the largest drop of the spring force; None if there is no slip."""
-    all_slips = slips(tree)
-    starts = all_slips["start_time"].values
+    columns = catalogue_of(tree).columns
+    starts = columns["start_time"].values
     inside = np.flatnonzero(
-        (all_slips["realization_index"].values == extent.first)
+        (columns["realization_index"].values == extent.first)
         & (starts >= extent.start)
         & (starts <= extent.end)
     )
     if inside.size == 0:
         return None
-    drops = all_slips["force_drop"].values[inside]
-    return all_slips.isel(slip=inside[np.argmax(np.abs(drops))])
+    largest = inside[np.argmax(np.abs(columns["force_drop"].values[inside]))]
+    return {name: float(one.values[largest]) for name, one in columns.items()}
 
 
-def slip_window(slip: xr.Dataset, before: float = 0.3, after: float = 2.0) -> tuple[float, float]:
+def slip_window(slip: Slip, before: float = 0.3, after: float = 2.0) -> tuple[float, float]:
     """Start and end [s] of a window around a slip; margins in units of its duration."""
-    start, duration = slip["start_time"].item(), slip["duration"].item()
+    start, duration = slip["start_time"], slip["duration"]
     return start - before * duration, start + (1 + after) * duration
 
 
 def draw_slip(
     panels: Sequence[Axes],
-    tree: xr.DataTree,
-    slip: xr.Dataset,
+    tree: Tree,
+    slip: Slip,
     names: Sequence[str],
     extent: Extent = EVERYTHING,
     title: str = "largest slip",
@@ -55,7 +58,7 @@ def draw_slip(
     panels
         Axes for the forces, and one for each variable.
     tree, slip
-        The output, and a slip of its catalogue.
+        The output, and a slip.
     names
         The variables.
     extent
@@ -119,9 +122,9 @@ class Sampling(NamedTuple):
     max_contact_interval: float
 
     @classmethod
-    def of(cls, tree: xr.DataTree, slip: xr.Dataset, realization: int) -> Sampling:
+    def of(cls, tree: Tree, slip: Slip, realization: int) -> Sampling:
         """The sampling of a slip."""
-        start, end = slip["start_time"].item(), slip["end_time"].item()
+        start, end = slip["start_time"], slip["end_time"]
         parts = [one.inside((start, end)) for one in samples(tree, realization)]
         count = sum(after - first for first, after in parts)
         limit = fine = (end - start) / MIN_SAMPLES["slip"]
@@ -137,13 +140,13 @@ class Sampling(NamedTuple):
         limit = self.max_contact_interval if name in OF_CONTACTS else self.max_interval
         return self.interval <= limit * (1 + 1e-6)
 
-    def curve(self, tree: xr.DataTree, name: str, extent: Extent, **style: Any) -> Curve:
+    def curve(self, tree: Tree, name: str, extent: Extent, **style: Any) -> Curve:
         """The curve of a variable, or its samples if they do not resolve it."""
         if not self.resolves(name):
             style |= {"linestyle": "", "marker": ".", "markersize": 2.5}
         return curve(tree, name, extent, **style)
 
-    def note(self, tree: xr.DataTree, names: Sequence[str]) -> str:
+    def note(self, tree: Tree, names: Sequence[str]) -> str:
         """The unresolved motions, and the key that helps; empty if all are resolved."""
         if all(self.resolves(one) for one in (*names, *OF_CONTACTS) if is_known(tree, one)):
             return ""
@@ -151,15 +154,15 @@ class Sampling(NamedTuple):
         return text if is_measured(tree) else f"{text};\nfiner: output.slip_interval"
 
 
-def _recorded_slip(slip: xr.Dataset) -> Curve:
+def _recorded_slip(slip: Slip) -> Curve:
     """The spring force at both ends of a slip, as the catalogue has it."""
-    times, forces = (np.array([slip[one].item() for one in pair]) for pair in (TIMES, FORCES))
+    times, forces = (np.array([slip[one] for one in pair]) for pair in (TIMES, FORCES))
     style = {"color": SPRING["color"], "linewidth": 0.7, "label": "from start to end"}
     return Curve(times, forces, style)
 
 
-def _recorded_peak(slip: xr.Dataset) -> Curve:
+def _recorded_peak(slip: Slip) -> Curve:
     """The peak velocity of a slip, as the catalogue has it."""
-    times = np.array([slip[one].item() for one in TIMES])
-    peak = np.full(2, slip["peak_velocity"].item())
+    times = np.array([slip[one] for one in TIMES])
+    peak = np.full(2, slip["peak_velocity"])
     return Curve(times, peak, {"color": RED, "linestyle": "--", "label": "peak"})

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line, max_size
@@ -30,7 +30,7 @@ class Curve(NamedTuple):
     style: dict[str, Any]
 
 
-def curve(tree: xr.DataTree, name: str, extent: Extent, **style: Any) -> Curve:
+def curve(tree: Tree, name: str, extent: Extent, **style: Any) -> Curve:
     """The curve of a variable of a run."""
     horizontal, _ = extent.horizontal
     x, y = line(tree, (horizontal, name), extent, extent.window(tree))
@@ -72,14 +72,14 @@ def draw_curves(
     horizontal.prepare(axes)
 
 
-def others_behind(tree: xr.DataTree, extent: Extent) -> Iterator[Extent]:
+def others_behind(tree: Tree, extent: Extent) -> Iterator[Extent]:
     """Extents of the realizations behind the first one, if none was chosen."""
     if extent.realization is None:
         for number in range(1, min(tree.sizes["realization"], MAX_OTHERS + 1)):
             yield Extent(number, extent.start, extent.end, extent.against, extent.parts // 4)
 
 
-def about_realizations(tree: xr.DataTree, extent: Extent) -> str:
+def about_realizations(tree: Tree, extent: Extent) -> str:
     """Which of several realizations are shown."""
     others = tree.sizes["realization"] - 1
     if others == 0:

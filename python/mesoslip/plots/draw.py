@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.configuration import differences
@@ -18,6 +17,9 @@ from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, legend_above, styled
 from mesoslip.plots.views import VIEWS, view_of
 from mesoslip.plots.views.base import Options, View
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 NO_OPTIONS = Options()
 # Views of which a movie is made without a view, the first that an output has.

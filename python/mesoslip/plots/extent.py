@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.output.arrays import Tree
 from mesoslip.output.samples import times_of
 
 # Horizontal axes: name of the variable, and its label.
@@ -70,7 +70,7 @@ class Extent:
         """Whether the window of time is the whole run."""
         return self.start == -math.inf and self.end == math.inf
 
-    def window(self, tree: xr.DataTree) -> tuple[float, float]:
+    def window(self, tree: Tree) -> tuple[float, float]:
         """Start and end [s] of the part of an output that is drawn.
 
         Raises

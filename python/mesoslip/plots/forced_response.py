@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.experiment import Experiment
@@ -14,6 +15,9 @@ from mesoslip.plots.record import MAX_MARKS
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles, write_title
 from mesoslip.quantities import scale_for, with_error
 from mesoslip.theory.thermal import creep_force
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Samples of the displacement that are drawn, and velocities of the theory.
 MAX_DOTS, THEORY_POINTS = 20_000, 30

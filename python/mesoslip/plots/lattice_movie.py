@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -27,6 +26,9 @@ from mesoslip.plots.lattice import (
 from mesoslip.plots.movie import MAX_FRAMES, Movie, chosen_frames, time_bar
 from mesoslip.plots.trace import driving_force_of
 from mesoslip.quantities import with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Height of the axes of the time and their labels [inch].
 TIME_HEIGHT = 1.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
+from mesoslip.output.arrays import Tree
 from mesoslip.output.samples import Samples, samples
 from mesoslip.plots.extent import MAX_PARTS, Extent
 
@@ -80,7 +80,7 @@ def extremes(
 
 
 def line(
-    tree: xr.DataTree, names: Sequence[str], extent: Extent, window: tuple[float, float]
+    tree: Tree, names: Sequence[str], extent: Extent, window: tuple[float, float]
 ) -> list[Array]:
     """Values of variables along a line: all samples of a window, or the extremes of many."""
     parts = samples(tree, extent.first)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.output.access import group_of
+from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.style import BLUE, RED, YELLOW
@@ -18,7 +18,7 @@ MAX_MARKS = 2000
 
 
 def draw_marks(
-    axes: Axes, tree: xr.DataTree, name: str, extent: Extent, horizontal: HorizontalAxis
+    axes: Axes, tree: Tree, name: str, extent: Extent, horizontal: HorizontalAxis
 ) -> bool:
     """Mark starts and ends of slips, and samples of impulses, on the force of a measured trace.
 
@@ -54,7 +54,7 @@ def draw_marks(
         ),
         (slips["end_time"].values, slips["force_after"].values, "^", "end of a slip", BLUE),
     ]
-    if "noise" in tree.children and "impulse_time" in tree["noise"]:
+    if "noise" in tree.children and "impulse_time" in tree.children["noise"]:
         at = group_of(tree, "noise")["impulse_time"].values
         marks.append((at, np.interp(at, time, force), "x", "impulse, taken off", YELLOW))
     found = False

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -21,6 +22,9 @@ from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.record import draw_record, fit_label, force_unit, title_record
 from mesoslip.plots.style import RED, Canvas, canvas, styled
 from mesoslip.quantities import Scale, scale_for, with_error
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

@@ -17,6 +17,7 @@ from mesoslip.plots.extent import Extent
 from mesoslip.plots.movie import ENDINGS, write
 from mesoslip.plots.printing import Print, finish, printed
 from mesoslip.plots.style import save, styled
+from mesoslip.plots.views import takes_arrays
 from mesoslip.plots.views.base import Options
 
 if TYPE_CHECKING:
@@ -129,7 +130,9 @@ def plot(
     if is_movie and len(outputs) > 1:
         raise FileError(f"{path}: a movie is of one output")
     with ExitStack() as stack, printed(how):
-        trees, names = opened(outputs, stack)
+        trees, names = opened(
+            outputs, stack, lambda tree: not is_movie and takes_arrays(tree, view)
+        )
         if path is not None and is_movie:
             with styled():
                 film = movie_of(trees[0], view, options)

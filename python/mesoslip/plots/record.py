@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties
 from matplotlib.transforms import offset_copy
@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.plots.style import BLUE, axes_width, titles, wrapped
 from mesoslip.quantities import Scale, scale_for, with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

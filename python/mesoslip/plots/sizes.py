@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -13,6 +12,9 @@ from mesoslip.analysis.avalanche_sizes import PowerLawFit, logarithmic_bins
 from mesoslip.analysis.avalanches import NO_AVALANCHES, failures
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

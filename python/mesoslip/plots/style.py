@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
+from mesoslip.output.arrays import Tree
 from mesoslip.output.targets import written_whole
 from mesoslip.plots.printing import current, is_narrow, size_of
 
@@ -43,7 +43,7 @@ def plain(text: str) -> str:
     return " ".join(text.split()).replace("$", r"\$")
 
 
-def caption(tree: xr.DataTree) -> str:
+def caption(tree: Tree) -> str:
     """The changes of a run from its base."""
     base = tree.attrs.get("base_configuration")
     if base is None:
@@ -58,7 +58,7 @@ def caption(tree: xr.DataTree) -> str:
 
 def titles(
     axes: Axes,
-    tree: xr.DataTree,
+    tree: Tree,
     about: str = "",
     *,
     mathematical: str = "",
@@ -90,7 +90,7 @@ def write_title(axes: Axes, text: str) -> None:
     axes.set_title(wrapped(text, axes_width(axes)), loc="left")
 
 
-def headings(tree: xr.DataTree) -> list[str]:
+def headings(tree: Tree) -> list[str]:
     """The title of an output and its changes from its base; none if the picture has a title."""
     if current().title is not None:
         return []

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -14,6 +14,9 @@ from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.names import name_of
 from mesoslip.plots.style import axes_width, characters
 from mesoslip.quantities import Scale, number, scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import is_measured
+from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import TRACE
 
 NAMES = {
@@ -22,19 +22,19 @@ UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()}
 UNITS |= {"time": "s", "friction_coefficient": "1"}
 
 
-def is_known(tree: xr.DataTree, name: str) -> bool:
+def is_known(tree: Tree, name: str) -> bool:
     """Whether an output has values of a variable of the trace: a measured one may not."""
     if not is_measured(tree):
         return True
     # Files of earlier versions have variables without values.
-    return name in tree.data_vars and bool(np.isfinite(tree.to_dataset()[name][0]).any())
+    return name in tree.data_vars and bool(np.isfinite(tree.to_dataset()[name][0].values).any())
 
 
-def force_of(tree: xr.DataTree) -> str:
+def force_of(tree: Tree) -> str:
     """The force that shows the motion: for an elastic slider the mean one in it."""
     return "elastic_force" if "elastic_force" in tree.data_vars else driving_force_of(tree)
 
 
-def driving_force_of(tree: xr.DataTree) -> str:
+def driving_force_of(tree: Tree) -> str:
     """The force at the drive, or the friction coefficient of a measured trace without forces."""
     return "spring_force" if "spring_force" in tree.data_vars else "friction_coefficient"

@@ -7,9 +7,9 @@ import io
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
-import xarray as xr
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
@@ -17,6 +17,9 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import Canvas, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Intervals of a line in each of which the page shows the extremes: fewer than in print.
 PARTS = 1000

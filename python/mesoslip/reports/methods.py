@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import singledispatch
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing, Thermal
@@ -24,6 +23,9 @@ from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError
 from mesoslip.inference import posterior
 from mesoslip.quantities import column, with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MODEL = "earthquake-like model of a multicontact interface [@braun2009; @braun2011; @braun2015]"
 INITIAL = {

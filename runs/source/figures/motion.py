@@ -135,7 +135,7 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
         draw_series(whole, tree, "spring_force", linestyle=style, label=label)
         slip = largest_slip(tree)
         if slip is not None:
-            start = slip["start_time"].item() - 5e-3
+            start = slip["start_time"] - 5e-3
             draw_series(
                 detail,
                 tree,

@@ -6,10 +6,9 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state.measured import fitted_trend, measured_rows
@@ -36,6 +35,9 @@ from mesoslip.errors import FileError
 from mesoslip.output.inputs import OutputLike, as_run, several
 from mesoslip.output.tables import write_table
 from mesoslip.output.variables import Group
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def response(
@@ -118,6 +120,8 @@ def response_of(
         (``hold``), ``rate_and_state`` (``fit``, one for each output and law), ``creep``
         (``force_stage``), ``restarts`` (``restart``) and ``ramps`` (``ramp``).
     """
+    import xarray as xr
+
     fits: list[dict[str, Any]] = []
     analysed = []
     for number, one in enumerate(experiments):
@@ -209,6 +213,8 @@ def _line_variables(group: Group, found: Line | None) -> dict[str, xr.Variable]:
 
 def _dataset(group: Group, dimension: str, rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     """Rows as a dataset, a variable for each column."""
+    import xarray as xr
+
     return xr.Dataset(
         {
             name: group.variable(
@@ -227,6 +233,8 @@ def ratio_name(name: str, suffix: str) -> str:
 
 def _with_ratios(data: xr.Dataset, group: Group, scale: float, suffix: str, of: str) -> xr.Dataset:
     """A dataset with its forces divided by a force as well."""
+    import xarray as xr
+
     ratios = {
         ratio_name(name, suffix): xr.Variable(
             data[name].dims,

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.analysis.experiment import Experiment, Stage
 from mesoslip.analysis.response.columns import HOLDS, empty_row
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.scatter import error_of_mean, scatter
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def hold_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:

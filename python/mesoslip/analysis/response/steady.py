@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from mesoslip.analysis.experiment import Experiment, Stage
 from mesoslip.analysis.response.columns import STEADY, empty_row
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.steady_force import SteadyMean
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def steady_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from mesoslip.analysis.response.dataset import ratio_name, rows_of, scalars_of
 from mesoslip.output.tables import PrintedTable
 from mesoslip.quantities import column, with_error, with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Row = Mapping[str, Any]
 

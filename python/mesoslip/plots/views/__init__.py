@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import pkgutil
 from importlib import import_module
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.output.arrays import Tree
 from mesoslip.output.kinds import KINDS, kind_of
 from mesoslip.plots.views.base import Options, View
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 VIEWS: tuple[View, ...] = tuple(
     import_module(f"{__name__}.{file.name}").VIEW
@@ -41,6 +44,15 @@ def summary_of_views() -> str:
         elif any("measure" in one.options for one in VIEWS if one.kind == kind):
             kinds.append(f"Of {description}: the name of a measure.")
     return " ".join(kinds)
+
+
+def takes_arrays(tree: Tree, name: str | None) -> bool:
+    """Whether the view of an output needs no xarray."""
+    return any(
+        KINDS[one.kind].is_of(tree)
+        for one in VIEWS
+        if one.takes_arrays and one.name == (name or one.kind)
+    )
 
 
 def view_of(tree: xr.DataTree, name: str | None, options: Options) -> View:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.avalanche_sizes import PowerLawFit, ccdf, fit_power_law
@@ -20,6 +20,9 @@ from mesoslip.plots.style import (
 )
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import percent, with_error
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Cutoffs of the fitted laws in formulas, by the exponent of s/s_c.
 CUTOFFS = {1.0: "e^{-s/s_c}", 2.0: "e^{-(s/s_c)^2}"}

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, canvas, shared_legend, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Options of a view of a trace.
 EXTENT = frozenset({"realization", "start, end", "x"})
@@ -47,10 +50,12 @@ class Options:
         return {name for name, given in is_given.items() if given}
 
 
-Draw = Callable[[xr.DataTree, Options, Canvas | None], Canvas]
-DrawPanel = Callable[[Axes, xr.DataTree, Options], None]
-Compare = Callable[[Sequence[xr.DataTree], Sequence[str], Options, Canvas | None], Canvas]
-ComparePanel = Callable[[Axes, Sequence[xr.DataTree], Sequence[str], Options], None]
+Draw: TypeAlias = "Callable[[xr.DataTree, Options, Canvas | None], Canvas]"
+DrawPanel: TypeAlias = "Callable[[Axes, xr.DataTree, Options], None]"
+Compare: TypeAlias = (
+    "Callable[[Sequence[xr.DataTree], Sequence[str], Options, Canvas | None], Canvas]"
+)
+ComparePanel: TypeAlias = "Callable[[Axes, Sequence[xr.DataTree], Sequence[str], Options], None]"
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,8 @@ class View:
         Whether it is for an output, where views of one name are for different outputs of a kind.
     movie
         Makes a movie of an output; None if there is none.
+    takes_arrays
+        Whether its pictures need no more of an output than `mesoslip.output.arrays.Arrays` has.
     """
 
     name: str
@@ -89,6 +96,7 @@ class View:
     compare_panel: ComparePanel | None = None
     applies: Callable[[xr.DataTree], bool] = lambda _: True
     movie: Callable[[xr.DataTree, Options], Movie] | None = None
+    takes_arrays: bool = False
 
 
 def single_panel(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from numbers import Real
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.return_map import settled_peaks
@@ -17,6 +17,9 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.plots.style import BLUE, Canvas
 from mesoslip.plots.views.base import Options, View, single_panel
 from mesoslip.quantities import scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Key of a single run, or of runs without a difference.
 DEFAULT_KEY = "drive.velocity"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -13,6 +14,9 @@ from mesoslip.plots.style import Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.sweep_axis import SweptKey
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

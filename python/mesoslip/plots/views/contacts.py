@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.patches import StepPatch
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, legend_rows, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for, with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

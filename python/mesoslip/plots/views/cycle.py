@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.plots.style import (
@@ -20,6 +20,9 @@ from mesoslip.plots.style import (
 )
 from mesoslip.plots.views.base import Options, View, single_panel
 from mesoslip.quantities import Scale, scale_for, with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from numpy.typing import NDArray
@@ -19,6 +18,9 @@ from mesoslip.plots.printing import UNLETTERED, current, is_narrow
 from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above, plain, styled
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

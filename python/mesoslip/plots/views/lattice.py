@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING
+
 from matplotlib.axes import Axes
 
 from mesoslip.plots.lattice import (
@@ -17,6 +18,9 @@ from mesoslip.plots.lattice_movie import lattice_movie
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import Canvas, canvas, styled
 from mesoslip.plots.views.base import Options, View
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:

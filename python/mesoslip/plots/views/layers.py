@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

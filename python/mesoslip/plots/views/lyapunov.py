@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.plots.style import BLUE, Canvas, curve_color, side_by_side, styled, titles
 from mesoslip.plots.views.base import Options, View, single_panel
 from mesoslip.plots.views.return_map import draw_map
 from mesoslip.quantities import with_error
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:

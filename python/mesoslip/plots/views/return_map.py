@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
@@ -11,6 +12,9 @@ from mesoslip.analysis.return_map import settled_peaks
 from mesoslip.plots.style import BLUE, Canvas, titles
 from mesoslip.plots.views.base import Options, View, single_panel
 from mesoslip.quantities import scale_for
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of, is_measured
+from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
 from mesoslip.plots.close_up import draw_slip, largest_slip
 from mesoslip.plots.curves import about_realizations, curve, draw_curves, others_behind
@@ -34,7 +34,7 @@ from mesoslip.plots.views.base import EXTENT, Options, View
 BELOW = ("velocity", "detached_contacts")
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
     """Force, velocity and detached contacts; beside them the same during the largest slip."""
     extent = options.extent
     slip, horizontal = largest_slip(tree, extent), horizontal_axis([tree], extent)
@@ -53,9 +53,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
             title = f"largest slip (shaded {place})" if is_shaded else "largest slip"
             draw_slip(list(panels[:, 1]), tree, slip, below, extent, title)
             if is_shaded:
-                edges = [
-                    slip[name].item() / horizontal.scale.size for name in ("start_time", "end_time")
-                ]
+                edges = [slip[name] / horizontal.scale.size for name in ("start_time", "end_time")]
                 for axes in panels[:, 0]:
                     axes.axvspan(*edges, color=YELLOW, alpha=0.4, linewidth=0.8, zorder=0)
         for axes in panels[:-1].flat:
@@ -87,12 +85,12 @@ def _panels(figure: Canvas, rows: int, has_slip: bool, is_stacked: bool) -> NDAr
     return panels  # noqa: RET504 (numpy has no type for it)
 
 
-def draw_force(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_force(axes: Axes, tree: Tree, options: Options) -> None:
     """Draw the spring force; for an elastic slider the mean force in it, and that at the drive."""
     _draw_force(axes, tree, options.extent, horizontal_axis([tree], options.extent))
 
 
-def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: HorizontalAxis) -> None:
+def _draw_force(axes: Axes, tree: Tree, extent: Extent, horizontal: HorizontalAxis) -> None:
     name = force_of(tree)
     is_elastic = name == "elastic_force"
     curves = [curve(tree, name, other, **OTHERS) for other in others_behind(tree, extent)]
@@ -114,14 +112,14 @@ def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: Horiz
 
 
 def _draw_variable(
-    axes: Axes, tree: xr.DataTree, name: str, extent: Extent, horizontal: HorizontalAxis
+    axes: Axes, tree: Tree, name: str, extent: Extent, horizontal: HorizontalAxis
 ) -> None:
     """Draw a variable of the trace, with other realizations behind it."""
     curves = [curve(tree, name, other, **OTHERS) for other in others_behind(tree, extent)]
     draw_curves(axes, [*curves, curve(tree, name, extent, color="black")], name, horizontal)
 
 
-def _known_below(trees: Sequence[xr.DataTree]) -> list[str]:
+def _known_below(trees: Sequence[Tree]) -> list[str]:
     """Variables below the force, those that some output has."""
     return [name for name in BELOW if any(is_known(tree, name) for tree in trees)]
 
@@ -132,7 +130,7 @@ def _height(below: Sequence[str]) -> float:
 
 
 def compare(
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[Tree],
     labels: Sequence[str],
     options: Options,
     figure: Canvas | None = None,
@@ -153,7 +151,7 @@ def compare(
 
 
 def compare_forces(
-    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], options: Options
+    axes: Axes, trees: Sequence[Tree], labels: Sequence[str], options: Options
 ) -> None:
     """Draw the forces of several runs over each other."""
     extent = options.extent
@@ -162,7 +160,7 @@ def compare_forces(
 
 def _compare(
     axes: Axes,
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[Tree],
     labels: Sequence[str],
     name: str | None,
     extent: Extent,
@@ -188,7 +186,7 @@ def _compare(
     draw_curves(axes, curves, names[0], horizontal, quantities)
 
 
-def _has_velocity(tree: xr.DataTree) -> bool:
+def _has_velocity(tree: Tree) -> bool:
     return is_measured(tree) or not config_of(tree).slider.jumps
 
 
@@ -201,5 +199,6 @@ VIEW = View(
     options=EXTENT,
     compare=compare,
     compare_panel=compare_forces,
+    takes_arrays=True,
     applies=_has_velocity,
 )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of, group_of, is_measured
+from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.samples import times_of
 from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
@@ -18,13 +19,16 @@ from mesoslip.plots.style import RED, Canvas, canvas, styled, titles
 from mesoslip.plots.views import run
 from mesoslip.plots.views.base import EXTENT, Options, View
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Array = NDArray[np.float64]
 
 # Avalanches with a vector mark each; more of them become an image.
 MAX_MARKS = 3000
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
     """Contact force and sizes of avalanches against the displacement of the slider."""
     extent = _against_displacement(options.extent)
     horizontal, data = horizontal_axis([tree], extent), _catalogue(tree, extent)
@@ -52,13 +56,13 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     return figure
 
 
-def draw_force(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_force(axes: Axes, tree: Tree, options: Options) -> None:
     """Draw the contact force against the displacement of the slider."""
     extent = _against_displacement(options.extent)
     _draw_force(axes, tree, extent, horizontal_axis([tree], extent))
 
 
-def _draw_force(axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: HorizontalAxis) -> None:
+def _draw_force(axes: Axes, tree: Tree, extent: Extent, horizontal: HorizontalAxis) -> None:
     curves = [curve(tree, "contact_force", extent, color="black")]
     draw_curves(axes, curves, "contact_force", horizontal)
     # No other realizations are behind it.
@@ -70,7 +74,7 @@ def _against_displacement(extent: Extent) -> Extent:
     return replace(extent, against=extent.against or "displacement")
 
 
-def _catalogue(tree: xr.DataTree, extent: Extent) -> xr.Dataset:
+def _catalogue(tree: Tree, extent: Extent) -> xr.Dataset | Arrays:
     """Avalanches of a realization in a window of time."""
     data = group_of(tree, "avalanches")
     starts = data["start_time"].values
@@ -79,7 +83,7 @@ def _catalogue(tree: xr.DataTree, extent: Extent) -> xr.Dataset:
     return data.isel(avalanche=np.flatnonzero(inside))
 
 
-def _positions(tree: xr.DataTree, data: xr.Dataset, extent: Extent) -> Array:
+def _positions(tree: Tree, data: xr.Dataset | Arrays, extent: Extent) -> Array:
     """Avalanches along the horizontal axis, in SI."""
     name, _ = extent.horizontal
     starts: Array = data["start_time"].values
@@ -93,7 +97,7 @@ def _positions(tree: xr.DataTree, data: xr.Dataset, extent: Extent) -> Array:
     return positions
 
 
-def _jumps(tree: xr.DataTree) -> bool:
+def _jumps(tree: Tree) -> bool:
     return not is_measured(tree) and config_of(tree).slider.jumps
 
 
@@ -106,5 +110,6 @@ VIEW = View(
     options=EXTENT,
     compare=run.compare,
     compare_panel=run.compare_forces,
+    takes_arrays=True,
     applies=_jumps,
 )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, styled, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
@@ -22,6 +22,9 @@ from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, styled
 from mesoslip.plots.sweep_axis import SweptKey, scale_of, spans_decades
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

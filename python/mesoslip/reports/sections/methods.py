@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
@@ -23,6 +22,9 @@ from mesoslip.reports.methods import (
     sweep_method,
 )
 from mesoslip.reports.references import PROGRAM, REFERENCES, numbered, program
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # How the method of each kind of output is described.
 METHODS: dict[str, Callable[[xr.DataTree, Config], str]] = {

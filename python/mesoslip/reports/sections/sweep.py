@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from mesoslip.configuration import differences
@@ -14,6 +13,9 @@ from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.views.sweep import measures
 from mesoslip.reports.content import Block, Section, Source, Subject, Table, Text
 from mesoslip.reports.sections.base import named, picture_of, row_in_one_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Measures with a picture.
 MAX_MAPS = 12

@@ -156,11 +156,17 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2"), max_cycles=30)
     assert irregular.motion == "irregular"
     assert irregular.spread > 0.02
+    assert sum(irregular.durations) < irregular.followed
+    assert "followed for" in irregular.verdict
     assert irregular.is_stable is None
 
 
 def test_a_state_is_the_same_after_taking_it_apart(regular):
-    assert np.array_equal(Archive(regular.state).words(), regular.state)
+    archive = Archive(regular.state)
+    assert np.array_equal(archive.words(), regular.state)
+    # Nothing of the motion before waits in it: a kernel stops where much does.
+    for section in ("slip trace", "stages"):
+        assert archive.numbers(section, "rows").size == 0, section
 
 
 def test_changes_of_a_state_are_those_asked_for(regular):

@@ -24,6 +24,7 @@ from mesoslip.cycles.settling import (
 )
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.inputs import ConfigLike, OutputLike, as_config, open_output
+from mesoslip.quantities import with_unit
 from mesoslip.simulation.kernel import Array, Words
 from mesoslip.theory.steady_sliding import steady_sliding
 
@@ -95,6 +96,8 @@ class Cycle:
         1 or more; otherwise NaN.
     smooth_stable
         Whether smooth sliding is linearly stable; None without a theory.
+    followed
+        Time for which the motion was followed [s].
     error
         Estimated relative error of period and peaks by the iteration, or their variation if that is
         larger; NaN if not periodic.
@@ -121,6 +124,7 @@ class Cycle:
     multipliers: tuple[complex, ...]
     variation: float
     smooth_stable: bool | None
+    followed: float
     error: float
     cycles: int
     solver: str
@@ -194,6 +198,7 @@ class Cycle:
             "multiplier_imaginary": leading.imag,
             "is_stable": self.is_stable,
             "smooth_stable": self.smooth_stable,
+            "followed": self.followed,
             "error": self.error,
             "cycles": self.cycles,
             "solver": self.solver,
@@ -214,7 +219,8 @@ class Cycle:
             return f"from this start the motion settles to smooth sliding; {smooth}"
         percent = f"{100 * self.amplitude_ratio:.3g} % of F_s"
         if self.motion == "irregular":
-            large = f"an irregular motion goes on, of {percent} in the mean"
+            duration = with_unit(self.followed, "s", 2)
+            large = f"an irregular motion, of {percent} in the mean, was followed for {duration}"
         elif self.multiple > 1:
             large = f"a cycle of {self.multiple} passages goes on, of {percent}"
         else:
@@ -225,6 +231,8 @@ class Cycle:
                 f"peaks vary by {100 * self.variation:.1g} %"
             )
         both = "; both motions are possible" if self.smooth_stable else ""
+        if both and self.motion == "irregular":
+            both += ", the irregular one perhaps for a time only"
         return f"from this start {large}; {smooth}{both}"
 
 
@@ -369,6 +377,7 @@ def _cycle_of(
         multipliers=found,
         variation=variation,
         smooth_stable=is_stable,
+        followed=settled.followed,
         error=max(settled.error, variation) if variation < MAX_SPREAD else settled.error,
         cycles=settled.cycles + steps * settled.multiple,
         solver="iteration from section to section"

@@ -34,6 +34,8 @@ MIN_LEVEL, MAX_LEVEL = 0.65, 0.93
 MAX_LOADINGS, MAX_PERIODS = 8.0, 30.0
 # No bound on the work of a chunk.
 ANY_WORK = 1e18
+# Tables that a slider with a constant drive fills.
+USED_TABLES = ("trace", "slips", "slip_trace", "stages")
 # Steps of Newton's method for the time of a passage.
 NEWTON_STEPS = 6
 
@@ -154,8 +156,7 @@ class Motion:
         rows = []
         while not kernel.ask().ending:
             kernel.advance(CHUNK * CHUNK, ANY_WORK)
-            rows.append(kernel.drain("trace"))
-            kernel.drain("slips")
+            rows.append(_taken(kernel)[0])
         return self._saved(kernel), structured(np.concatenate(rows), TRACE_COLUMNS)
 
     def _saved(self, kernel: Kernel) -> Words:
@@ -176,7 +177,7 @@ class Motion:
         now = start
         while now < limit:
             kernel.advance(CHUNK, ANY_WORK)
-            pieces.append(_Piece(words, now, kernel.drain("trace"), kernel.drain("slips")))
+            pieces.append(_Piece(words, now, *_taken(kernel)))
             found = watch.crossing(pieces[-1].trace)
             if found is not None:
                 kernel.close()
@@ -193,7 +194,7 @@ class Motion:
         kernel = self.open(last.words, time)
         while not kernel.ask().ending:
             kernel.advance(CHUNK, ANY_WORK)
-        pieces.append(_Piece(last.words, last.time, kernel.drain("trace"), kernel.drain("slips")))
+        pieces.append(_Piece(last.words, last.time, *_taken(kernel)))
         return Passage(
             self._saved(kernel),
             start,
@@ -201,6 +202,12 @@ class Motion:
             structured(np.concatenate([one.trace for one in pieces]), TRACE_COLUMNS),
             structured(np.concatenate([one.slips for one in pieces]), SLIP_COLUMNS),
         )
+
+
+def _taken(kernel: Kernel) -> tuple[Array, Array]:
+    """The trace and the slips that wait in a kernel, which waits for all its tables to be taken."""
+    taken = {table: kernel.drain(table) for table in USED_TABLES}
+    return taken["trace"], taken["slips"]
 
 
 class _Piece(NamedTuple):

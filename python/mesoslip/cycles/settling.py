@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mesoslip.cycles.coordinates import Coordinates
 from mesoslip.cycles.decay import Amplitudes
-from mesoslip.cycles.section import Level, Motion, Passage, Trace
+from mesoslip.cycles.section import Level, Motion, Passage, Trace, time_of
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Words
 
@@ -63,6 +63,8 @@ class Settled:
         The section.
     words
         State at the end.
+    followed
+        Time for which the motion was followed [s].
     cycles
         Passages that were computed.
     extrapolations
@@ -81,6 +83,7 @@ class Settled:
     passages: list[Passage]
     level: Level | None
     words: Words
+    followed: float
     cycles: int
     extrapolations: int = 0
     error: float = math.nan
@@ -118,7 +121,7 @@ def settle(
     progress
         Called after each passage with the part of the maximum that is done.
     """
-    run = _Settling(motion, is_stable, root, tolerance)
+    run = _Settling(motion, is_stable, root, tolerance, 0.0 if words is None else time_of(words))
     if words is None or level is None:
         words, trace = motion.go_on(words, run.window)
         level = run.level_of(trace)
@@ -139,9 +142,15 @@ class _Settling:
     """Passages so far."""
 
     def __init__(
-        self, motion: Motion, is_stable: bool | None, root: complex | None, tolerance: float
+        self,
+        motion: Motion,
+        is_stable: bool | None,
+        root: complex | None,
+        tolerance: float,
+        start: float,
     ) -> None:
         self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
+        self._start = start
         self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
@@ -330,6 +339,7 @@ class _Settling:
             passages,
             self._level,
             words,
+            time_of(words) - self._start,
             self._count,
             self._extrapolations,
             error if motion == "periodic" else math.nan,

@@ -312,6 +312,17 @@ def test_numbers_are_read_in_one_way(tmp_path, command, delimiter, row, wanted):
     assert len(errors) < 600
 
 
+def test_a_minus_sign_is_a_hyphen(tmp_path):
+    table = tmp_path / "table.csv"
+    rows = [f"{number},{-number - 1}\n" for number in range(40)]
+    texts = ["time [s],force [uN]\n" + "".join(rows), "".join(rows).replace("-", "\u2212")]
+    table.write_text(texts[0])
+    usual = mesoslip.read_trace(table, velocity="-1 um/s")["spring_force"].values
+    table.write_text("time [s],force [uN]\n" + texts[1], encoding="utf-8")
+    found = mesoslip.read_trace(table, velocity="-1 um/s")["spring_force"].values
+    np.testing.assert_array_equal(found, usual)
+
+
 def test_decimal_commas_that_can_be_nothing_else():
     known = {name: Quantity(name, si, "") for name, si in (("time", "s"), ("force", "N"))}
     cells = cells_of("time [ms];force [uN]\n0,5;1,500\n2;-3,25\n", "table")

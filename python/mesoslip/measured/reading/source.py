@@ -101,7 +101,9 @@ def _limited(path: Path, file: IO[bytes]) -> bytes:
 
 
 def text_of(path: Path, data: bytes) -> str:
-    """The text of a file: UTF-8, UTF-16 or an encoding of Western Europe; line breaks are `\\n`.
+    """The text of a file: UTF-8, UTF-16 or an encoding of Western Europe.
+
+    Line breaks are `\\n`, and minus signs hyphens.
 
     Raises
     ------
@@ -117,7 +119,8 @@ def text_of(path: Path, data: bytes) -> str:
             f"{path}: is neither text nor MATLAB, HDF5, netCDF or .npz: it begins with "
             f"{shown(data[:12])}"
         )
-    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\N{MINUS SIGN}", "-")
 
 
 def _decoded(data: bytes) -> str | None:

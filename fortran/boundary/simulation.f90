@@ -397,7 +397,7 @@ subroutine ask_contacts(handle, count, values, status, message)
    call find_simulation(handle, .true., simulation, error)
    if (.not. allocated(error)) then
       if (simulation%contacts%individual_count() == count) then
-         call simulation%contacts%records(simulation%slider%time, values)
+         call simulation%contacts%records(simulation%slider%time, 1, values)
       else
          call raise(error, status_invalid, "contacts are not kept one by one, or not as many")
       end if

@@ -111,7 +111,7 @@ module mesoslip_contacts_base
       procedure :: individual_count
       !> How the contacts are
       procedure :: snapshot
-      !> State of each contact
+      !> State of some contacts
       procedure :: records
    end type contacts_type
 
@@ -264,14 +264,15 @@ contains
       values = 0.0_wp
    end subroutine snapshot
 
-   !> State of each contact; nothing for contacts that are not kept one by one.
-   pure subroutine records(self, time, values)
+   !> State of some contacts; nothing for contacts that are not kept one by one.
+   pure subroutine records(self, time, first, values)
       !> The contacts
       class(contacts_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
-      !> Numbers in the order of contact_record_length, shape (contact_record_length,
-      !> individual_count)
+      !> The first of the contacts
+      integer, intent(in) :: first
+      !> Numbers in the order of contact_record_length, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       values = 0.0_wp

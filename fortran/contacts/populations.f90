@@ -201,7 +201,7 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
-      call self%pinned%initialize(state)
+      call self%pinned%initialize(state, self%failure)
    end subroutine initialize
 
    !> Contact force as a law, and where it holds: until contacts break, or for a step.

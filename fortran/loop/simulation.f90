@@ -105,7 +105,7 @@ contains
       integer(i8), intent(in) :: max_advances
       !> Work, in units of an advance of a rigid slider or a contact that breaks
       real(wp), intent(in) :: max_work
-      !> Set if the motion makes no progress
+      !> Set if the motion makes no progress, or there is not enough memory
       type(error_type), allocatable, intent(out) :: error
 
       type(segment_type) :: segment
@@ -128,6 +128,10 @@ contains
          end if
          if (allocated(error)) exit
       end do
+      if (allocated(error)) return
+      call self%recorder%report_failure(error)
+      call self%stages%report_failure(error)
+      call self%avalanches%report_failure(error)
    end subroutine run
 
    !> Some advances, by the loop for this family of sliders.

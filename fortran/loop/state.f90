@@ -3,7 +3,7 @@ module mesoslip_loop_state
    use mesoslip_contacts_base, only: contacts_type
    use mesoslip_loop_endings, only: ending_none, stop_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_avalanches, only: avalanche_recorder_type
@@ -275,9 +275,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       type(archive_type) :: archive
+      integer :: stat
 
       if (self%is_started) then
          call raise(error, status_invalid, "the simulation has been started already")
+         return
+      end if
+      allocate (archive%word(size(words, kind=i8)), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for a checkpoint")
          return
       end if
       archive%word = words

@@ -16,6 +16,9 @@ module mesoslip_numerics_archive
    integer, parameter :: name_words = 4, heading_words = name_words + 3
    integer, parameter :: name_length = 8 * name_words
 
+   !> Words that are taken from an array, or put into one, at once
+   integer(i8), parameter :: block = 1024_i8
+
    integer(i8), parameter :: kind_section = 0, kind_real = 1, kind_integer = 2
 
    !> A state as words of 64 bits, with a place where the next entry goes.
@@ -134,11 +137,10 @@ contains
       integer(i8), intent(in) :: length
       real(wp), intent(inout) :: value(length)
 
-      integer(i8), parameter :: most = 1024_i8
-      integer(i8) :: words(most), first, number
+      integer(i8) :: words(block), first, number
 
-      do first = 1, length, most
-         number = min(most, length - first + 1)
+      do first = 1, length, block
+         number = min(block, length - first + 1)
          words(:number) = transfer(value(first:first + number - 1), words, int(number))
          call self%exchange_words(words(:number))
          value(first:first + number - 1) = transfer(words(:number), value, int(number))
@@ -161,12 +163,19 @@ contains
          allocate (longer(max(2_i8 * size(self%word, kind=i8), self%place + more)), stat=stat)
       end if
       if (stat /= 0) then
-         call raise(self%failure, status_memory, "not enough memory for a checkpoint")
+         call lack_memory(self)
          return
       end if
       longer(:self%place) = self%word(:self%place)
       call move_alloc(longer, self%word)
    end subroutine reserve
+
+   !> Note that there is not enough memory.
+   subroutine lack_memory(self)
+      class(archive_type), intent(inout) :: self
+
+      call raise(self%failure, status_memory, "not enough memory for a checkpoint")
+   end subroutine lack_memory
 
    subroutine exchange_real(self, name, value)
       class(archive_type), intent(inout) :: self
@@ -237,7 +246,7 @@ contains
       character(len=*), intent(in) :: name
       real(wp), intent(inout), allocatable :: value(:)
 
-      integer :: extent(2)
+      integer :: extent(2), stat
 
       extent = 1
       if (self%saving) extent(1) = size(value)
@@ -245,7 +254,12 @@ contains
       if (allocated(self%failure)) return
       if (.not. self%saving) then
          if (allocated(value)) deallocate (value)
-         allocate (value(extent(1)))
+         allocate (value(extent(1)), stat=stat)
+         if (stat /= 0) then
+            allocate (value(0))
+            call lack_memory(self)
+            return
+         end if
       end if
       call exchange_flat(self, size(value, kind=i8), value)
    end subroutine exchange_reals
@@ -255,7 +269,7 @@ contains
       character(len=*), intent(in) :: name
       real(wp), intent(inout), allocatable :: value(:, :)
 
-      integer :: extent(2)
+      integer :: extent(2), stat
 
       extent = 0
       if (self%saving) extent = shape(value)
@@ -263,7 +277,12 @@ contains
       if (allocated(self%failure)) return
       if (.not. self%saving) then
          if (allocated(value)) deallocate (value)
-         allocate (value(extent(1), extent(2)))
+         allocate (value(extent(1), extent(2)), stat=stat)
+         if (stat /= 0) then
+            allocate (value(0, 0))
+            call lack_memory(self)
+            return
+         end if
       end if
       call exchange_flat(self, size(value, kind=i8), value)
    end subroutine exchange_matrix
@@ -293,20 +312,22 @@ contains
       character(len=*), intent(in) :: name
       integer, intent(inout), allocatable :: value(:)
 
-      integer(i8), allocatable :: words(:)
-      integer :: extent(2)
+      integer :: extent(2), stat
 
       extent = 1
       if (self%saving) extent(1) = size(value)
       call self%heading(name, kind_integer, extent)
       if (allocated(self%failure)) return
-      if (self%saving) then
-         words = int(value, i8)
-      else
-         allocate (words(extent(1)))
+      if (.not. self%saving) then
+         if (allocated(value)) deallocate (value)
+         allocate (value(extent(1)), stat=stat)
+         if (stat /= 0) then
+            allocate (value(0))
+            call lack_memory(self)
+            return
+         end if
       end if
-      call self%exchange_words(words)
-      if (.not. self%saving) value = int(words)
+      call exchange_flat_integers(self, size(value, kind=i8), value)
    end subroutine exchange_integers
 
    subroutine exchange_integer_matrix(self, name, value)
@@ -314,23 +335,45 @@ contains
       character(len=*), intent(in) :: name
       integer, intent(inout), allocatable :: value(:, :)
 
-      integer, allocatable :: flat(:)
-      integer :: extent(2)
+      integer :: extent(2), length(2), stat
 
       extent = 0
-      if (self%saving) then
-         extent = shape(value)
-         flat = reshape(value, [size(value)])
-      end if
+      if (self%saving) extent = shape(value)
       call self%heading(name, kind_section, extent)
-      call self%exchange_integers(name, flat)
-      if (allocated(self%failure) .or. self%saving) return
-      if (size(flat) == product(extent)) then
-         value = reshape(flat, extent)
-      else
+      length = [product(extent), 1]
+      call self%heading(name, kind_integer, length)
+      if (allocated(self%failure)) return
+      if (length(1) /= product(extent)) then
          call raise(self%failure, status_invalid, "the checkpoint has another size of '" &
             & // name // "'")
+         return
       end if
+      if (.not. self%saving) then
+         if (allocated(value)) deallocate (value)
+         allocate (value(extent(1), extent(2)), stat=stat)
+         if (stat /= 0) then
+            allocate (value(0, 0))
+            call lack_memory(self)
+            return
+         end if
+      end if
+      call exchange_flat_integers(self, size(value, kind=i8), value)
    end subroutine exchange_integer_matrix
+
+   !> Put the integers of an array in, or take them out, of any shape.
+   subroutine exchange_flat_integers(self, length, value)
+      type(archive_type), intent(inout) :: self
+      integer(i8), intent(in) :: length
+      integer, intent(inout) :: value(length)
+
+      integer(i8) :: words(block), first, number
+
+      do first = 1, length, block
+         number = min(block, length - first + 1)
+         words(:number) = int(value(first:first + number - 1), i8)
+         call self%exchange_words(words(:number))
+         if (.not. self%saving) value(first:first + number - 1) = int(words(:number))
+      end do
+   end subroutine exchange_flat_integers
 
 end module mesoslip_numerics_archive

@@ -5,6 +5,7 @@
 module mesoslip_recording_avalanches
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_contacts_base, only: contacts_type, extent_columns, extent_length, &
@@ -80,6 +81,8 @@ module mesoslip_recording_avalanches
       procedure, non_overridable :: close
       !> Begin another run
       procedure, non_overridable :: begin_run
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: begin, take_snapshot
@@ -245,13 +248,38 @@ contains
       !> Time [s], displacement, and displacement from the moving origin [m]
       real(wp), intent(in) :: time, displacement, relative
 
-      real(wp), allocatable :: values(:, :)
-
-      allocate (values(snapshot_length, contacts%individual_count()))
-      call contacts%snapshot(time, relative, values)
+      call self%snapshots%reserve()
+      if (.not. self%snapshots%has_room()) return
+      self%snapshots%count = self%snapshots%count + 1
+      call write_snapshot(contacts%individual_count(), &
+         & self%snapshots%row(:, self%snapshots%count))
       call self%events%add([time, displacement, self%size])
-      call self%snapshots%add(reshape(values, [size(values)]))
+
+   contains
+
+      !> Write a snapshot to where it is kept, as it may be long.
+      subroutine write_snapshot(number, values)
+         !> Number of contacts
+         integer, intent(in) :: number
+         !> Their numbers
+         real(wp), intent(out) :: values(snapshot_length, number)
+
+         call contacts%snapshot(time, relative, values)
+      end subroutine write_snapshot
+
    end subroutine take_snapshot
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The recorder
+      class(avalanche_recorder_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%catalogue%report_failure(error)
+      call self%events%report_failure(error)
+      call self%snapshots%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

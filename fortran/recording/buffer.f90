@@ -1,6 +1,7 @@
 !> Rows that were recorded and wait to be taken away.
 module mesoslip_recording_buffer
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -13,11 +14,16 @@ module mesoslip_recording_buffer
       real(wp), allocatable :: row(:, :)
       !> Rows that wait
       integer :: count = 0
+      !> Set when there is not enough memory for a row, which is then lost
+      type(error_type), allocatable :: failure
    contains
       !> Set up an empty table
       procedure, non_overridable :: open
-      !> Make room for one more row
+      !> Make room for one more row, and whether there is
       procedure, non_overridable :: reserve
+      procedure, non_overridable :: has_room
+      !> Report that rows were lost
+      procedure, non_overridable :: report_failure
       !> Add a row
       procedure, non_overridable :: add
       !> Take the first rows away
@@ -35,8 +41,14 @@ contains
       !> Numbers in a row, and rows for which there is room at first
       integer, intent(in) :: length, room
 
+      integer :: stat
+
       if (allocated(self%row)) deallocate (self%row)
-      allocate (self%row(length, room))
+      allocate (self%row(length, room), stat=stat)
+      if (stat /= 0) then
+         call fail(self)
+         allocate (self%row(length, 0))
+      end if
       self%count = 0
    end subroutine open
 
@@ -46,12 +58,44 @@ contains
       class(buffer_type), intent(inout) :: self
 
       real(wp), allocatable :: longer(:, :)
+      integer :: stat
 
-      if (self%count < size(self%row, 2)) return
-      allocate (longer(size(self%row, 1), 2 * self%count + 1))
+      if (self%has_room()) return
+      allocate (longer(size(self%row, 1), 2 * self%count + 1), stat=stat)
+      if (stat /= 0) then
+         call fail(self)
+         return
+      end if
       longer(:, :self%count) = self%row
       call move_alloc(longer, self%row)
    end subroutine reserve
+
+   !> Whether there is room for one more row.
+   pure function has_room(self)
+      !> The table
+      class(buffer_type), intent(in) :: self
+      !> Whether there is
+      logical :: has_room
+
+      has_room = self%count < size(self%row, 2)
+   end function has_room
+
+   !> Report that rows were lost.
+   subroutine report_failure(self, error)
+      !> The table
+      class(buffer_type), intent(in) :: self
+      !> Set if there was not enough memory for a row
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (allocated(self%failure)) error = self%failure
+   end subroutine report_failure
+
+   !> Note that there is not enough memory.
+   pure subroutine fail(self)
+      class(buffer_type), intent(inout) :: self
+
+      call raise(self%failure, status_memory, "not enough memory for what is recorded")
+   end subroutine fail
 
    !> Add a row.
    subroutine add(self, values)
@@ -61,6 +105,7 @@ contains
       real(wp), intent(in) :: values(:)
 
       call self%reserve()
+      if (.not. self%has_room()) return
       self%count = self%count + 1
       self%row(:, self%count) = values
    end subroutine add
@@ -92,13 +137,24 @@ contains
       type(archive_type), intent(inout) :: archive
 
       real(wp), allocatable :: waiting(:, :)
-      integer :: room
+      integer :: room, stat
 
-      if (archive%saving) waiting = self%row(:, :self%count)
+      if (archive%saving) then
+         allocate (waiting, source=self%row(:, :self%count), stat=stat)
+         if (stat /= 0) then
+            call fail(self)
+            archive%failure = self%failure
+            return
+         end if
+      end if
       call archive%exchange(name, waiting)
       if (archive%saving .or. allocated(archive%failure)) return
       room = max(size(self%row, 2), size(waiting, 2))
       call self%open(size(waiting, 1), room)
+      if (allocated(self%failure)) then
+         archive%failure = self%failure
+         return
+      end if
       self%count = size(waiting, 2)
       self%row(:, :self%count) = waiting
    end subroutine exchange

@@ -15,6 +15,7 @@
 !> in a quarter of a wave, in which the force rises by K u/w: so much is ringing there.
 module mesoslip_recording_minima
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type
@@ -54,6 +55,8 @@ module mesoslip_recording_minima
       procedure, non_overridable :: add
       !> Force that ringing has regained
       procedure, non_overridable :: regained_force
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type minima_type
@@ -153,6 +156,16 @@ contains
       catching_up = max_start_rise * minimum(row_lag) * half_period / pi
       part = part * min(1.0_wp, max(min_ringing_part, catching_up / (drive - block)))
    end function ringing
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The minima
+      class(minima_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%rows%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -2,6 +2,7 @@
 module mesoslip_recording_recorder
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_recording_slips, only: slip_parameters_type, slip_recorder_type
    use mesoslip_recording_trace, only: max_samples_in_step, trace_type
    use mesoslip_sliders_base, only: slider_type
@@ -42,6 +43,8 @@ module mesoslip_recording_recorder
       procedure, non_overridable :: record
       !> Which steps of a slider need record
       procedure, non_overridable :: step_filter
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type recorder_type
@@ -112,6 +115,17 @@ contains
       filter%reference = slider%drive%rate
       call self%slips%narrow(slider, filter)
    end function step_filter
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The recorder
+      class(recorder_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%trace%report_failure(error)
+      call self%slips%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -4,6 +4,7 @@
 !> dropped. They go on until the block has been slow for half a period, or another slip starts.
 module mesoslip_recording_slip_trace
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -57,6 +58,8 @@ module mesoslip_recording_slip_trace
       procedure, non_overridable :: keep
       !> End the trace
       procedure, non_overridable :: stop
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type slip_trace_type
@@ -181,6 +184,16 @@ contains
       self%has_slip = .false.
       self%next_time = huge(1.0_wp)
    end subroutine stop
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The traces
+      class(slip_trace_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%rows%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -23,6 +23,7 @@
 !> block's own.
 module mesoslip_recording_slips
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -106,6 +107,8 @@ module mesoslip_recording_slips
       procedure, non_overridable :: skip_steps
       !> Close a slip at the end of the run
       procedure, non_overridable :: finish
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: change_stage, pass_maximum, pass_minimum
@@ -429,6 +432,18 @@ contains
       if (self%phase == phase_fall) call self%drop_fall()
       call self%trace%stop()
    end subroutine finish
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The recorder
+      class(slip_recorder_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%catalogue%report_failure(error)
+      call self%trace%report_failure(error)
+      call self%minima%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

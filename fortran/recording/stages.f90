@@ -5,6 +5,7 @@
 !> the impulse of the drive.
 module mesoslip_recording_stages
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -42,6 +43,8 @@ module mesoslip_recording_stages
       !> A stage begins, and is over
       procedure, non_overridable :: begin
       procedure, non_overridable :: finish
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type stage_recorder_type
@@ -113,6 +116,16 @@ contains
             & extremes%min_displacement, mean])
       end associate
    end subroutine finish
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The recorder
+      class(stage_recorder_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%rows%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

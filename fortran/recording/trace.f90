@@ -3,6 +3,7 @@
 !> They are taken from the motion between events, so the interval does not change a run.
 module mesoslip_recording_trace
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -49,6 +50,8 @@ module mesoslip_recording_trace
       procedure, non_overridable :: is_full
       !> Take the samples within the last advance of a slider
       procedure, non_overridable :: take_samples
+      !> Report that not all could be recorded
+      procedure, non_overridable :: report_failure
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type trace_type
@@ -111,6 +114,7 @@ contains
          if (self%layers > 0) then
             associate (layers => self%layer_rows)
                call layers%reserve()
+               if (.not. layers%has_room()) exit
                layers%count = layers%count + 1
                call slider%observe_layers(self%next_time, layers%row(:, layers%count))
             end associate
@@ -137,6 +141,17 @@ contains
          & motion%spring_force, motion%contact_force, detached, &
          & motion%elastic_force, motion%base_displacement]
    end function sample_of
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      !> The trace
+      class(trace_type), intent(in) :: self
+      !> Set if there was not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%rows%report_failure(error)
+      call self%layer_rows%report_failure(error)
+   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

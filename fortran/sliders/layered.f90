@@ -10,7 +10,7 @@
 module mesoslip_sliders_layered
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_quadrature, only: gauss_legendre
@@ -99,23 +99,31 @@ contains
       if (allocated(error)) return
       values%solver = solver_codes(solver)
       allocate (self)
-      call new_slider_layered(self, values)
+      call new_slider_layered(self, values, error)
       call move_alloc(self, slider)
    end subroutine make_slider_layered
 
    !> Set up an elastic slider.
-   subroutine new_slider_layered(self, parameters)
+   subroutine new_slider_layered(self, parameters, error)
       !> The slider
       type(slider_layered_type), intent(inout) :: self
       !> Parameters of the slider
       type(layered_parameters_type), intent(in) :: parameters
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
-      integer :: term
+      integer :: term, stat
 
       self%parameters = parameters
       self%cost = 1.0_wp + parameters%layers / layers_per_cost
-      allocate (self%state(0:parameters%layers, 2), source=0.0_wp)
-      allocate (self%series(0:parameters%layers, 2, 0:max_terms), source=0.0_wp)
+      allocate (self%state(0:parameters%layers, 2), source=0.0_wp, stat=stat)
+      if (stat == 0) then
+         allocate (self%series(0:parameters%layers, 2, 0:max_terms), source=0.0_wp, stat=stat)
+      end if
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the layers")
+         return
+      end if
       call gauss_legendre(self%point, self%weight)
       ! The first term left out is below 1e-17 of what a free motion has.
       do term = 1, max_terms

@@ -103,7 +103,7 @@ contains
       name = contacts // ", " // slider // ", " // law
       call build(simulation, contacts, slider, law, width, coupling, "series")
       call check_energy(simulation, initial, 1.0e-11_wp, name)
-      call simulation%contacts%records(simulation%slider%time, record)
+      call simulation%contacts%records(simulation%slider%time, 1, record)
       call check(size(pack(record(2, :), record(2, :) > 0.0_wp)) &
          & + nint(simulation%contacts%detached_count) == count, "contacts are conserved: " // name)
    end subroutine closes

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from dataclasses import fields
 
 import pytest
@@ -72,6 +74,31 @@ def test_columns_are_variables_of_outputs(columns, group, others):
 def test_parameters_are_taken_by_name(parameters, message):
     with pytest.raises(RunError, match=message):
         Kernel().set_slider("rigid", parameters)
+
+
+# Populations of a fine resolution, in a process that gets hardly any more memory.
+WITHOUT_MEMORY = """
+import resource, sys
+from pathlib import Path
+import mesoslip
+overrides = ["run.engine=me", "run.resolution=0.01", "contacts.initial=steady"]
+with mesoslip.Realization(mesoslip.Config.load(sys.argv[1], overrides=overrides)) as run:
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (size + 2**20, resource.RLIM_INFINITY))
+    try:
+        run.advance_to(0.01)
+    except mesoslip.RunError as error:
+        print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the size of the process from /proc")
+def test_memory_that_is_refused_is_an_error():
+    """The kernel does not stop the program."""
+    command = [sys.executable, "-c", WITHOUT_MEMORY, str(ROOT / "runs" / "klein.toml")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "not enough memory for the populations of contacts" in done.stdout
 
 
 def test_unknown_lists_of_names_are_errors():

@@ -289,22 +289,25 @@ contains
       call self%order_renewal%arrange()
    end subroutine rebuild
 
-   !> State of each contact.
-   pure subroutine records(self, time, values)
+   !> State of some contacts.
+   pure subroutine records(self, time, first, values)
       !> The contacts
       class(contact_activated_ageing_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
+      !> The first of the contacts
+      integer, intent(in) :: first
       !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
-      !> number of renewals of each contact, shape (contact_record_length, count)
+      !> number of renewals of each contact, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
-      integer :: contact
+      integer :: contact, place
 
-      call self%contact_activated_type%records(time, values)
-      do contact = 1, self%parameters%count
+      call self%contact_activated_type%records(time, first, values)
+      do place = 1, size(values, 2)
+         contact = first + place - 1
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         values(3, contact) = self%threshold(contact, time)
+         values(3, place) = self%threshold(contact, time)
       end do
    end subroutine records
 

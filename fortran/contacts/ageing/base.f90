@@ -277,23 +277,26 @@ contains
       self%cost = self%cost + visits / visits_per_cost
    end subroutine count_visits
 
-   !> State of each contact.
-   pure subroutine records(self, time, values)
+   !> State of some contacts.
+   pure subroutine records(self, time, first, values)
       !> The contacts
       class(ageing_contacts_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
+      !> The first of the contacts
+      integer, intent(in) :: first
       !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
-      !> number of renewals of each contact, shape (contact_record_length, count)
+      !> number of renewals of each contact, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
-      integer :: contact
+      integer :: contact, place
 
-      do contact = 1, self%parameters%count
-         values(:, contact) = self%record([row_origin, row_stiffness, row_limit, row_renewal], &
+      do place = 1, size(values, 2)
+         contact = first + place - 1
+         values(:, place) = self%record([row_origin, row_stiffness, row_limit, row_renewal], &
             & contact)
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         values(3, contact) = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+         values(3, place) = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
             & time - self%life(life_birth, contact))
       end do
    end subroutine records

@@ -27,6 +27,9 @@ module mesoslip_contacts_individual_base
 
    public :: individual_contacts_type, exchange_individual, total_law, snapshot_individual
 
+   !> Contacts of a snapshot that are evaluated together
+   integer, parameter :: snapshot_block = 256
+
    !> N individual contacts.
    type, abstract, extends(contacts_type) :: individual_contacts_type
       !> Records of the contacts, shape (record_length, count)
@@ -543,20 +546,24 @@ contains
       !> in the current avalanche; shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
 
-      real(wp), allocatable :: now(:, :)
-      integer :: contact
+      real(wp) :: now(contact_record_length, snapshot_block)
+      integer :: first, last, contact
 
-      ! Thresholds of now, which ageing contacts do not keep.
-      allocate (now(contact_record_length, self%parameters%count))
-      call self%records(time, now)
-      do contact = 1, self%parameters%count
-         values(:, contact) = [huge(1.0_wp), 0.0_wp, 0.0_wp]
-         if (self%track%columns > 0) then
-            values(3, contact) = real(self%track%contact(row_generation, contact), wp)
-         end if
-         if (.not. now(2, contact) > 0.0_wp) cycle
-         values(1, contact) = displacement - now(1, contact)
-         values(2, contact) = values(1, contact) / now(3, contact)
+      do first = 1, self%parameters%count, snapshot_block
+         last = min(first + snapshot_block - 1, self%parameters%count)
+         ! Thresholds of now, which ageing contacts do not keep.
+         call self%records(time, first, now(:, :last - first + 1))
+         do contact = first, last
+            values(:, contact) = [huge(1.0_wp), 0.0_wp, 0.0_wp]
+            if (self%track%columns > 0) then
+               values(3, contact) = real(self%track%contact(row_generation, contact), wp)
+            end if
+            associate (one => now(:, contact - first + 1))
+               if (.not. one(2) > 0.0_wp) cycle
+               values(1, contact) = displacement - one(1)
+               values(2, contact) = values(1, contact) / one(3)
+            end associate
+         end do
       end do
    end subroutine snapshot_individual
 
@@ -604,17 +611,20 @@ contains
       number = self%parameters%count
    end function individual_count
 
-   !> Records of all contacts.
-   pure subroutine records(self, time, values)
+   !> Records of some contacts.
+   pure subroutine records(self, time, first, values)
       !> The contacts
       class(individual_contacts_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
+      !> The first of them
+      integer, intent(in) :: first
       !> For each contact: origin [m], stiffness [N/m] (0 while detached), breaking stretch [m],
-      !> number of renewals; shape (contact_record_length, count)
+      !> number of renewals; shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
-      values = self%record([row_origin, row_stiffness, row_limit, row_renewal], :)
+      values = self%record([row_origin, row_stiffness, row_limit, row_renewal], &
+         & first:first + size(values, 2) - 1)
    end subroutine records
 
    !> Write the state to an archive, or read it.

@@ -320,12 +320,20 @@ contains
       !> The two keys
       real(wp), intent(in) :: start, horizon
 
-      integer :: filled(0:max_bins), bin(size(key)), last_contact(size(key))
-      real(wp) :: last_key(size(key)), scale
-      integer :: bins, position, place
+      integer, allocatable :: bin(:), last_contact(:)
+      real(wp), allocatable :: last_key(:)
+      integer :: filled(0:max_bins), bins, position, place, stat
+      real(wp) :: scale
 
       bins = min(max_bins, size(key) / bin_load)
       if (bins < 2 .or. .not. horizon < none) then
+         call sort(key, contact, size(key))
+         return
+      end if
+      allocate (bin(size(key)), stat=stat)
+      if (stat == 0) allocate (last_contact(size(key)), stat=stat)
+      if (stat == 0) allocate (last_key(size(key)), stat=stat)
+      if (stat /= 0) then
          call sort(key, contact, size(key))
          return
       end if

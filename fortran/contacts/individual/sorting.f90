@@ -4,7 +4,7 @@ module mesoslip_contacts_individual_sorting
    implicit none
    private
 
-   public :: before, push, remove_first, sort
+   public :: before, push, remove_first, sort, sort_in_place
 
    !> Beyond this length sorting by insertion gives way to merging.
    integer, parameter :: short_run = 16
@@ -69,7 +69,8 @@ contains
       heap_contact(parent) = contact
    end subroutine remove_first
 
-   !> Sort contacts by key, then by number: short runs by insertion, longer ones by merging.
+   !> Sort contacts by key, then by number: short runs by insertion, longer ones by merging, or in
+   !> place if there is not enough memory for that.
    pure subroutine sort(key, contact, count)
       real(wp), intent(inout), contiguous :: key(:)
       integer, intent(inout), contiguous :: contact(:)
@@ -77,14 +78,19 @@ contains
 
       real(wp), allocatable :: left_key(:)
       integer, allocatable :: left_contact(:)
-      integer :: first, middle, last, run
+      integer :: first, middle, last, run, stat
 
       do first = 1, count, short_run
          call insertion_sort(key, contact, first, min(first + short_run - 1, count))
       end do
       if (count <= short_run) return
 
-      allocate (left_key(count), left_contact(count))
+      allocate (left_key(count), stat=stat)
+      if (stat == 0) allocate (left_contact(count), stat=stat)
+      if (stat /= 0) then
+         call sort_in_place(key, contact, count)
+         return
+      end if
       run = short_run
       do while (run < count)
          do first = 1, count - run, 2 * run
@@ -95,6 +101,38 @@ contains
          run = 2 * run
       end do
    end subroutine sort
+
+   !> Sort contacts by key, then by number, without more memory: by a heap.
+   pure subroutine sort_in_place(key, contact, count)
+      real(wp), intent(inout), contiguous :: key(:)
+      integer, intent(inout), contiguous :: contact(:)
+      integer, intent(in) :: count
+
+      integer :: first, last, first_contact
+      real(wp) :: first_key
+
+      do last = 2, count
+         first_key = key(last)
+         first_contact = contact(last)
+         call push(key, contact, last, first_key, first_contact)
+      end do
+      do last = count, 2, -1
+         first_key = key(1)
+         first_contact = contact(1)
+         call remove_first(key, contact, last)
+         key(last) = first_key
+         contact(last) = first_contact
+      end do
+      do first = 1, count / 2
+         last = count + 1 - first
+         first_key = key(first)
+         first_contact = contact(first)
+         key(first) = key(last)
+         contact(first) = contact(last)
+         key(last) = first_key
+         contact(last) = first_contact
+      end do
+   end subroutine sort_in_place
 
    !> Sort one run by insertion.
    pure subroutine insertion_sort(key, contact, first, last)

@@ -15,6 +15,7 @@ module mesoslip_contacts_populations_activated
    use mesoslip_contacts_populations_survivors, only: new_survivors, no_level, &
       & survivors_type
    use mesoslip_interface_law, only: pose_type
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -80,7 +81,7 @@ contains
    end subroutine set_activation
 
    !> Find what breaks in a motion of the slider.
-   subroutine try_motion(self, before, after, displacement, late, onset)
+   subroutine try_motion(self, before, after, displacement, late, onset, error)
       !> The populations
       class(activated_populations_type), intent(inout) :: self
       !> Pose of the slider, and where it comes to
@@ -89,6 +90,8 @@ contains
       real(wp), intent(in) :: displacement
       !> Breaks of populations that start to come to their thresholds, and where most of them do [m]
       real(wp), intent(out) :: late, onset
+      !> Set if there is not enough memory; nothing breaks then
+      type(error_type), allocatable, intent(inout) :: error
 
       type(growth_type) :: growth
       real(wp) :: direction, edge, max_breaks, start, end, last, cut, left, heat, squares
@@ -97,12 +100,13 @@ contains
       direction = sign(1.0_wp, displacement - before%displacement)
       if (.not. abs(displacement - before%displacement) > 0.0_wp) direction = before%direction
       column = merge(column_ahead, column_behind, direction > 0.0_wp)
-      call self%make_room_to_try()
+      late = 0.0_wp
+      onset = displacement
+      call self%make_room_to_try(error)
+      if (allocated(error)) return
       growth = self%activation%growth(before, after)
       edge = direction * before%displacement + tiny_gap * self%step
-      late = 0.0_wp
       max_breaks = 0.0_wp
-      onset = displacement
       associate (trial => self%trial, population => self%population)
          trial%end = displacement
          trial%time = after%time

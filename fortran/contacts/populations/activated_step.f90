@@ -89,7 +89,8 @@ contains
       do trial_number = 1, max_trials
          after = pose_after()
          call self%pinned%try_motion(pose, after, pose%displacement + direction * reach, late, &
-            & onset)
+            & onset, self%failure)
+         if (allocated(self%failure)) return
          if (may_end_early .and. late > self%max_late &
             & .and. abs(onset - pose%displacement) < reach) then
             ! Where many populations start to come to their thresholds the force has a kink.

@@ -11,6 +11,7 @@ module mesoslip_contacts_populations_breaking
       & massive, moments_length, number, population_rows_type, stiff
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -69,7 +70,7 @@ module mesoslip_contacts_populations_breaking
 contains
 
    !> Find what breaks until the slider comes to a displacement.
-   subroutine try(self, before, displacement, time, direction, late, onset)
+   subroutine try(self, before, displacement, time, direction, late, onset, error)
       !> The populations
       class(breaking_populations_type), intent(inout) :: self
       !> Pose of the slider
@@ -79,12 +80,17 @@ contains
       !> Breaks of populations that start to break in the displacement, and where most of them do
       !> so [m]
       real(wp), intent(out) :: late, onset
+      !> Set if there is not enough memory; nothing breaks then
+      type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: next
       integer :: column
 
       column = merge(column_ahead, column_behind, direction > 0.0_wp)
-      call self%make_room_to_try()
+      late = 0.0_wp
+      onset = displacement
+      call self%make_room_to_try(error)
+      if (allocated(error)) return
       self%trial%end = displacement
       self%trial%time = time
       self%trial%direction = direction
@@ -258,24 +264,34 @@ contains
    end function more_lost
 
    !> Make room for a trial of all populations.
-   subroutine make_room_to_try(self)
+   subroutine make_room_to_try(self, error)
+      !> The populations
       class(breaking_populations_type), intent(inout) :: self
+      !> Set if there is not enough memory; the trial is empty then
+      type(error_type), allocatable, intent(inout) :: error
 
-      integer :: rows
+      integer :: rows, stat
 
       rows = size(self%population, 1)
       if (allocated(self%trial%population)) then
          if (size(self%trial%population) == rows) return
-         deallocate (self%trial%population, self%trial%force, self%trial%distance, &
-            & self%trial%broken, self%trial%level, self%trial%moments, self%trial%lost)
       end if
-      allocate (self%trial%population(rows), self%trial%force(rows), &
-         & self%trial%distance(rows), self%trial%broken(rows))
-      allocate (self%trial%level(rows), source=no_level)
-      allocate (self%trial%moments(moments_length, rows), self%trial%lost(rows))
-      if (.not. allocated(self%kept)) return
-      if (allocated(self%trial%kept)) deallocate (self%trial%kept)
-      allocate (self%trial%kept(size(self%kept, 1), rows))
+      self%trial = trial_type()
+      associate (trial => self%trial)
+         allocate (trial%population(rows), stat=stat)
+         if (stat == 0) allocate (trial%force(rows), stat=stat)
+         if (stat == 0) allocate (trial%distance(rows), stat=stat)
+         if (stat == 0) allocate (trial%broken(rows), stat=stat)
+         if (stat == 0) allocate (trial%level(rows), source=no_level, stat=stat)
+         if (stat == 0) allocate (trial%moments(moments_length, rows), stat=stat)
+         if (stat == 0) allocate (trial%lost(rows), stat=stat)
+         if (stat == 0 .and. allocated(self%kept)) then
+            allocate (trial%kept(size(self%kept, 1), rows), stat=stat)
+         end if
+      end associate
+      if (stat == 0) return
+      self%trial = trial_type()
+      call raise(error, status_memory, "not enough memory for the populations of contacts")
    end subroutine make_room_to_try
 
    !> List the populations of which contacts break until the slider comes to a displacement.

@@ -351,11 +351,12 @@ contains
       real(wp) :: late, onset, displacement
 
       call self%pinned%try(pose, pose%displacement + direction * distance, &
-         & expected_time(distance), direction, late, onset)
+         & expected_time(distance), direction, late, onset, self%failure)
       if (late > self%max_late) then
          displacement = onset
          distance = abs(displacement - pose%displacement)
-         call self%pinned%try(pose, displacement, expected_time(distance), direction, late, onset)
+         call self%pinned%try(pose, displacement, expected_time(distance), direction, late, &
+            & onset, self%failure)
       end if
 
    contains

@@ -7,6 +7,7 @@ module mesoslip_contacts_populations_packets
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_mechanics, only: delay_exponential
    use mesoslip_contacts_populations_motion, only: max_time, patience, position_at
@@ -93,13 +94,15 @@ contains
    end subroutine new_detached_packets
 
    !> Take up contacts that broke evenly from one time to another.
-   subroutine add(self, start_time, end_time, number, mass)
+   subroutine add(self, start_time, end_time, number, mass, error)
       !> The packets
       class(detached_packets_type), intent(inout) :: self
       !> From when and until when they broke [s]
       real(wp), intent(in) :: start_time, end_time
       !> How many they are, and their mass
       real(wp), intent(in) :: number, mass
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
       call self%number%add(number)
       call self%mass%add(mass)
@@ -114,7 +117,8 @@ contains
       self%pending(row_number) = self%pending(row_number) + number
       self%pending(row_mass) = self%pending(row_mass) + mass
       if (self%pending(row_number) < self%negligible) return
-      if (self%last == size(self%packet, 2)) call self%make_room()
+      if (self%last == size(self%packet, 2)) call self%make_room(error)
+      if (allocated(error)) return
       self%last = self%last + 1
       self%packet(:, self%last) = self%pending
       self%pending = 0.0_wp
@@ -133,15 +137,20 @@ contains
    end function is_empty
 
    !> Make room for one more packet: where some have attached, or in a larger array.
-   subroutine make_room(self)
+   subroutine make_room(self, error)
       class(detached_packets_type), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
 
       real(wp), allocatable :: larger(:, :)
-      integer :: waiting
+      integer :: waiting, stat
 
       waiting = self%last - self%first + 1
       if (2 * waiting > size(self%packet, 2)) then
-         allocate (larger(packet_length, 2 * size(self%packet, 2)), source=0.0_wp)
+         allocate (larger(packet_length, 2 * size(self%packet, 2)), source=0.0_wp, stat=stat)
+         if (stat /= 0) then
+            call raise(error, status_memory, "not enough memory for the detached contacts")
+            return
+         end if
          larger(:, :waiting) = self%packet(:, self%first:self%last)
          call move_alloc(larger, self%packet)
       else

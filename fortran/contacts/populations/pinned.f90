@@ -11,6 +11,7 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
       & new_population_rows, number, stiff
    use mesoslip_contacts_populations_table_lives, only: new_table_lives, newborn_law
+   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -182,11 +183,13 @@ contains
    end subroutine set_ageing
 
    !> Prepare the populations for the start of a run.
-   subroutine initialize(self, state)
+   subroutine initialize(self, state, error)
       !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
       integer :: class
       real(wp) :: total
@@ -194,14 +197,15 @@ contains
       if (state == initial_steady) then
          do class = 1, self%classes
             call self%add_sliding(self%class_force(class), self%share(class), &
-               & self%law_of(class, 1.0_wp), self%class_broken(class))
+               & self%law_of(class, 1.0_wp), self%class_broken(class), error)
          end do
       else if (state == initial_uniform) then
-         call self%add_sliding(0.0_wp, 1.0_wp, 2, 0.0_wp)
+         call self%add_sliding(0.0_wp, 1.0_wp, 2, 0.0_wp, error)
       else
          call self%add(0.0_wp, 0.0_wp, real(self%parameters%count, wp), 1, 0.0_wp, 0.0_wp, &
-            & -self%ageing%initial_age, 0.0_wp)
+            & -self%ageing%initial_age, 0.0_wp, error)
       end if
+      if (allocated(error)) return
       if (state == initial_steady .or. state == initial_uniform) then
          total = self%number_of_contacts()
          associate (weight => self%population(:self%count, column_weight), &
@@ -215,7 +219,7 @@ contains
    end subroutine initialize
 
    !> Add contacts that attached with one force, as many in each displacement.
-   subroutine add_sliding(self, force, share, moments, broken)
+   subroutine add_sliding(self, force, share, moments, broken, error)
       !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> Relative force at attaching, and relative number of contacts
@@ -224,6 +228,8 @@ contains
       integer, intent(in) :: moments
       !> Relative threshold at or below which none attached
       real(wp), intent(in) :: broken
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: max_distance, cell, middle, edge, even, least
 
@@ -236,7 +242,7 @@ contains
          edge = 0.0_wp
          even = 1.0_wp
          if (self%parameters%law%width > max_spread) even = min_even
-         do while (edge < max_distance)
+         do while (edge < max_distance .and. .not. allocated(error))
             ! The tails of wide laws are spread over many stretches, and smooth; many of their
             ! thresholds are small.
             cell = min(self%step / self%stretch * max(even, edge), max_distance - edge)
@@ -245,13 +251,13 @@ contains
             least = middle
             if (.not. self%has_table) least = max(broken, broken_threshold(coupling, force, middle))
             call self%add(-middle * self%stretch, force, share * cell, moments, least, 0.0_wp, &
-               & -self%ageing%initial_age, 0.0_wp)
+               & -self%ageing%initial_age, 0.0_wp, error)
          end do
       end associate
    end subroutine add_sliding
 
    !> Attach contacts as one population for each force, where they do on average.
-   subroutine attach(self, births, moment, direction, displacement, birth, time, lost)
+   subroutine attach(self, births, moment, direction, displacement, birth, time, lost, error)
       !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> How many they are, the sum of their displacements [m], and the direction of their forces
@@ -260,6 +266,8 @@ contains
       real(wp), intent(in) :: displacement, birth, time
       !> Elastic energy that is lost as contacts join others [J]
       real(wp), intent(out) :: lost
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: origin, force, mean_force
       integer :: class
@@ -281,7 +289,9 @@ contains
                & births * self%newborn_share(class), mean_force, displacement, time, lost)
          else
             call self%add(origin, force, self%share(class) * births, &
-               & self%law_of(class, direction), self%class_broken(class), displacement, birth, time)
+               & self%law_of(class, direction), self%class_broken(class), displacement, birth, &
+               & time, error)
+            if (allocated(error)) return
             if (self%is_activated) call self%begin_hazard(self%count, time - birth, mean_force)
          end if
       end do

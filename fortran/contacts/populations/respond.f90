@@ -41,7 +41,8 @@ contains
          associate (trial => self%pinned%trial)
             self%breaks = self%breaks + trial%breaks
             call self%step_work%add(trial%work)
-            call self%detached%add(before%time, after%time, trial%breaks, trial%mass)
+            call self%detached%add(before%time, after%time, trial%breaks, trial%mass, &
+               & self%failure)
          end associate
       end if
       if (.not. self%detached%is_empty()) call attach_due(self, start, end)
@@ -79,7 +80,8 @@ contains
       end if
       if (.not. has_broken) return
       if (.not. self%pinned%has_tried(after%displacement, after%time)) then
-         call self%pinned%try(before, after%displacement, after%time, direction, late, onset)
+         call self%pinned%try(before, after%displacement, after%time, direction, late, onset, &
+            & self%failure)
       end if
    end subroutine try_to_break
 
@@ -94,7 +96,8 @@ contains
 
       has_broken = self%pinned%count > 0 .and. (after%time > before%time &
          & .or. abs(after%displacement - before%displacement) > 0.0_wp)
-      if (has_broken) call self%pinned%try_motion(before, after, after%displacement, late, onset)
+      if (has_broken) call self%pinned%try_motion(before, after, after%displacement, late, onset, &
+         & self%failure)
    end subroutine try_activated
 
    !> Take a motion as even in which the slider may have oscillated many times, by next to nothing.
@@ -166,7 +169,7 @@ contains
          & * (0.5_wp * self%pinned%newborn_stiffness * (after%displacement - origin) &
          & + self%parameters%static_force * force))
       call self%pinned%attach(births, moment, after%direction, after%displacement, &
-         & min(when / births, after%time), after%time, lost)
+         & min(when / births, after%time), after%time, lost, self%failure)
       call self%step_work%add(lost)
    end subroutine attach_due
 

@@ -22,6 +22,7 @@ module mesoslip_contacts_populations_rows
    use mesoslip_contacts_populations_table_lives, only: table_lives_type
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -135,7 +136,7 @@ contains
    end subroutine new_population_rows
 
    !> Add a population.
-   subroutine add(self, origin, force, weight, law, broken, displacement, birth, time)
+   subroutine add(self, origin, force, weight, law, broken, displacement, birth, time, error)
       class(population_rows_type), intent(inout) :: self
       !> Where it attached [m], with what force, how many contacts, with which law
       real(wp), intent(in) :: origin, force, weight
@@ -146,10 +147,13 @@ contains
       real(wp), intent(in) :: displacement
       !> When it attached, and when that is [s]
       real(wp), intent(in) :: birth, time
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: moments(moments_length), ahead, behind
 
-      call self%make_room()
+      call self%make_room(error)
+      if (allocated(error)) return
       self%count = self%count + 1
       if (self%has_table) then
          ahead = max(broken, self%table_lives%shortest(law, 1.0_wp))
@@ -180,22 +184,30 @@ contains
    end subroutine add
 
    !> Make room for one more population.
-   subroutine make_room(self)
+   subroutine make_room(self, error)
       class(population_rows_type), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
 
-      real(wp), allocatable :: larger(:, :)
+      real(wp), allocatable :: population(:, :), left(:, :), kept(:, :)
+      integer :: stat
 
       if (self%count < size(self%population, 1)) return
-      allocate (larger(2 * self%count, population_length), source=0.0_wp)
-      larger(:self%count, :) = self%population
-      call move_alloc(larger, self%population)
-      allocate (larger(moments_length, 2 * self%count), source=0.0_wp)
-      larger(:, :self%count) = self%left
-      call move_alloc(larger, self%left)
-      if (.not. allocated(self%kept)) return
-      allocate (larger(size(self%kept, 1), 2 * self%count), source=0.0_wp)
-      larger(:, :self%count) = self%kept
-      call move_alloc(larger, self%kept)
+      allocate (population(2 * self%count, population_length), source=0.0_wp, stat=stat)
+      if (stat == 0) allocate (left(moments_length, 2 * self%count), source=0.0_wp, stat=stat)
+      if (stat == 0 .and. allocated(self%kept)) then
+         allocate (kept(size(self%kept, 1), 2 * self%count), source=0.0_wp, stat=stat)
+      end if
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the populations of contacts")
+         return
+      end if
+      population(:self%count, :) = self%population
+      call move_alloc(population, self%population)
+      left(:, :self%count) = self%left
+      call move_alloc(left, self%left)
+      if (.not. allocated(kept)) return
+      kept(:, :self%count) = self%kept
+      call move_alloc(kept, self%kept)
    end subroutine make_room
 
    !> Displacement at which contacts of a population break next in a direction.

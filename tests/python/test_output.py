@@ -387,6 +387,8 @@ def test_what_a_killed_process_left_behind_is_removed(tmp_path):
         tmp_path / f".{node}-{os.getpid()}-1.out.nc",
         tmp_path / f".elsewhere-{dead.pid}-1.out.nc",
         tmp_path / f".{node}-{dead.pid}-1.other.nc",
+        # A number that no process can have.
+        tmp_path / f".{node}-{10**30}-1.out.nc",
     ]
     for one in (left, *others):
         one.touch()

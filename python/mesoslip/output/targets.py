@@ -132,8 +132,8 @@ def _remove_left_behind(path: Path) -> None:
         except ProcessLookupError:
             with suppress(OSError):
                 other.unlink(missing_ok=True)
-        except OSError:
-            # A process of another user, still running.
+        except (OSError, OverflowError):
+            # A process of another user, still running, or a number that no process has.
             continue
 
 

@@ -10,10 +10,12 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT
+from mesoslip.cycles import branch
 from mesoslip.cycles.branch import adapted
 from mesoslip.cycles.coordinates import SLIDER, Coordinates
 from mesoslip.cycles.cycle import master_equation
 from mesoslip.cycles.section import Motion
+from mesoslip.cycles.settling import _Settling
 from mesoslip.simulation.archive import Archive
 from mesoslip.theory.steady_sliding import SteadySliding
 from scipy.optimize import minimize_scalar
@@ -187,6 +189,40 @@ def test_branches_go_on_from_the_value_before(regular):
     assert np.all(found["growth_rate"] > 0)
     with pytest.raises(mesoslip.ConfigError, match=r"contacts\.delay"):
         mesoslip.branches(configuration(), "contacts.count", [10, 20])
+
+
+def test_the_end_of_an_oscillation_is_found(regular, monkeypatch):
+    """Going down only: upwards the oscillation begins where smooth sliding gets unstable."""
+    limit = 1.234e-3
+
+    def settled(config, *_, **__):
+        motion = "periodic" if config.contacts.delay > limit else "smooth"
+        return dataclasses.replace(regular, config=config, motion=motion)
+
+    monkeypatch.setattr(branch, "_next", settled)
+    found = mesoslip.branches(configuration(), "contacts.delay", [1e-3, 2e-3, 3e-3])
+    assert found["end_direction"].values.tolist() == [1]
+    (value,), (beyond,) = found["end_value"].values, found["end_beyond"].values
+    assert beyond <= limit < value < 1.01 * beyond
+    assert found["end_value"].attrs["units"] == "s"
+    assert found["end_amplitude_ratio"].values == pytest.approx(regular.amplitude_ratio)
+    labels = [line.get_label() for line in mesoslip.plot(found).axes[0].lines]
+    assert "end of the oscillation" in labels
+
+
+@pytest.mark.parametrize(("alternation", "multiple"), [(0.0, 1), (0.05, 2)])
+def test_passages_that_differ_by_their_errors_are_of_one_cycle(regular, alternation, multiple):
+    """And those of a cycle of two differ by more."""
+    run = _Settling(Motion(regular.config), None, None, 1e-5, 0.0)
+    rng = np.random.default_rng(3)
+    found = []
+    for number in range(40):
+        errors = 1 + 1e-5 * rng.standard_normal(3)
+        run._rows.append(errors * np.array([0.1, 1e-5 * (1 + alternation * (number % 2)), 2e-6]))
+        found.append(run._multiple())
+    settled = {one for one, error in found[8:] if error < 1e-5}
+    assert settled <= {multiple}
+    assert run._spread()[0] == multiple
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,8 @@ class Motion(NamedTuple):
     kind: str
     amplitude: float
     smooth_stable: bool | None
+    cycles: int
+    followed: float
 
 
 def motion(stiffness: float, velocity: float, start: str) -> Motion:
@@ -60,7 +62,14 @@ def motion(stiffness: float, velocity: float, start: str) -> Motion:
         Config.from_dict(APPARATUS).replace(changes), start=start, find_multipliers=False
     )
     return Motion(
-        stiffness, velocity, start, found.motion, found.amplitude_ratio, found.smooth_stable
+        stiffness,
+        velocity,
+        start,
+        found.motion,
+        found.amplitude_ratio,
+        found.smooth_stable,
+        found.cycles,
+        found.followed,
     )
 
 
@@ -124,7 +133,8 @@ def main() -> None:
             motions.append(one)
             print(
                 f"{one.stiffness:9.4g} N/m, {1e6 * one.velocity:.3g} um/s, {one.start:8}: "
-                f"{one.kind:9} {one.amplitude:.3f}; smooth sliding "
+                f"{one.kind:9} {one.amplitude:.3f} after {one.cycles} passages in "
+                f"{one.followed:.3g} s; smooth sliding "
                 f"{'stable' if one.smooth_stable else 'unstable'}",
                 flush=True,
             )

@@ -30,6 +30,8 @@ MASS, STATIC_FORCE, STIFFNESS = 3.2e-3, 55e-6, 4000.0
 # Loadings of the spring in a run, and mean lives of contacts: what their start leaves of phases in
 # common is forgotten in some hundred.
 LOADINGS, LIVES = 40, 300
+# Passages of an oscillation that ends, but may last longer from another start.
+LONG_TRANSIENT = 40
 # Amplitude of the master equation that is an oscillation, over F_s.
 MIN_AMPLITUDE = 0.002
 # Samples in a period of the slider on the spring and on the contacts.
@@ -79,14 +81,18 @@ def expected(one: Run, found: Sequence[Motion]) -> set[bool]:
     """Whether the run may oscillate, and may not."""
     point = one.stiffness, one.velocity
     here = [other for other in found if (other.stiffness, other.velocity) == point]
-    if one.count is None:
-        return {other.kind != "smooth" for other in here if other.start == one.start}
-    possible = {False} if here[0].smooth_stable else set()
+    possible = set()
     for other in here:
-        if other.kind != "smooth":
+        if one.count is None and other.start != one.start:
+            continue
+        # An oscillation that went on for as long as this may end later, or earlier.
+        if other.kind == "smooth" or (other.kind == "irregular" and other.smooth_stable):
+            possible.add(False)
+        if other.kind != "smooth" or other.cycles > LONG_TRANSIENT:
             # The amplitude of a cycle is from maximum to minimum.
-            possible |= {True} if other.amplitude / 2 > one.limit else {True, False}
-    return possible
+            is_small = 0 < other.amplitude / 2 < one.limit
+            possible |= {True, False} if is_small else {True}
+    return possible | ({False} if one.count and here[0].smooth_stable else set())
 
 
 def computed(workers: int) -> Iterator[Motion | Run]:

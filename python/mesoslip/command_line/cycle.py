@@ -160,6 +160,17 @@ def _print_branches(data: xr.Dataset, key: str) -> None:
             ]
         rows.append(row)
     print_table(rows)
+    for end in range(data.sizes.get("end", 0)):
+        one = data.isel(end=end)
+        between = " and ".join(
+            with_unit(value, unit, 4)
+            for value in sorted((one["end_value"].item(), one["end_beyond"].item()))
+        )
+        typer.echo(
+            f"{('up', 'down')[one['end_direction'].item()]}: the {words[one['end_motion'].item()]} "
+            f"motion, of {100 * one['end_amplitude_ratio'].item():.3g} % of F_s, ends in smooth "
+            f"sliding between {between}"
+        )
 
 
 def _print(found: Cycle) -> None:

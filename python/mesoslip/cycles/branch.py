@@ -1,14 +1,16 @@
 """Branches of a motion over a parameter: each value starts from the state of the one before.
 
 Values go up and down again. Where cycles and smooth sliding are both possible, the two directions
-differ: hysteresis.
+differ: hysteresis. Where an oscillation ends between two values, the end is found by bisection.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +49,31 @@ MAX_CYCLES = 32
 # Part by which the contacts over their stretch are modulated where smooth sliding is unstable, so
 # that its growth starts from more than rounding.
 MODULATION = 0.02
+# Relative distance of the values between which an oscillation ends.
+END_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class End:
+    """Where an oscillation ends in smooth sliding as it is followed over a parameter.
+
+    Attributes
+    ----------
+    direction
+        0 if the values go up, 1 if they go down.
+    value, beyond
+        The last value with the oscillation, and the first one without.
+    motion
+        "periodic" or "irregular", at the last value.
+    amplitude_ratio
+        Amplitude there over the static force F_s.
+    """
+
+    direction: int
+    value: float
+    beyond: float
+    motion: str
+    amplitude_ratio: float
 
 
 def branches(
@@ -79,6 +106,8 @@ def branches(
     xarray.Dataset
         Of dimensions ``direction`` ("up", "down") and the key: amplitude, period, peaks, kind of
         motion, multipliers; over the key alone: steady force and growth rate of smooth sliding.
+        Of dimension ``end``, if an oscillation ends in smooth sliding: the values around that
+        within 1 %, the direction, and the amplitude just before.
 
     Raises
     ------
@@ -104,8 +133,36 @@ def branches(
             if progress is not None:
                 progress(done / (2 * len(configs)))
         found.append(branch[::order])
+    ends = []
+    for direction, order in enumerate((1, -1)):
+        along = list(zip(values[::order], found[direction][::order], strict=True))
+        for (value, before), (beyond, after) in pairwise(along):
+            if before.exists and not after.exists:
+                end = _end_between(base, key, value, beyond, before, tolerance, max_cycles)
+                ends.append(End(direction, *end))
     sliding = [steady_sliding(one, MAX_WORK) for one in configs]
-    return dataset_of(base, key, values, found, sliding)
+    return dataset_of(base, key, values, found, sliding, ends)
+
+
+def _end_between(
+    base: Config,
+    key: str,
+    value: float,
+    beyond: float,
+    last: Cycle,
+    tolerance: float,
+    max_cycles: int,
+) -> tuple[float, float, str, float]:
+    """Last value with an oscillation, first one without, the motion and its amplitude over F_s."""
+    while abs(beyond - value) > END_TOLERANCE * max(abs(beyond), abs(value)):
+        middle = (value + beyond) / 2
+        config = base.replace({key: middle})
+        found = _next(config, last, tolerance, max_cycles, find_multipliers=False)
+        if found.exists:
+            value, last = middle, found
+        else:
+            beyond = middle
+    return value, beyond, last.motion, last.amplitude_ratio
 
 
 def _check(key: str, values: Sequence[float]) -> None:

@@ -15,6 +15,7 @@ from mesoslip.output.variables import BRANCHES
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
+    from mesoslip.cycles.branch import End
     from mesoslip.cycles.cycle import Cycle
     from mesoslip.theory.linear_stability import LinearStability
 
@@ -28,6 +29,7 @@ def dataset_of(
     values: Sequence[float],
     found: Sequence[Sequence[Cycle]],
     sliding: Sequence[LinearStability | None],
+    ends: Sequence[End],
 ) -> xr.Dataset:
     """The branches as a dataset.
 
@@ -41,6 +43,8 @@ def dataset_of(
         Settled motions, shape (directions, values).
     sliding
         Steady sliding at each value; None without a theory.
+    ends
+        Where oscillations end in smooth sliding.
     """
     kind = key_kind(key)
     columns: dict[str, Callable[[Cycle], float]] = {
@@ -68,11 +72,33 @@ def dataset_of(
         ("growth_rate", [math.nan if one is None else one.growth_rate for one in sliding]),
     ):
         data[name] = BRANCHES.variable(name, (key,), np.array(numbers))
-    units = None if kind is None else kind.cf_units
-    coordinate = xr.Variable((key,), np.array(values, dtype=float), {"units": units or "1"})
+    units = (None if kind is None else kind.cf_units) or "1"
+    coordinate = xr.Variable((key,), np.array(values, dtype=float), {"units": units})
+    if ends:
+        data |= _end_variables(ends, units)
     attrs = program_attributes(base, "branches") | {"continued_key": key}
     return xr.Dataset(
         data,
         coords={key: coordinate, "direction": ("direction", list(DIRECTIONS))},
         attrs=attrs,
     )
+
+
+def _end_variables(ends: Sequence[End], units: str) -> dict[str, xr.Variable]:
+    """Where oscillations end, dimension ``end``; units are those of the key."""
+    columns: dict[str, list[float]] = {
+        "end_value": [one.value for one in ends],
+        "end_beyond": [one.beyond for one in ends],
+        "end_amplitude_ratio": [one.amplitude_ratio for one in ends],
+        "end_direction": [one.direction for one in ends],
+        "end_motion": [MOTIONS.index(one.motion) for one in ends],
+    }
+    data = {
+        name: BRANCHES.variable(name, ("end",), np.array(values, dtype=BRANCHES[name].dtype))
+        for name, values in columns.items()
+    }
+    for name in ("end_value", "end_beyond"):
+        data[name].attrs["units"] = units
+    for name, words in (("end_direction", DIRECTIONS), ("end_motion", MOTIONS)):
+        data[name].attrs["flag_values"] = np.arange(len(words), dtype=np.int8)
+    return data

@@ -37,6 +37,8 @@ MAX_WORK = 400_000
 CHANGE, MAX_STEPS, MULTIPLIER_ERROR = 3e-3, 6, 0.02
 # Modulation of the density of contacts after which a cycle comes back, and cycles until then.
 MODULATION, CYCLES_AFTER = 0.01, 20
+# Passages of an oscillation that is worth a word, though it ends in smooth sliding.
+MANY_CYCLES = 40
 # A duration without bound [s].
 LONG = 1e9
 # States to start from, by name.
@@ -216,7 +218,11 @@ class Cycle:
             if self.smooth_stable is False:
                 limit = f"{100 * MIN_AMPLITUDE:g} % of F_s"
                 return f"from this start no oscillation above {limit} is found; {smooth}"
-            return f"from this start the motion settles to smooth sliding; {smooth}"
+            before = ""
+            if self.cycles > MANY_CYCLES:
+                duration = with_unit(self.followed, "s", 2)
+                before = f" after oscillations of {self.cycles} passages or more in {duration}"
+            return f"from this start the motion settles to smooth sliding{before}; {smooth}"
         percent = f"{100 * self.amplitude_ratio:.3g} % of F_s"
         if self.motion == "irregular":
             duration = with_unit(self.followed, "s", 2)

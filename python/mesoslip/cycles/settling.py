@@ -32,8 +32,9 @@ MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
 BATCH_PART = 0.5
 # Ratio of successive changes below which they shrink.
 SHRINKING = 0.98
-# Ratio of spreads that are equal: the shorter cycle is taken.
-EQUAL_SPREAD = 1.5
+# Ratio of spreads that are equal, and of changes: the shorter cycle is taken. Those of a cycle of
+# several passages are far below those from one passage to the next.
+EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
 # Amplitude over F_s below which sliding is smooth.
 MIN_AMPLITUDE = 1e-3
 # Time before the first section, in times of loading and in periods of the setup.
@@ -266,8 +267,8 @@ class _Settling:
 
         A cycle of several passages is one whose passages stay different.
         """
-        found = []
-        is_shrinking = False
+        found: list[tuple[float, int]] = []
+        is_shrinking, first = False, math.inf
         for multiple in range(1, MAX_MULTIPLE + 1):
             if len(self._rows) < 2 * multiple + 1 or (multiple > 1 and is_shrinking):
                 break
@@ -276,7 +277,9 @@ class _Settling:
             before = float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
             is_shrinking = is_shrinking or last < SHRINKING * before
             factor = min(0.99, last / before) if before > 0 else 0.9
-            found.append((max(1.0, factor / (1 - factor)) * last, multiple))
+            first = last if multiple == 1 else first
+            if multiple == 1 or first > EQUAL_CHANGE * last:
+                found.append((max(1.0, factor / (1 - factor)) * last, multiple))
         if not found:
             return 1, math.inf
         settled = [one for one in found if one[0] < self._tolerance]

@@ -327,6 +327,18 @@ BRANCHES = Group(
     multiple=Meaning("1", "passages of the section in a cycle", np.int8),
     steady_force=Meaning("N", "force of steady sliding"),
     growth_rate=Meaning("s-1", "growth rate of small perturbations of steady sliding"),
+    end_value=Meaning("1", "last value with an oscillation that ends in smooth sliding"),
+    end_beyond=Meaning("1", "first value without it"),
+    end_amplitude_ratio=Meaning("1", "amplitude at the last value over the static force"),
+    end_direction=Meaning(
+        "1", "direction of the values", np.int8, further={"flag_meanings": "up down"}
+    ),
+    end_motion=Meaning(
+        "1",
+        "motion at the last value",
+        np.int8,
+        further={"flag_meanings": "smooth periodic irregular"},
+    ),
 )
 
 STEADY = Group(

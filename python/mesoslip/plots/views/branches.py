@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mesoslip.plots.directions import STYLES
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import Canvas, canvas, legend_above, styled, titles
-from mesoslip.plots.sweep_axis import SweptKey
+from mesoslip.plots.sweep_axis import SweptKey, scale_of
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -62,6 +62,8 @@ def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
         )
     _mark_hysteresis(axes, axis.values, ratio)
     _mark_boundary(axes, axis.values, data["growth_rate"].values)
+    if "end_value" in data:
+        _mark_ends(axes, data)
     if axis.is_logarithmic:
         logarithmic(axes, "x")
     axes.set_ylabel("amplitude over $F_s$")
@@ -103,6 +105,22 @@ def _mark_boundary(axes: Axes, values: Array, growth: Array) -> None:
             color="black",
             linestyle="--",
             label="linear stability of smooth sliding" if number == 0 else None,
+        )
+
+
+def _mark_ends(axes: Axes, data: xr.Dataset) -> None:
+    """Mark where oscillations end in smooth sliding, up to the amplitude just before."""
+    scale = scale_of(data[data.attrs["continued_key"]])
+    styles = list(STYLES.values())
+    for end in range(data.sizes["end"]):
+        one = data.isel(end=end)
+        value = (one["end_value"].item() + one["end_beyond"].item()) / 2 / scale.size
+        axes.plot(
+            [value, value],
+            [0, one["end_amplitude_ratio"].item()],
+            color=styles[one["end_direction"].item()]["color"],
+            linestyle=":",
+            label="end of the oscillation" if end == 0 else None,
         )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mesoslip.analysis.noise import estimate_noise, parts_of
-from scipy.signal import lfilter
+from mesoslip.analysis.power_spectrum import power_spectrum
+from scipy.signal import lfilter, welch
 
 COUNT = 40_000
 TIME = 1e-3 * np.arange(COUNT)
@@ -23,6 +24,17 @@ def coloured(deviation: float, samples: float, seed: int = 2):
     ratio = np.exp(-1 / samples)
     start = np.random.default_rng(seed).standard_normal(COUNT + 1000)
     return deviation * lfilter([np.sqrt(1 - ratio**2)], [1, -ratio], start)[1000:]
+
+
+@pytest.mark.parametrize("length", [64, 255, 4096, 100_000])
+def test_power_spectra_are_those_of_scipy(length):
+    values = SAW + coloured(0.1, 20)
+    for found, wanted in zip(
+        power_spectrum(values, 1e-3, length),
+        welch(values, fs=1e3, nperseg=min(length, COUNT)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-18)
 
 
 @pytest.mark.parametrize("deviation", [1e-4, 1e-3, 1e-2])

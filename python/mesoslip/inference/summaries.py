@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.power_spectrum import power_spectrum
 from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
 from mesoslip.inference.features import (
     BANDS,
@@ -164,8 +165,6 @@ class Summarizer:
         return values
 
     def _whole(self, force: Array) -> dict[str, float]:
-        from scipy.signal import welch
-
         if force.size < 64:
             return {}
         values = {
@@ -175,9 +174,7 @@ class Summarizer:
         for one, value in zip(QUANTILES, np.percentile(force, QUANTILES), strict=True):
             values[f"force_quantile_{one}"] = float(value)
         length = round(SEGMENT_PERIODS * self.period / self._interval)
-        frequency, power = welch(
-            force, fs=1 / self._interval, nperseg=max(64, min(length, force.size))
-        )
+        frequency, power = power_spectrum(force, self._interval, max(64, length))
         edges = self._edges
         for band in range(BANDS):
             inside = (frequency >= edges[band]) & (frequency < edges[band + 1])

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.power_spectrum import power_spectrum
+
 Array = NDArray[np.float64]
 
 # Frequencies of the mains [Hz], and the relative tolerance of a line's.
@@ -120,13 +122,12 @@ def _is_harmonic(frequency: float, base: float) -> bool:
 def _candidates(force: Array, interval: float, given: float | None) -> list[float]:
     """Frequencies of lines, the strongest first [Hz]."""
     from scipy.ndimage import median_filter
-    from scipy.signal import welch
 
     steps = np.diff(force)
     bound = CLIP * max(float(np.median(np.abs(steps))), 1e-300)
     steps = np.clip(steps, -bound, bound)
     length = len(steps) // SEGMENTS
-    bins, power = welch(steps, fs=1 / interval, nperseg=length)
+    bins, power = power_spectrum(steps, interval, length)
     if given is not None:
         multiples = given * np.arange(1, MAX_HARMONIC + 1)
         return [_peak(bins, power, float(one)) for one in multiples if one < 0.45 / interval]

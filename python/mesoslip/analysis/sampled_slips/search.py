@@ -119,7 +119,7 @@ class SlipSearch:
 
 def _rates(trace: DenoisedTrace) -> Array:
     """Rate of the force, by lines over an eighth of a period [N/s]."""
-    from scipy.signal import savgol_filter
+    from scipy.ndimage import correlate1d
 
     rates = np.zeros(len(trace.force))
     for part in trace.parts:
@@ -128,9 +128,10 @@ def _rates(trace: DenoisedTrace) -> Array:
         half = max(1, round(trace.period / 2 / part.interval))
         # Wide enough to average over noise, narrow enough for ringing faster than the setup's.
         width = min(2 * max(1, half // 8) + 1, len(part) - 1 + len(part) % 2)
-        rates[part.samples] = savgol_filter(
-            trace.force[part.samples], width, 1, deriv=1, delta=part.interval, mode="nearest"
-        )
+        # The slope of a line through so many samples.
+        at = np.arange(width) - width // 2
+        weights = at / (np.sum(at**2) * part.interval)
+        rates[part.samples] = correlate1d(trace.force[part.samples], weights, mode="nearest")
     return rates
 
 

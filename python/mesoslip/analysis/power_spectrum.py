@@ -36,7 +36,7 @@ def power_spectrum(values: Array, interval: float, length: int) -> tuple[Array, 
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
     parts = np.lib.stride_tricks.sliding_window_view(values, length)[:: length - length // 2]
     spectra = np.fft.rfft(window * (parts - parts.mean(axis=1, keepdims=True)), axis=1)
-    density = np.mean(np.abs(spectra) ** 2, axis=0) * interval / np.sum(window**2)
+    density: Array = np.mean(np.abs(spectra) ** 2, axis=0) * interval / np.sum(window**2)
     # Negative frequencies too, which zero and that of Nyquist do not have.
     density[1 : (length + 1) // 2] *= 2
-    return np.fft.rfftfreq(length, interval), density
+    return np.arange(length // 2 + 1) / (length * interval), density

@@ -133,9 +133,9 @@ def _candidates(force: Array, interval: float, given: float | None) -> list[floa
         return [_peak(bins, power, float(one)) for one in multiples if one < 0.45 / interval]
     background = median_filter(power, BACKGROUND, mode="nearest")
     strong = (power > MIN_POWER * background) & (bins > LINE_BINS * bins[1])
-    peaks = [
+    peaks: list[int] = [
         at
-        for at in np.flatnonzero(strong)
+        for at in np.flatnonzero(strong).tolist()
         if power[at] == power[max(0, at - 2 * LINE_BINS) : at + 2 * LINE_BINS + 1].max()
         # Narrow: it has ended within some bins.
         and power[max(0, at - 2 * LINE_BINS)] < 0.05 * power[at]

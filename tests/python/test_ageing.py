@@ -16,7 +16,7 @@ from mesoslip.simulation.runner import run_realizations
 from mesoslip.theory.ageing import mean_life, restart_peak, steady_force
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import Contacts, aged, ageing_force, fixed_step, stationary_force
-from scipy import optimize
+from scipy import optimize, stats
 from test_events import breaks
 
 STATIC, STRETCH = 18e-6, 9e-9
@@ -212,6 +212,64 @@ def test_contacts_that_weaken_break_at_rest(klein):
     assert len(events) == 50
     times = [time for time, _ in sorted(expected)]
     np.testing.assert_allclose([time for time, _ in events], times, rtol=1e-11)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.02])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_populations_that_weaken_break_at_rest(klein, sign, turn):
+    """In either direction, after a small motion back too, which the force is against then."""
+    stretches = [1.2 + turn, -turn] if turn > 0 else [1.2]
+    stages = [{"duration": 1e-4, "velocity": sign * one * STRETCH / 1e-4} for one in stretches]
+    config = klein(
+        **PRESCRIBED,
+        run__engine="me",
+        run__duration=None,
+        run__resolution=0.01,
+        drive={"stage": [*stages, {"duration": 0.3, "velocity": 0}]},
+        output__interval=1e-2,
+        contacts__threshold__relative_width=0.05,
+        contacts__reattach=False,
+        contacts__ageing=WEAKEN | {"time": 0.05, "young_relative_width": 0.05, "initial_age": 0.0},
+    )
+    tree = mesoslip.run(config)
+    # Contacts of the configured thresholds u have broken at the times at which
+    # u (1 + exp(-t/tau_a)/2) = 1.2.
+    limit = 1.2 / (1 + 0.5 * np.exp(-tree["time"].values[1:] / 0.05))
+    broken = stats.norm.cdf((limit - 1) / 0.05)
+    share = tree["detached_contacts"].values[0, 1:] / config.contacts.count
+    np.testing.assert_allclose(share, broken, atol=0.015)
+
+
+def test_contacts_that_became_old_are_as_those_that_were(klein):
+    """A hold until thresholds do not change any more, then a motion as of contacts of any age."""
+    stages = [
+        {"duration": 0.05, "velocity": 0},
+        {"duration": 0.3e-2, "velocity": STRETCH / 1e-2},
+        {
+            "duration": 1e-2,
+            "start_velocity": STRETCH / 1e-2,
+            "end_velocity": 2 * STRETCH / 1e-2,
+        },
+    ]
+    young, old = (
+        breaks(
+            klein(
+                **PRESCRIBED,
+                run__duration=None,
+                drive={"stage": stages},
+                output__interval=1e-3,
+                contacts__count=150,
+                contacts__threshold__relative_width=0.05,
+                contacts__reattach=False,
+                contacts__ageing=RELAX
+                | {"time": 1e-3, "young_force_ratio": 0.98, "young_relative_width": 0.2}
+                | age,
+            )
+        )
+        for age in ({"initial_age": 0.0}, {})
+    )
+    assert len(old) == 150
+    assert young == old
 
 
 def steady(law: str, width: float, velocity: float, **changes: object) -> dict[str, object]:

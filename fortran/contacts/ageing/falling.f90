@@ -32,9 +32,7 @@ contains
       do position = self%list(falling)%count, 1, -1
          call retire(self, self%list(falling)%contact(position), pose%time)
       end do
-      self%scan_upper = huge(1.0_wp)
-      self%scan_lower = -huge(1.0_wp)
-      self%scan_time = huge(1.0_wp)
+      call clear_scan(self)
       if (self%list(falling)%count > few) then
          fastest = 0.0_wp
          do position = 1, self%list(falling)%count
@@ -63,6 +61,16 @@ contains
       call self%count_visits(2 * self%list(falling)%count)
    end subroutine scan
 
+   !> Let the last scan hold everywhere and for ever: of few contacts all are near, and of none no
+   !> one breaks.
+   pure subroutine clear_scan(self)
+      class(ageing_contacts_type), intent(inout) :: self
+
+      self%scan_upper = huge(1.0_wp)
+      self%scan_lower = -huge(1.0_wp)
+      self%scan_time = huge(1.0_wp)
+   end subroutine clear_scan
+
    !> Scan the contacts whose thresholds fall if that is due; those that are old do so no more.
    subroutine scan_if_needed(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
@@ -70,10 +78,13 @@ contains
 
       integer :: position
 
-      if (self%list(falling)%count == 0) return
       do position = self%list(near)%count, 1, -1
          call retire(self, self%list(near)%contact(position), pose%time)
       end do
+      if (self%list(falling)%count == 0) then
+         call clear_scan(self)
+         return
+      end if
       if (pose%time >= self%scan_time &
          & .or. self%direction * pose%displacement >= self%scan_upper &
          & .or. self%direction * pose%displacement <= self%scan_lower &

@@ -110,6 +110,9 @@ contains
          window%end_time = min(window%end_time, max(pose%time + max_span, &
             & nearest(pose%time, huge(1.0_wp))))
       end if
+      ! Contacts may break at rest later on.
+      if (self%max_fall_time < max_time) window%end_time = min(window%end_time, &
+         & max(pose%time + self%max_fall_time, nearest(pose%time, huge(1.0_wp))))
       window%upper = max(self%pinned%ahead, pose%displacement)
       window%lower = min(self%pinned%behind, pose%displacement)
       if (moves) then

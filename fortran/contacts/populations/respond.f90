@@ -36,22 +36,52 @@ contains
       else
          call try_to_break(self, start, end, has_broken)
       end if
-      if (has_broken) then
-         call self%pinned%break_tried(self%break_loss)
-         associate (trial => self%pinned%trial)
-            self%breaks = self%breaks + trial%breaks
-            call self%step_work%add(trial%work)
-            call self%detached%add(before%time, after%time, trial%breaks, trial%mass, &
-               & self%failure)
-         end associate
-      end if
+      if (has_broken) call detach_tried(self, before, after)
       if (.not. self%detached%is_empty()) call attach_due(self, start, end)
       if (self%pinned%ages) call self%pinned%update_thresholds(after%displacement, after%time)
+      if (self%pinned%some_fall .and. .not. self%pinned%is_activated) then
+         call break_fallen(self, before, after)
+      end if
       self%detached_count = self%detached%number%total()
       self%cost = 1.0_wp + self%pinned%count / populations_per_cost
       if (self%pinned%is_activated) call note_step(self, before, after)
       self%offers = .false.
    end subroutine respond_to_motion
+
+   !> Detach what was found to break.
+   subroutine detach_tried(self, before, after)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      call self%pinned%break_tried(self%break_loss)
+      associate (trial => self%pinned%trial)
+         self%breaks = self%breaks + trial%breaks
+         call self%step_work%add(trial%work)
+         call self%detached%add(before%time, after%time, trial%breaks, trial%mass, self%failure)
+      end associate
+   end subroutine detach_tried
+
+   !> Break contacts whose thresholds fell to forces against the direction of motion, which the
+   !> motion does not increase.
+   subroutine break_fallen(self, before, after)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: direction, late, onset
+
+      direction = -after%direction
+      if (abs(after%displacement - before%displacement) > 0.0_wp) then
+         direction = sign(1.0_wp, before%displacement - after%displacement)
+      end if
+      if (direction > 0.0_wp) then
+         if (after%displacement < self%pinned%ahead) return
+      else
+         if (after%displacement > self%pinned%behind) return
+      end if
+      call self%pinned%try(before, after%displacement, after%time, direction, late, onset, &
+         & self%failure)
+      call detach_tried(self, before, after)
+   end subroutine break_fallen
 
    !> Find what breaks of contacts that break at their thresholds.
    subroutine try_to_break(self, before, after, has_broken)

@@ -241,14 +241,14 @@ contains
       !> Integral of the part that is pinned, and of the force
       real(wp), intent(out) :: mean_life, stretching
 
-      integer, parameter :: most_cells = 2000
+      integer, parameter :: max_cells = 2000
       real(wp) :: state(3), length
       integer :: cell, cells, node
 
       mean_life = 0.0_wp
       stretching = 0.0_wp
       ! The spread of the stretch smooths what is left over its standard deviation.
-      cells = ceiling(min(real(most_cells, wp), 0.5_wp * self%longest / self%newborn_width))
+      cells = ceiling(min(real(max_cells, wp), 0.5_wp * self%longest / self%newborn_width))
       length = self%longest / cells
       do cell = 0, cells - 1
          do node = 1, points

@@ -238,6 +238,7 @@ def test_populations_that_weaken_break_at_rest(klein, sign, turn):
     broken = stats.norm.cdf((limit - 1) / 0.05)
     share = tree["detached_contacts"].values[0, 1:] / config.contacts.count
     np.testing.assert_allclose(share, broken, atol=0.015)
+    assert abs(float(tree["energy_residual"][0])) < 1e-9
 
 
 def test_contacts_that_became_old_are_as_those_that_were(klein):

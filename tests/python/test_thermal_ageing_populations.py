@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kinds import RELAX, configuration
+from mesoslip import Config, Realization
 from mesoslip.theory.thermal import steady_force
 from test_thermal import unit
 from test_thermal_populations import COUNT, extrapolated_force, finished
@@ -78,3 +79,44 @@ def test_without_temperature_it_is_the_model_without():
     ]
     assert differences[0] < 0.015 * 18e-6
     assert differences[1] < 0.45 * differences[0]
+
+
+@pytest.mark.parametrize("delay", [1e-8, 1e-6])
+def test_steps_of_a_hold_are_not_as_short_as_the_delay(delay):
+    """Few contacts break in a delay then: what waits to attach leaves no gaps that end steps."""
+    config = Config.from_dict(
+        {
+            "run": {"engine": "me"},
+            "drive": {
+                "stage": [
+                    {"duration": 3.0, "velocity": 1.0},
+                    {"duration": 1.0, "velocity": 0.0},
+                    {"duration": 2.0, "velocity": -1.0},
+                    {"duration": 1.0, "velocity": 0.0},
+                ]
+            },
+            "slider": {"kind": "rigid", "mass": 0.01, "stiffness": 0.5, "damping_ratio": 0.3},
+            "contacts": {
+                "count": 300,
+                "static_force": 1.0,
+                "stiffness": 1.0,
+                "drag_rate": 0.0,
+                "delay": delay,
+                "coupling": "equal",
+                "threshold": {"law": "gaussian", "relative_width": 0.05},
+                "ageing": {
+                    "law": "relax",
+                    "time": 0.1,
+                    "young_force_ratio": 0.9,
+                    "young_relative_width": 0.3,
+                },
+                "thermal": {"rate": 10.0, "force_ratio": 0.05},
+            },
+            "output": {"interval": 0.05},
+        }
+    )
+    with Realization(config, estimates_errors=False, coarsening=2.0) as run:
+        while not run.finished and run.advances < 3000:
+            run.advance(500)
+        assert run.finished
+        assert run.advances < 1000

@@ -26,6 +26,8 @@ module mesoslip_contacts_populations_packets
 
    !> Part of the contacts that is too small for a packet of its own
    real(wp), parameter :: negligible_part = 1.0e-10_wp
+   !> Rate at which contacts break, over that of those before, up to which it is about the same
+   real(wp), parameter :: max_rate_ratio = 8.0_wp
    !> Packets for which there is room at first
    integer, parameter :: initial_packets = 64
 
@@ -74,7 +76,8 @@ module mesoslip_contacts_populations_packets
       procedure, non_overridable :: take_due
       !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
-      procedure, non_overridable, private :: due_times, make_room, expect_random, take_random
+      procedure, non_overridable, private :: due_times, goes_on, make_room, expect_random, &
+         & take_random
    end type detached_packets_type
 
 contains
@@ -112,7 +115,9 @@ contains
          return
       end if
       ! Few that waited are taken to have broken with more that come: a delay is not stretched back.
-      if (number >= self%pending(row_number)) self%pending(row_start) = start_time
+      ! Where contacts break all the time, gaps between packets would end steps.
+      if (number >= self%pending(row_number) .and. .not. self%goes_on(start_time, end_time, &
+         & number)) self%pending(row_start) = start_time
       self%pending(row_end) = end_time
       self%pending(row_number) = self%pending(row_number) + number
       self%pending(row_mass) = self%pending(row_mass) + mass
@@ -123,6 +128,21 @@ contains
       self%packet(:, self%last) = self%pending
       self%pending = 0.0_wp
    end subroutine add
+
+   !> Whether contacts go on to break as those that wait to be enough for a packet, at once and not
+   !> much faster.
+   pure function goes_on(self, start_time, end_time, number)
+      class(detached_packets_type), intent(in) :: self
+      real(wp), intent(in) :: start_time, end_time, number
+      logical :: goes_on
+
+      associate (pending => self%pending)
+         goes_on = self%short_gap > 0.0_wp .and. pending(row_number) > 0.0_wp &
+            & .and. pending(row_end) >= start_time &
+            & .and. number * (pending(row_end) - pending(row_start)) &
+            & <= max_rate_ratio * pending(row_number) * (end_time - start_time)
+      end associate
+   end function goes_on
 
    !> Whether none waits to attach.
    pure function is_empty(self)

@@ -1,8 +1,8 @@
 """Does a trace prefer a film that melts as a whole, or contacts?
 
-Traces of Klein's slider over each, with noise: both models are fitted to each trace, and to its
-first half alone, and compared by `mesoslip.compare_fits`. Prints the table of
-``docs/melting-film.md``; some minutes a trace::
+Traces of Klein's slider over each, with noise: both models are fitted to each trace, and compared
+by `mesoslip.compare_fits` on that trace, of which no part is held out. Prints the table of
+``docs/melting-film.md``; half a minute a trace::
 
     .venv/bin/python tests/studies/film_or_contacts.py [TRUTH ...]
 """

@@ -8,7 +8,7 @@ import pytest
 from conftest import long
 from mesoslip import _core
 from mesoslip.simulation.kernel import named
-from mesoslip.theory.derived import verdict
+from mesoslip.theory.derived import ESTIMATE_RANGE, derived, verdict
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.lives import law_parameters
 from oracles import frozen_law, stationary_force
@@ -368,6 +368,25 @@ def test_a_base_is_in_series_with_the_spring(klein):
     top = int(np.argmax(force))
     assert force[top] == pytest.approx(curve.peak[0], rel=2e-2)
     assert np.min(force[top : top + 70]) < 0.5 * force[top]
+
+
+@pytest.mark.parametrize("law", ["gaussian", "uniform", "lognormal", "weibull"])
+@pytest.mark.parametrize("width", [0.01, 0.1])
+@pytest.mark.parametrize("coupling", ["equal", "scaled"])
+def test_the_estimate_is_as_near_as_the_verdict_states(klein, law, width, coupling):
+    config = klein(
+        contacts__threshold={"law": law, "relative_width": width}, contacts__coupling=coupling
+    )
+    estimate = derived(config)["K_star_estimate"].value
+    low, high = ESTIMATE_RANGE
+    assert low < ForceCurve(config).K_star[0] / estimate < high
+    for factor, words in (
+        (low / 1.1, "below the estimate"),
+        (1.1 * low, "times the estimate"),
+        (high / 1.1, "times the estimate"),
+        (1.1 * high, "above the estimate"),
+    ):
+        assert words in verdict(config.replace({"slider.stiffness": factor * estimate}))
 
 
 def test_verdicts_say_what_they_do_not_mean(klein, command, tmp_path):

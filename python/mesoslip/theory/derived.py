@@ -17,6 +17,8 @@ from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
 
 # Maximum work for the stability of steady sliding, about a tenth of a second.
 MAX_WORK = 10_000
+# K* over its estimate, for thresholds of 0.3 to 10 % of all laws, and exponential ones.
+ESTIMATE_RANGE = 0.2, 2.0
 
 
 @dataclass(frozen=True)
@@ -102,12 +104,19 @@ def _verdict_of_stiffness(config: Config) -> str | None:
         return None
     estimate = next(one[1] for one in _contacts(config) if one[0] == "K_star_estimate")
     name = "K" if spring == config.spring_stiffness else "K in series with the base"
-    side = "above" if spring >= estimate else "below"
+    ratio = spring / estimate
+    low, high = ESTIMATE_RANGE
+    if low < ratio < high:
+        return (
+            f"{name} is {ratio:.2g} times the estimate of K*, and K* itself {low:g} to {high:g} "
+            "times it for most threshold laws: mesoslip curve computes K*. Slow sliding from "
+            "relaxed contacts without delay is stable above K*, and has a first slip below"
+        )
     sentences = [
-        f"{name} is {side} the estimate of K*, which depends on the threshold law: mesoslip curve "
-        "computes K*"
+        f"{name} is {'above' if ratio > 1 else 'below'} the estimate of K*, which depends on the "
+        "threshold law: mesoslip curve computes K*"
     ]
-    if side == "above":
+    if ratio > 1:
         sentences.append("Above K* slow sliding from relaxed contacts without delay is stable")
         after = "with a delay there may be stick-slip nevertheless"
     else:

@@ -186,8 +186,9 @@ def compare_fits(posteriors: Sequence[OutputLike]) -> list[Score]:
 
     The score is the logarithm of the predictive density of the summaries, in the directions in
     which the predictions of all fits vary most, with t distributions of the means and covariances
-    of the predictions of each fit. A fit with more parameters gains nothing by them unless its
-    predictions improve (Vehtari, Gelman & Gabry 2017, Stat. Comput. 27, 1413).
+    of the predictions of each fit. Of results of `predict` it is that of traces that were not
+    fitted: a fit with more parameters gains nothing by them unless its predictions improve
+    (Vehtari, Gelman & Gabry 2017, Stat. Comput. 27, 1413).
 
     Parameters
     ----------

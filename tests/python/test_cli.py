@@ -141,8 +141,11 @@ def test_commands_import_what_they_need(short, tmp_path, command):
         ["slips", str(output)],
         ["regime", str(output)],
         ["plot", str(output), "-o", str(tmp_path / "short.png")],
-        ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
+        ["report", str(output), "-o", str(tmp_path / "short.html")],
         ["response", str(steps)],
+        ["plot", str(steps), "--view", "response", "-o", str(tmp_path / "steps.png")],
+        ["report", str(steps), "-o", str(tmp_path / "steps.html")],
+        ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
     ]
     code = f"""
 import json, sys
@@ -170,8 +173,11 @@ json.dump(found, stdout)
         [],
         [],
         ["matplotlib"],
-        ["pandas", "xarray"],
+        [],
         ["scipy.integrate"],
+        [],
+        [],
+        ["pandas", "xarray"],
     ]
 
 

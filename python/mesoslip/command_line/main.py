@@ -68,6 +68,8 @@ WITHOUT_XARRAY = {
     catalogues.slips,
     catalogues.regime,
     pictures.plot,
+    report.report,
+    response.response,
 }
 
 # How to install the libraries that the kernels are linked to.

@@ -48,9 +48,9 @@ def response(
     ] = False,
 ) -> None:
     """Print steady forces, velocity steps, holds, and rate-and-state parameters."""
-    from mesoslip.analysis import response as responses
     from mesoslip.analysis.response import (
         force_scale,
+        response_arrays,
         rows_of,
         scalars_of,
         tables,
@@ -62,7 +62,7 @@ def response(
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
         targets.check_writable(table, outputs)
-    tree = responses.response(outputs, normal_force=scale, fit=fit, free_stiffness=free_stiffness)
+    tree = response_arrays(outputs, normal_force=scale, with_fit=fit, free_stiffness=free_stiffness)
     if table is not None and is_printed(table):
         write_printed(tables(tree), table)
     elif table is not None:

@@ -1,6 +1,7 @@
 """Outputs as plain arrays: what commands for small files need of xarray, which is slow to import.
 
-Groups and variables here have the names that xarray's have for the same, as far as they go.
+Groups and variables here have the names that xarray's have for the same, as far as they go. The
+variables are in a file (`Stored`) or in memory (`Values`).
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,70 @@ Array = NDArray[Any]
 ENCODINGS = {"missing_value", "scale_factor", "add_offset", "_Unsigned"}
 
 
+class Variable(Protocol):
+    """A variable of a group.
+
+    Attributes
+    ----------
+    dims
+        Names of its dimensions.
+    values
+        Its values.
+    attrs
+        Its attributes.
+    """
+
+    @property
+    def dims(self) -> tuple[str, ...]: ...
+
+    @property
+    def values(self) -> Array: ...
+
+    @property
+    def attrs(self) -> Mapping[str, Any]: ...
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of its values."""
+
+    def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Variable:
+        """A part of it, by indices along dimensions that are whole."""
+
+    def __getitem__(self, index: Any) -> Variable:
+        """A part along the first dimension, or along the first ones with several indices."""
+
+
 @dataclass(frozen=True)
-class Variable:
+class Values:
+    """A variable in memory; see `Variable`."""
+
+    dims: tuple[str, ...]
+    values: Array
+    attrs: Mapping[str, Any]
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of its values."""
+        return self.values.dtype
+
+    def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Values:
+        """A part of it, by indices along dimensions."""
+        part = {**(part or {}), **by_name}
+        return self[tuple(part.get(one, slice(None)) for one in self.dims)]
+
+    def __getitem__(self, index: Any) -> Values:
+        """A part along the first dimension, or along the first ones with several indices."""
+        indices = index if isinstance(index, tuple) else (index,)
+        left = tuple(
+            name
+            for number, name in enumerate(self.dims)
+            if number >= len(indices) or not isinstance(indices[number], int | np.integer)
+        )
+        return Values(left, np.asarray(self.values[indices]), self.attrs)
+
+
+@dataclass(frozen=True)
+class Stored:
     """A variable in a file, whose values are read when they are needed, or a part of one.
 
     Attributes
@@ -65,14 +128,14 @@ class Variable:
             # A variable without dimensions takes no empty index.
             return np.asarray(self.stored[index or ...])
 
-    def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Variable:
+    def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Stored:
         """A part of it, by indices along dimensions that are whole."""
         part = {**(part or {}), **by_name}
         assert not self.part.keys() & part.keys()
         own = {name: index for name, index in part.items() if name in self.stored.dimensions}
-        return Variable(self.stored, self.attrs, {**self.part, **own})
+        return Stored(self.stored, self.attrs, {**self.part, **own})
 
-    def __getitem__(self, index: Any) -> Variable:
+    def __getitem__(self, index: Any) -> Stored:
         """A part along the first dimension, or along the first ones with several indices."""
         indices = index if isinstance(index, tuple) else (index,)
         return self.isel(dict(zip(self.dims, indices, strict=False)))
@@ -122,6 +185,23 @@ class Arrays(Mapping[str, Variable]):
         return Arrays(variables, sizes, self.attrs)
 
 
+def in_xarray(arrays: Arrays) -> xr.DataTree:
+    """A group and those in it as a tree of datasets.
+
+    Parameters
+    ----------
+    arrays
+        Groups with variables in memory.
+    """
+    import xarray as xr
+
+    variables = {
+        name: xr.Variable(one.dims, one.values, dict(one.attrs)) for name, one in arrays.items()
+    }
+    children = {name: in_xarray(one) for name, one in arrays.children.items()}
+    return xr.DataTree(xr.Dataset(variables, attrs=dict(arrays.attrs)), children=children)
+
+
 # An output of which no more is used than both have.
 Tree: TypeAlias = "Arrays | xr.DataTree"
 
@@ -139,7 +219,7 @@ def arrays_of(group: netCDF4.Dataset) -> Arrays | None:
     for before, stored in group.variables.items():
         stored.set_auto_maskandscale(False)
         attributes = attributes_of(name, now[before]) if before in now else _attributes(stored)
-        variables[now.get(before, before)] = Variable(stored, attributes)
+        variables[now.get(before, before)] = Stored(stored, attributes)
     children = {}
     for below in group.groups.values():
         found = arrays_of(below)

@@ -15,7 +15,7 @@ from mesoslip.errors import ConfigError, FileError, Problem, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mesoslip.output.arrays import Arrays
+    from mesoslip.output.arrays import Arrays, Tree
 
 ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
 OutputLike: TypeAlias = "PathLike | xr.DataTree | xr.Dataset"
@@ -98,6 +98,24 @@ def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
             yield tree, os.fspath(output)
     else:
         yield as_run(output), "the output"
+
+
+@contextmanager
+def opened_run_arrays(output: OutputLike) -> Iterator[Tree]:
+    """An output of a run, read when used, without xarray if it is in a file.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is not an output of a run.
+    """
+    from mesoslip.output import files
+
+    if isinstance(output, str | os.PathLike):
+        with files.opened_arrays(Path(output)) as tree:
+            yield tree
+    else:
+        yield as_run(output)
 
 
 def trace_name(output: OutputLike, tree: xr.DataTree) -> str:

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.response import creep_line, friction_line, response_of
 from mesoslip.configuration.config import Config
+from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.record import MAX_MARKS
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles, write_title
 from mesoslip.quantities import scale_for, with_error
 from mesoslip.theory.thermal import creep_force
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 # Samples of the displacement that are drawn, and velocities of the theory.
 MAX_DOTS, THEORY_POINTS = 20_000, 30
 
 
-def draw_forced(tree: xr.DataTree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
+def draw_forced(tree: Tree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
     """Displacement over time; creep velocities with those of the theory; static friction.
 
     Parameters
@@ -36,11 +32,11 @@ def draw_forced(tree: xr.DataTree, experiment: Experiment, figure: Canvas | None
         Where; a figure of its own by default.
     """
     found = response_of([experiment], with_fit=False)
-    creep, ramps = found["creep"].to_dataset(), found["ramps"].to_dataset()
+    creep, ramps = found.children["creep"], found.children["ramps"]
     creep = creep.isel(force_stage=creep["velocity"].values > 2 * creep["velocity_error"].values)
     ramps = ramps.isel(ramp=np.isfinite(ramps["static_friction"].values))
     drawn = ((_draw_creep, creep), (_draw_friction, ramps))
-    panels = [(draw, data) for draw, data in drawn if data["stage_number"].size]
+    panels = [(draw, data) for draw, data in drawn if data["stage_number"].values.size]
     with styled():
         figure = canvas(figure, (6.5, 5.0 if panels else 3.0))
         grid = figure.add_gridspec(2 if panels else 1, max(1, len(panels)))
@@ -50,7 +46,7 @@ def draw_forced(tree: xr.DataTree, experiment: Experiment, figure: Canvas | None
     return figure
 
 
-def _draw_displacement(axes: Axes, tree: xr.DataTree, experiment: Experiment) -> None:
+def _draw_displacement(axes: Axes, tree: Tree, experiment: Experiment) -> None:
     """Draw the displacement of each realization over time, and the starts of stages."""
     step = max(1, experiment.time.size // MAX_DOTS)
     length = scale_for(float(np.max(np.abs(experiment.displacement))), "m")
@@ -68,7 +64,7 @@ def _draw_displacement(axes: Axes, tree: xr.DataTree, experiment: Experiment) ->
     titles(axes, tree)
 
 
-def _draw_creep(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
+def _draw_creep(axes: Axes, experiment: Experiment, data: Arrays) -> None:
     """Draw the force over the velocity of creep, and the theory with the slider's damping."""
     velocity, force = data["velocity"].values, data["force"].values / experiment.static_force
     unit = scale_for(float(np.max(velocity)), "m/s")
@@ -105,7 +101,7 @@ def _is_known(config: Config) -> bool:
     return contacts.thermal is not None and contacts.newborn_width == 0 and contacts.reattach
 
 
-def _draw_friction(axes: Axes, experiment: Experiment, data: xr.Dataset) -> None:
+def _draw_friction(axes: Axes, experiment: Experiment, data: Arrays) -> None:
     """Draw the static friction over the rate of the force, with a line."""
     scale = 1 / experiment.static_force
     rate, friction = data["force_rate"].values, data["static_friction"].values

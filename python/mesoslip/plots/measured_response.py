@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -17,14 +15,12 @@ from mesoslip.analysis.rate_and_state import (
 )
 from mesoslip.analysis.response import response_of, rows_of
 from mesoslip.errors import RunError
+from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.record import draw_record, fit_label, force_unit, title_record
 from mesoslip.plots.style import RED, Canvas, canvas, styled
 from mesoslip.quantities import Scale, scale_for, with_error
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -102,9 +98,9 @@ def _draw_residuals(axes: Axes, experiment: Experiment, found: MeasuredFit, scal
     axes.set_xlabel(scale.label("displacement of the load point"))
 
 
-def _draw_rates(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
+def _draw_rates(axes: Axes, response: Arrays, unit: Scale) -> None:
     """Draw a - b of each step against the velocity after it, with standard errors."""
-    steps = tree["steps"].to_dataset()
+    steps = response.children["steps"]
     velocity = np.abs(steps["velocity_after"].values)
     name = next(one for one in ("rate_dependence_coefficient", "rate_dependence") if one in steps)
     value, error = steps[name].values / unit.size, steps[f"{name}_error"].values / unit.size
@@ -114,7 +110,7 @@ def _draw_rates(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
     )
     fits = [
         row
-        for row in rows_of(tree, "rate_and_state")
+        for row in rows_of(response, "rate_and_state")
         if row["is_preferred"] and np.isfinite(row[_key(row)])
     ]
     stages = {number: one for one, number in enumerate(steps["stage_number"].values)}
@@ -149,9 +145,9 @@ def _stem(row: dict[str, float]) -> str:
     return "a_minus_b_coefficient_error" if "a_minus_b_coefficient" in row else "a_minus_b_error"
 
 
-def _draw_healing(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
+def _draw_healing(axes: Axes, response: Arrays, unit: Scale) -> None:
     """Draw the healing against the hold time."""
-    holds = tree["holds"].to_dataset()
+    holds = response.children["holds"]
     name = next(one for one in ("healing_coefficient", "healing") if one in holds)
     error = np.nan_to_num(holds[f"{name}_error"].values) / unit.size
     axes.errorbar(
@@ -167,9 +163,7 @@ def _draw_healing(axes: Axes, tree: xr.DataTree, unit: Scale) -> None:
     axes.set_ylabel(f"healing ({unit.name})")
 
 
-def draw_measured(
-    tree: xr.DataTree, experiment: Experiment, figure: Canvas | None = None
-) -> Canvas:
+def draw_measured(tree: Tree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
     """The record with the law that fits best, its residuals, a - b against velocity, and healing.
 
     Parameters
@@ -181,8 +175,8 @@ def draw_measured(
     """
     found = best_fit(experiment)
     response = response_of([experiment])
-    has_steps = response["steps"].sizes["step"] > 0
-    has_holds = response["holds"].sizes["hold"] > 0
+    has_steps = response.children["steps"].sizes["step"] > 0
+    has_holds = response.children["holds"].sizes["hold"] > 0
     unit = force_unit(experiment)
     scale = scale_for(float(np.max(np.abs(experiment.drive))), "m")
     with styled():

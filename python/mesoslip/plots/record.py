@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
@@ -14,11 +13,9 @@ from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
+from mesoslip.output.arrays import Tree
 from mesoslip.plots.style import BLUE, axes_width, titles, wrapped
 from mesoslip.quantities import Scale, scale_for, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -93,7 +90,7 @@ def fit_label(axes: Axes, parts: Sequence[str]) -> str:
     return wrapped(text, axes_width(axes))
 
 
-def title_record(axes: Axes, tree: xr.DataTree, about: str = "") -> None:
+def title_record(axes: Axes, tree: Tree, about: str = "") -> None:
     """Write the title of an output above the labels of its stages, and a line about them; between
     title and labels the legend, where it hides no data."""
     titles(axes, tree, about)

@@ -21,11 +21,12 @@ from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError
-from mesoslip.inference import posterior
 from mesoslip.quantities import column, with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mesoslip.inference.posterior import Row
 
 MODEL = "earthquake-like model of a multicontact interface [@braun2009; @braun2011; @braun2015]"
 INITIAL = {
@@ -131,6 +132,8 @@ def sweep_method(tree: xr.DataTree, config: Config) -> str:
 
 def fit_method(tree: xr.DataTree, config: Config) -> str:
     """The method of a fit, with the medians of its free keys."""
+    from mesoslip.inference import posterior
+
     rows = posterior.table(tree)
     estimates = "; ".join(_estimate(one) for one in rows)
     medians = {one.key: one.percentiles[2] for one in rows if key_kind(one.key) is not None}
@@ -154,7 +157,7 @@ def fit_method(tree: xr.DataTree, config: Config) -> str:
     )
 
 
-def _estimate(row: posterior.Row) -> str:
+def _estimate(row: Row) -> str:
     """A free key with its median and interval of 90 %."""
     shown = column(row.percentiles, row.unit, row.digits)
     low, _, median, _, high = (shown.text(one) for one in row.percentiles)

@@ -11,6 +11,7 @@ from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.reports.content import Subject
 from mesoslip.reports.page import write
+from mesoslip.reports.sections import takes_arrays
 
 
 def report(output: OutputLike | Sequence[OutputLike], file: PathLike) -> None:
@@ -36,7 +37,7 @@ def report(output: OutputLike | Sequence[OutputLike], file: PathLike) -> None:
     path = as_path(file)
     with ExitStack() as stack:
         outputs = several(output)
-        trees, names = opened(outputs, stack)
+        trees, names = opened(outputs, stack, takes_arrays)
         stems = [
             Path(name).stem if isinstance(one, str | os.PathLike) else name
             for name, one in zip(names, outputs, strict=True)

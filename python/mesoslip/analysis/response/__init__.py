@@ -6,6 +6,7 @@ Of a slider under a force: creep velocities and static friction.
 
 from mesoslip.analysis.response.dataset import (
     response,
+    response_arrays,
     response_of,
     rows_of,
     scalars_of,
@@ -30,6 +31,7 @@ __all__ = [
     "healing_line",
     "line",
     "response",
+    "response_arrays",
     "response_of",
     "rows_of",
     "scalars_of",

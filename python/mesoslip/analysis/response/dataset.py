@@ -1,10 +1,12 @@
-"""The response of outputs to their drives, as a tree of datasets."""
+"""The response of outputs to their drives, as groups of variables."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +34,8 @@ from mesoslip.analysis.response.restarts import restart_rows
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
 from mesoslip.errors import FileError
-from mesoslip.output.inputs import OutputLike, as_run, several
+from mesoslip.output.arrays import Arrays, Tree, Values, Variable, in_xarray
+from mesoslip.output.inputs import OutputLike, opened_run_arrays, several
 from mesoslip.output.tables import write_table
 from mesoslip.output.variables import Group
 
@@ -80,16 +83,35 @@ def response(
         If an output cannot be read, is not of a run, or is of a slider without mass under
         a force.
     """
-    experiments = [
-        Experiment(
-            as_run(one),
-            os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+    return in_xarray(
+        response_arrays(
+            output, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
         )
-        for number, one in enumerate(several(output))
-    ]
-    return response_of(
-        experiments, normal_force=normal_force, with_fit=fit, free_stiffness=free_stiffness
     )
+
+
+def response_arrays(
+    output: OutputLike | Sequence[OutputLike],
+    *,
+    normal_force: float | None = None,
+    with_fit: bool = True,
+    free_stiffness: bool = False,
+) -> Arrays:
+    """The same without xarray; see `response`."""
+    with ExitStack() as stack:
+        experiments = [
+            Experiment(
+                stack.enter_context(opened_run_arrays(one)),
+                os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
+            )
+            for number, one in enumerate(several(output))
+        ]
+        return response_of(
+            experiments,
+            normal_force=normal_force,
+            with_fit=with_fit,
+            free_stiffness=free_stiffness,
+        )
 
 
 def response_of(
@@ -98,7 +120,7 @@ def response_of(
     normal_force: float | None = None,
     with_fit: bool = True,
     free_stiffness: bool = False,
-) -> xr.DataTree:
+) -> Arrays:
     """Steady forces, velocity steps, holds, and rate-and-state parameters of experiments.
 
     Parameters
@@ -115,13 +137,11 @@ def response_of(
 
     Returns
     -------
-    xarray.DataTree
+    Arrays
         Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
         (``hold``), ``rate_and_state`` (``fit``, one for each output and law), ``creep``
         (``force_stage``), ``restarts`` (``restart``) and ``ramps`` (``ramp``).
     """
-    import xarray as xr
-
     fits: list[dict[str, Any]] = []
     analysed = []
     for number, one in enumerate(experiments):
@@ -138,10 +158,6 @@ def response_of(
         "restarts": [row for number, one in numbered for row in restart_rows(one, number)],
         "ramps": [row for number, one in numbered for row in ramp_rows(one, number)],
     }
-    steady = _dataset(STEADY, "velocity_stage", rows["steady"])
-    holds = _dataset(HOLDS, "hold", rows["holds"])
-    creep = _dataset(CREEP, "force_stage", rows["creep"])
-    ramps = _dataset(RAMPS, "ramp", rows["ramps"])
     names = {one.apparatus.force_name for one in experiments}
     if len(names) > 1:
         raise FileError(
@@ -150,46 +166,31 @@ def response_of(
         )
     are_coefficients = names == {"friction_coefficient"}
     parts = {
-        "steady": (
-            steady.assign(_line_variables(STEADY_LINE, steady_line(steady))),
-            Group(STEADY, **STEADY_LINE),
-        ),
-        "steps": (_dataset(STEPS, "step", rows["steps"]), STEPS),
-        "holds": (
-            holds.assign(_line_variables(HEALING_LINE, healing_line(holds))),
-            Group(HOLDS, **HEALING_LINE),
-        ),
-        "rate_and_state": (_dataset(FIT, "fit", fits), FIT),
-        "creep": (
-            creep.assign(_line_variables(CREEP_LINE, creep_line(creep))),
-            Group(CREEP, **CREEP_LINE),
-        ),
-        "restarts": (_dataset(RESTARTS, "restart", rows["restarts"]), RESTARTS),
-        "ramps": (
-            ramps.assign(_line_variables(FRICTION_LINE, friction_line(ramps))),
-            Group(RAMPS, **FRICTION_LINE),
-        ),
+        "steady": _part(STEADY, "velocity_stage", rows["steady"], STEADY_LINE, steady_line),
+        "steps": _part(STEPS, "step", rows["steps"]),
+        "holds": _part(HOLDS, "hold", rows["holds"], HEALING_LINE, healing_line),
+        "rate_and_state": _part(FIT, "fit", fits),
+        "creep": _part(CREEP, "force_stage", rows["creep"], CREEP_LINE, creep_line),
+        "restarts": _part(RESTARTS, "restart", rows["restarts"]),
+        "ramps": _part(RAMPS, "ramp", rows["ramps"], FRICTION_LINE, friction_line),
     }
     # Unknown without a configuration.
     static = {one.static_force for one in experiments if not math.isnan(one.static_force)}
-    groups = {}
-    for name, (data, group) in parts.items():
-        if are_coefficients:
-            data = _as_coefficients(data, group)
-        elif normal_force is not None:
-            data = _with_ratios(data, group, normal_force, "coefficient", "normal force")
-        elif len(static) == 1:
-            data = _with_ratios(data, group, static.copy().pop(), "ratio", "static force")
-        groups["/" + name] = data
-    tree = xr.DataTree.from_dict(groups)
-    tree.attrs["outputs"] = [one.name for one in experiments]
+    attributes: dict[str, Any] = {"outputs": [one.name for one in experiments]}
+    scaled: Callable[[Arrays], Arrays] | None = None
     if are_coefficients:
-        tree.attrs["force_unit"] = "1"
+        attributes["force_unit"] = "1"
+        scaled = _as_coefficients
     elif normal_force is not None:
-        tree.attrs["normal_force"] = normal_force
+        attributes["normal_force"] = normal_force
+        scaled = partial(_with_ratios, scale=normal_force, suffix="coefficient", of="normal force")
     elif len(static) == 1:
-        tree.attrs["static_force"] = static.pop()
-    return tree
+        (force,) = static
+        attributes["static_force"] = force
+        scaled = partial(_with_ratios, scale=force, suffix="ratio", of="static force")
+    if scaled is not None:
+        parts = {name: scaled(data) for name, data in parts.items()}
+    return Arrays({}, {}, attributes, parts)
 
 
 def _fits(experiment: Experiment, number: int, free_stiffness: bool) -> list[dict[str, Any]]:
@@ -198,31 +199,37 @@ def _fits(experiment: Experiment, number: int, free_stiffness: bool) -> list[dic
     return rows_of_fit(experiment, number, free_stiffness=free_stiffness)
 
 
-def _line_variables(group: Group, found: Line | None) -> dict[str, xr.Variable]:
-    """The scalars of a line, NaN without a line."""
-    values = (
-        (math.nan, math.nan, math.nan, 0)
-        if found is None
-        else (found.slope, found.slope_error, found.chi_square, found.degrees_of_freedom)
-    )
-    return {
-        name: group.variable(name, (), np.asarray(value, dtype=group[name].dtype))
-        for name, value in zip(group, values, strict=True)
+def _part(
+    group: Group,
+    dimension: str,
+    rows: Sequence[Mapping[str, Any]],
+    line_group: Group | None = None,
+    line_of: Callable[[Arrays], Line | None] | None = None,
+) -> Arrays:
+    """A group of rows, a variable for each column, and the scalars of a line through them."""
+    columns: dict[str, Variable] = {
+        name: Values(
+            (dimension,),
+            np.array([row[name] for row in rows], dtype=meaning.dtype),
+            meaning.attributes,
+        )
+        for name, meaning in group.items()
     }
+    data = Arrays(columns, {dimension: len(rows)}, {})
+    if line_group is None or line_of is None:
+        return data
+    scalars: dict[str, Variable] = {
+        name: Values((), np.asarray(value, dtype=meaning.dtype), meaning.attributes)
+        for (name, meaning), value in zip(line_group.items(), _scalars(line_of(data)), strict=True)
+    }
+    return Arrays({**columns, **scalars}, data.sizes, {})
 
 
-def _dataset(group: Group, dimension: str, rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-    """Rows as a dataset, a variable for each column."""
-    import xarray as xr
-
-    return xr.Dataset(
-        {
-            name: group.variable(
-                name, (dimension,), np.array([row[name] for row in rows], dtype=meaning.dtype)
-            )
-            for name, meaning in group.items()
-        }
-    )
+def _scalars(line: Line | None) -> tuple[float, float, float, int]:
+    """The scalars of a line, NaN without a line."""
+    if line is None:
+        return math.nan, math.nan, math.nan, 0
+    return line.slope, line.slope_error, line.chi_square, line.degrees_of_freedom
 
 
 def ratio_name(name: str, suffix: str) -> str:
@@ -231,52 +238,51 @@ def ratio_name(name: str, suffix: str) -> str:
     return f"{stem}_{suffix}{name[len(stem) :]}"
 
 
-def _with_ratios(data: xr.Dataset, group: Group, scale: float, suffix: str, of: str) -> xr.Dataset:
-    """A dataset with its forces divided by a force as well."""
-    import xarray as xr
-
+def _with_ratios(data: Arrays, scale: float, suffix: str, of: str) -> Arrays:
+    """A group with its forces divided by a force as well."""
     ratios = {
-        ratio_name(name, suffix): xr.Variable(
-            data[name].dims,
-            data[name].values / scale,
-            {"units": "1", "long_name": f"{data[name].attrs['long_name']}, over the {of}"},
+        ratio_name(name, suffix): Values(
+            one.dims,
+            one.values / scale,
+            {"units": "1", "long_name": f"{one.attrs['long_name']}, over the {of}"},
         )
-        for name in map(str, data.data_vars)
-        if group[name].units == "N"
+        for name, one in data.items()
+        if one.attrs["units"] == "N"
     }
-    return data.assign(ratios)
+    return Arrays({**data, **ratios}, data.sizes, data.attrs)
 
 
-def _as_coefficients(data: xr.Dataset, group: Group) -> xr.Dataset:
-    """A dataset of a trace of friction coefficients: forces have the suffix ``_coefficient``, and
+def _as_coefficients(data: Arrays) -> Arrays:
+    """A group of a trace of friction coefficients: forces have the suffix ``_coefficient``, and
     stiffnesses are inverse lengths."""
-    renamed = {
-        name: ratio_name(name, "coefficient")
-        for name in map(str, data.data_vars)
-        if group[name].units == "N"
+    units = {"N": "1", "N m-1": "m-1"}
+    variables = {
+        ratio_name(name, "coefficient") if one.attrs["units"] == "N" else name: Values(
+            one.dims,
+            one.values,
+            {**one.attrs, "units": units.get(one.attrs["units"], one.attrs["units"])},
+        )
+        for name, one in data.items()
     }
-    for name in map(str, data.data_vars):
-        if group[name].units in {"N", "N m-1"}:
-            data[name].attrs["units"] = "1" if group[name].units == "N" else "m-1"
-    return data.rename(renamed)
+    return Arrays(variables, data.sizes, data.attrs)
 
 
-def rows_of(tree: xr.DataTree, name: str) -> list[dict[str, Any]]:
+def rows_of(tree: Tree, name: str) -> list[dict[str, Any]]:
     """The rows of a group of a response, a dictionary for each, without its scalars."""
     data = tree.children[name].to_dataset()
-    columns = {str(one): data[one].values.tolist() for one in data.data_vars if data[one].ndim}
+    columns = {one: data[one].values.tolist() for one in map(str, data) if data[one].dims}
     return [
         dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)
     ]
 
 
-def scalars_of(tree: xr.DataTree, name: str) -> dict[str, Any]:
+def scalars_of(tree: Tree, name: str) -> dict[str, Any]:
     """The scalars of a group of a response."""
     data = tree.children[name].to_dataset()
-    return {str(one): data[one].item() for one in data.data_vars if not data[one].ndim}
+    return {one: data[one].values.item() for one in map(str, data) if not data[one].dims}
 
 
-def write_csv(tree: xr.DataTree, path: Path) -> None:
+def write_csv(tree: Tree, path: Path) -> None:
     """Write a response as one table with a row for each stage.
 
     A stage at constant velocity has the columns of ``steady``, and those of ``steps`` if it starts

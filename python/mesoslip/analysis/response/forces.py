@@ -15,7 +15,7 @@ from mesoslip.analysis.steady_force import steady_mean
 from mesoslip.quantities import with_unit
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from mesoslip.output.arrays import Arrays
 
 # Minimum share of the static force by which contacts bear less than the force on a sliding slider.
 MIN_DEFICIT = 0.02
@@ -66,7 +66,7 @@ def creep_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
     return rows
 
 
-def creep_line(data: xr.Dataset) -> Line | None:
+def creep_line(data: Arrays) -> Line | None:
     """The line of the force over ln V, of steady creep above the noise, without errors; None for
     fewer than two forces: velocities under one force differ by their noise."""
     velocity = np.abs(data["velocity"].values)
@@ -165,7 +165,7 @@ def motion_under_force(experiment: Experiment) -> tuple[str, bool]:
     return "is unloaded", False
 
 
-def friction_line(data: xr.Dataset) -> Line | None:
+def friction_line(data: Arrays) -> Line | None:
     """The line of the static friction over ln of the rate of the force, of ramps after a constant
     force; None for fewer than two rates."""
     has_hold = np.isfinite(data["hold_time"].values)

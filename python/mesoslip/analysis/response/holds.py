@@ -13,7 +13,7 @@ from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.scatter import error_of_mean, scatter
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from mesoslip.output.arrays import Arrays
 
 
 def hold_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
@@ -102,7 +102,7 @@ def _fill_hold(
     return "; ".join(notes)
 
 
-def healing_line(data: xr.Dataset) -> Line | None:
+def healing_line(data: Arrays) -> Line | None:
     """The line of the healing over the decimal logarithm of the hold time."""
     return line(
         np.log10(data["hold_time"].values), data["healing"].values, data["healing_error"].values

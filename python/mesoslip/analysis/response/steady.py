@@ -12,7 +12,7 @@ from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.steady_force import SteadyMean
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from mesoslip.output.arrays import Arrays
 
 
 def steady_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
@@ -66,7 +66,7 @@ def _note(experiment: Experiment, stage: Stage, mean: SteadyMean) -> str:
     return "; ".join(notes)
 
 
-def steady_line(data: xr.Dataset) -> Line | None:
+def steady_line(data: Arrays) -> Line | None:
     """The line of the steady force over ln V, of steady stages; None for fewer than two
     velocities."""
     good = data["is_steady"].values == 1

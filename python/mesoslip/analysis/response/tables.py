@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mesoslip.analysis.response.dataset import ratio_name, rows_of, scalars_of
+from mesoslip.output.arrays import Tree
 from mesoslip.output.tables import PrintedTable
 from mesoslip.quantities import column, with_error, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Row = Mapping[str, Any]
 
@@ -85,7 +83,7 @@ class _Column:
         return (shown.head(self.header), *map(shown.text, values, errors))
 
 
-def force_scale(tree: xr.DataTree) -> str:
+def force_scale(tree: Tree) -> str:
     """A sentence on the scale of the forces in the tables."""
     if "force_unit" in tree.attrs:
         return "Forces are friction coefficients."
@@ -100,7 +98,7 @@ def _size(force: float) -> str:
     return with_unit(force, "N", 6)
 
 
-def tables(tree: xr.DataTree) -> list[ResponseTable]:
+def tables(tree: Tree) -> list[ResponseTable]:
     """Tables of a response, without the empty ones.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +12,7 @@ from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit, record_of
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
+from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.forced_response import draw_forced
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
@@ -21,9 +21,6 @@ from mesoslip.plots.record import draw_record, fit_label, title_record
 from mesoslip.plots.style import RED, Canvas, canvas, styled, write_title
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -47,7 +44,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, sc
     axes.legend(loc="best")
 
 
-def draw_force(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_force(axes: Axes, tree: Tree, _: Options) -> None:
     """Draw the force against the displacement of the load point, and the rate-and-state law that
     fits better."""
     experiment = Experiment(tree)
@@ -70,7 +67,7 @@ def draw_force(axes: Axes, tree: xr.DataTree, _: Options) -> None:
         _draw_fit(axes, experiment, record, best, scale)
 
 
-def draw_steady(axes: Axes, data: xr.Dataset) -> None:
+def draw_steady(axes: Axes, data: Arrays) -> None:
     """Draw the steady force against the logarithm of the velocity, with a line fitted to it."""
     data = data.isel(velocity_stage=np.isfinite(data["steady_force"].values))
     velocity = np.abs(data["velocity"].values)
@@ -96,7 +93,7 @@ def draw_steady(axes: Axes, data: xr.Dataset) -> None:
     axes.set_ylabel("steady force over $F_s$")
 
 
-def draw_healing(axes: Axes, data: xr.Dataset) -> None:
+def draw_healing(axes: Axes, data: Arrays) -> None:
     """Draw the growth of the restart peak against the hold time."""
     scale = _scale(data, "healing")
     hold = data["hold_time"].values
@@ -119,14 +116,14 @@ def draw_healing(axes: Axes, data: xr.Dataset) -> None:
     axes.set_ylabel("(peak - steady force) over $F_s$")
 
 
-def _scale(data: xr.Dataset, name: str) -> float:
+def _scale(data: Arrays, name: str) -> float:
     """One over the static force."""
     force, ratio = data[name].values, data[f"{name}_ratio"].values
     good = np.isfinite(force) & (force != 0)
     return float(ratio[good][0] / force[good][0]) if good.any() else 1.0
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
     """The record with the law that fits better; steady forces; healing in holds.
 
     Of a measured trace: residuals, and a - b against velocity, instead of steady forces. Of a
@@ -138,7 +135,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     if experiment.is_forced:
         return draw_forced(tree, experiment, figure)
     found = response_of([experiment], with_fit=False)
-    steady, holds = found["steady"].to_dataset(), found["holds"].to_dataset()
+    steady, holds = found.children["steady"], found.children["holds"]
     velocities = steady["velocity"].values[np.isfinite(steady["steady_force"].values)]
     draws_steady = np.unique(np.abs(velocities)).size > 1
     draws_healing = bool(np.isfinite(holds["healing"].values).any())
@@ -166,4 +163,5 @@ VIEW = View(
     summary="steady forces, velocity steps and holds",
     draw=draw,
     panel=draw_force,
+    takes_arrays=True,
 )

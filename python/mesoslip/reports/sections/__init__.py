@@ -6,6 +6,9 @@ A new section is a file in this folder and a line in `SECTIONS`; a new kind of o
 
 from __future__ import annotations
 
+from mesoslip.output.arrays import Arrays
+from mesoslip.output.kinds import kind_of
+from mesoslip.plots.views import takes_arrays as view_takes_arrays
 from mesoslip.reports.content import Writer
 from mesoslip.reports.sections.avalanches import avalanches
 from mesoslip.reports.sections.changes import changes
@@ -44,3 +47,14 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
     "lyapunov": (changes, pictures, lyapunov, methods, configuration, provenance),
     "fit": (parameters, methods, configuration, provenance),
 }
+
+
+def takes_arrays(tree: Arrays) -> bool:
+    """Whether the sections about an output need no xarray: those of a run without avalanches, and
+    without pictures of layers or snapshots."""
+    return (
+        kind_of(tree) == "run"
+        and view_takes_arrays(tree, None)
+        and not {"avalanches", "snapshots"} & tree.children.keys()
+        and "layer_displacement" not in tree
+    )

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mesoslip.configuration import differences
-from mesoslip.inference import posterior
 from mesoslip.reports.content import Block, Section, Source, Subject, Table, Text
 from mesoslip.reports.sections.base import named
 
@@ -67,6 +66,8 @@ def _free_keys(subject: Subject) -> dict[str, tuple[float, float]]:
     """The keys that a fit estimates, with the ends of their ranges in SI."""
     if "posterior" not in subject.tree.children:
         return {}
+    from mesoslip.inference import posterior
+
     return {one.key: (one.low, one.high) for one in posterior.table(subject.tree)}
 
 

@@ -33,10 +33,10 @@ def energy(subjects: Sequence[Subject]) -> Section | None:
 
 def _balance(subject: Subject) -> Table:
     """Energies, and their parts of the work of the drive."""
-    data = group_of(subject.tree, "energy").sum("realization")
-    work = abs(data["drive_work"].item())
+    data = group_of(subject.tree, "energy")
+    work = abs(float(data["drive_work"].values.sum()))
     energies = {
-        meaning.long_name: data[name].item()
+        meaning.long_name: float(data[name].values.sum())
         for name, meaning in variables.ENERGY.items()
         if name in data
     }

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from mesoslip.inference import posterior
 from mesoslip.quantities import column
 from mesoslip.reports.content import Block, Section, Subject, Table, Text
 from mesoslip.reports.sections.base import picture_of
+
+if TYPE_CHECKING:
+    from mesoslip.inference.posterior import Row
 
 HEAD = (
     "parameter",
@@ -21,6 +24,8 @@ HEAD = (
 
 def parameters(subjects: Sequence[Subject]) -> Section:
     """Parameters of fits with their intervals, and the warnings of the fits."""
+    from mesoslip.inference import posterior
+
     blocks: list[Block] = []
     for subject in subjects:
         if len(subjects) > 1:
@@ -41,7 +46,7 @@ def parameters(subjects: Sequence[Subject]) -> Section:
     return Section("Parameters", tuple(blocks))
 
 
-def _row(parameter: posterior.Row) -> tuple[str, ...]:
+def _row(parameter: Row) -> tuple[str, ...]:
     """A parameter with its unit, its median and intervals in that unit, and its verdict."""
     shown = column(parameter.percentiles, parameter.unit, parameter.digits)
     low, lower, median, upper, high = (shown.text(one) for one in parameter.percentiles)

@@ -13,11 +13,9 @@ def regime(subjects: Sequence[Subject]) -> Section:
     """The regime of the motion of each run."""
     blocks = []
     for subject in subjects:
-        found = regimes.regimes(subject.tree, subject.name)
+        results, motion = regimes.judge(subject.tree, subject.name)
         text = (
-            f"in the last stage the slider {found.attrs['motion']}"
-            if "motion" in found.attrs
-            else regimes.summary(regimes.results_of(found))
+            regimes.summary(results) if motion is None else f"in the last stage the slider {motion}"
         )
         blocks.append(Text(named(subjects, subject, f"{text[:1].upper()}{text[1:]}.")))
     return Section("Regime", tuple(blocks))

@@ -1,31 +1,38 @@
-"""Derived numbers of force curves, onsets of slip and settled cycles."""
+"""Derived numbers of force curves, onsets of slip and settled cycles.
+
+The theory is imported where it is used: a report of a run has none.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mesoslip.cycles import cycle as cycles
 from mesoslip.reports.content import Section, Subject, Table, Text
 from mesoslip.reports.sections.base import named, row_in_one_unit
-from mesoslip.theory import force_curve, slip_onset
 
 DIGITS = 5
 
 
 def curve(subjects: Sequence[Subject]) -> Section:
     """Numbers of force curves."""
-    return _numbers("Force curve", subjects, force_curve.SUMMARY)
+    from mesoslip.theory.force_curve import SUMMARY
+
+    return _numbers("Force curve", subjects, SUMMARY)
 
 
 def cycle(subjects: Sequence[Subject]) -> Section:
     """Numbers of settled cycles."""
-    return _numbers("Settled motion", subjects, cycles.SUMMARY)
+    from mesoslip.cycles.cycle import SUMMARY
+
+    return _numbers("Settled motion", subjects, SUMMARY)
 
 
 def onset(subjects: Sequence[Subject]) -> Section:
     """Numbers of onsets of slip."""
-    return _numbers("Onset of slip", subjects, slip_onset.SUMMARY)
+    from mesoslip.theory.slip_onset import SUMMARY
+
+    return _numbers("Onset of slip", subjects, SUMMARY)
 
 
 def _numbers(

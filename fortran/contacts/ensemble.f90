@@ -157,7 +157,7 @@ contains
       schedule%moments = 0
       schedule%direction = self%direction
       schedule%behind = self%behind
-      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, schedule, &
+      call self%list_attachments(min(limit, max_events, number + 4), pose%direction, schedule, &
          & contact)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
       schedule%is_over = .false.

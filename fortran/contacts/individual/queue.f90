@@ -20,7 +20,7 @@ module mesoslip_contacts_individual_queue
    !> Contacts in a chunk of a bucket: 16 numbers of 4 bytes fill a cache line.
    integer, parameter :: chunk_length = 16
    !> Mean number of contacts in a bucket when keys are spread evenly.
-   integer, parameter :: bucket_load = 8
+   integer, parameter :: bucket_load = 16
    integer, parameter :: min_buckets = 64
    !> Bound on bucket numbers, for keys far beyond any motion.
    real(wp), parameter :: max_bucket = 1.0e15_wp

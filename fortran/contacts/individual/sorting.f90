@@ -1,13 +1,13 @@
 !> Contacts in the order of a key, then of their number: sorting, and a binary heap.
 module mesoslip_contacts_individual_sorting
-   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_kinds, only: i8, wp
    implicit none
    private
 
    public :: before, push, remove_first, sort, sort_in_place
 
-   !> Beyond this length sorting by insertion gives way to merging.
-   integer, parameter :: short_run = 16
+   !> Beyond this length sorting by counting gives way to merging.
+   integer, parameter :: short_run = 32
 
 contains
 
@@ -69,7 +69,7 @@ contains
       heap_contact(parent) = contact
    end subroutine remove_first
 
-   !> Sort contacts by key, then by number: short runs by insertion, longer ones by merging, or in
+   !> Sort contacts by key, then by number: short runs by counting, longer ones by merging, or in
    !> place if there is not enough memory for that.
    pure subroutine sort(key, contact, count)
       real(wp), intent(inout), contiguous :: key(:)
@@ -81,7 +81,8 @@ contains
       integer :: first, middle, last, run, stat
 
       do first = 1, count, short_run
-         call insertion_sort(key, contact, first, min(first + short_run - 1, count))
+         last = min(first + short_run - 1, count)
+         call sort_run(key(first:last), contact(first:last), last - first + 1)
       end do
       if (count <= short_run) return
 
@@ -134,20 +135,49 @@ contains
       end do
    end subroutine sort_in_place
 
+   !> Sort one run by counting how many keys are smaller than each, without a branch that depends on
+   !> them, or by insertion if keys are equal.
+   pure subroutine sort_run(key, contact, count)
+      integer, intent(in) :: count
+      real(wp), intent(inout) :: key(count)
+      integer, intent(inout) :: contact(count)
+
+      real(wp) :: unsorted_key(short_run)
+      integer :: unsorted_contact(short_run), one
+      ! Of as many bytes as a key, so that both are compared and counted side by side.
+      integer(i8) :: smaller(short_run)
+
+      smaller(:count) = 0_i8
+      do one = 1, count
+         unsorted_key(one) = key(one)
+         unsorted_contact(one) = contact(one)
+         smaller(:count) = smaller(:count) + merge(1_i8, 0_i8, key(one) < key)
+      end do
+      if (sum(smaller(:count)) /= (count * (count - 1)) / 2) then
+         ! Keys that are equal share a number.
+         call insertion_sort(key, contact, count)
+         return
+      end if
+      do one = 1, count
+         key(smaller(one) + 1_i8) = unsorted_key(one)
+         contact(smaller(one) + 1_i8) = unsorted_contact(one)
+      end do
+   end subroutine sort_run
+
    !> Sort one run by insertion.
-   pure subroutine insertion_sort(key, contact, first, last)
-      real(wp), intent(inout), contiguous :: key(:)
-      integer, intent(inout), contiguous :: contact(:)
-      integer, intent(in) :: first, last
+   pure subroutine insertion_sort(key, contact, count)
+      integer, intent(in) :: count
+      real(wp), intent(inout) :: key(count)
+      integer, intent(inout) :: contact(count)
 
       integer :: next, position, moved_contact
       real(wp) :: moved_key
 
-      do next = first + 1, last
+      do next = 2, count
          moved_key = key(next)
          moved_contact = contact(next)
          position = next
-         do while (position > first)
+         do while (position > 1)
             if (.not. before(moved_key, moved_contact, key(position - 1), &
                & contact(position - 1))) exit
             key(position) = key(position - 1)

@@ -16,6 +16,7 @@ module mesoslip_sliders_rigid
    use mesoslip_sliders_hazard_clock, only: limit_window
    use mesoslip_sliders_motion_series, only: horner, integral
    use mesoslip_sliders_rigid_long_step, only: take_long_step
+   use mesoslip_sliders_rigid_run_through, only: run_through
    use mesoslip_sliders_rigid_settled_step, only: try_settled_step
    use mesoslip_sliders_rigid_short_step, only: try_short_step
    use mesoslip_sliders_rigid_state, only: constants, few_terms, long_terms, many_terms, &
@@ -101,15 +102,17 @@ contains
 
       type(system_type) :: system
 
+      if (.not. schedule%has_clocks) then
+         call run_through(self, schedule, filter)
+         return
+      end if
       system = constants(self)
+      self%has_clocks = .true.
       do
          self%law = schedule%law()
-         if (schedule%has_clocks) then
-            self%has_clocks = .true.
-            call schedule%hazard%offer(self%displacement, self%clock)
-         end if
+         call schedule%hazard%offer(self%displacement, self%clock)
          call step_on(self, system, schedule%window(self%time))
-         if (schedule%has_clocks) call schedule%hazard%go_on(self%clock)
+         call schedule%hazard%go_on(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)

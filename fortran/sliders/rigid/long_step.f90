@@ -145,7 +145,7 @@ contains
             & lever(series, terms, step))
          call arrive(self, system, early, self%drive%at(self%time) - self%displacement, late)
       else
-         call pull(self, system, step, second_integral(series, terms, step))
+         call pull(self, system%drive_gap, step, second_integral(series, terms, step))
          call arrive(self, system, early, uniform_gap(self), late)
       end if
       select case (terms)

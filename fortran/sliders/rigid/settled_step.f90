@@ -73,7 +73,7 @@ contains
       if (crosses) self%displacement = target
       self%velocity = velocity
       self%damper = 0.0_wp
-      call pull(self, system, step, 0.5_wp * velocity * step**2)
+      call pull(self, system%drive_gap, step, 0.5_wp * velocity * step**2)
       call arrive(self, system, early, uniform_gap(self), late)
       call self%drag_loss%add(self%law%drag * velocity**2 * step)
    end subroutine try_settled_step

@@ -6,16 +6,17 @@
 !> exact to rounding or nearly so. Other steps are for the module of long steps, as are those under
 !> a drive that accelerates.
 module mesoslip_sliders_rigid_short_step
-   use mesoslip_interface_law, only: window_type
+   use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_motion_series, only: horner, integral, inverse
-   use mesoslip_sliders_rigid_state, only: arrive, few_terms, motion_rates_type, pull, &
-      & rigid_state_type, system_type, uniform_gap
+   use mesoslip_sliders_rigid_state, only: drive_gap_at, few_terms, motion_rates, &
+      & motion_rates_type, pull, rigid_motion_type, rigid_state_type, system_type
    implicit none
    private
 
-   public :: try_short_step
+   public :: short_step_type
+   public :: try_short_step, derive, find_end, move, audit, keep_series
 
    !> Maximum duration of a short step in units of the fastest rate
    real(wp), parameter :: max_step = 3.0e-3_wp
@@ -27,11 +28,24 @@ module mesoslip_sliders_rigid_short_step
    !> Maximum terms with which the reversion is still right to some 1e-6
    real(wp), parameter :: fair_a_2 = 2.0e-2_wp, fair_a_3 = 1.0e-3_wp
 
-   !> Derivatives of the acceleration, from the first to the fourth, and of the damper, from the
-   !> second to the fourth.
-   type :: derivatives_type
+   !> A short step.
+   type :: short_step_type
+      !> The motion at its start, and how far the drive is ahead of the slider there [m]
+      type(motion_rates_type) :: early
+      real(wp) :: drive_gap
+      !> Drag of the contacts [N s/m]
+      real(wp) :: drag
+      !> Derivatives of the acceleration at its start, from the first to the fourth, and of the
+      !> damper, from the second to the fourth
       real(wp) :: jerk, snap, crackle, pop, damper_2, damper_3, damper_4
-   end type derivatives_type
+      !> Its duration [s]
+      real(wp) :: duration
+      !> Whether it ends at a break, and where that is [m]; when it ends otherwise [s]
+      logical :: crosses
+      real(wp) :: target, end_time
+      !> Acceleration at its end [m/s2]
+      real(wp) :: acceleration
+   end type short_step_type
 
 contains
 
@@ -48,21 +62,105 @@ contains
       !> Whether the step was made; if not, the motion has not changed
       logical, intent(out) :: is_done
 
-      real(wp) :: target, distance, pace, rest, passage, longest, step, change, inverse_pace, &
-         & end_time
-      type(derivatives_type) :: derivatives
-      logical :: crosses, nears, is_due
+      type(short_step_type) :: step
+      type(rigid_motion_type) :: motion
+      logical :: is_due
+
+      motion = self%motion()
+      step%early = early
+      step%drive_gap = system%drive_gap
+      step%drag = self%law%drag
+      call derive(system, self%damping, step)
+      call find_end(system, self%damping, motion, window, step, is_done)
+      if (.not. is_done) return
+      call keep_series(self, step)
+      if (self%has_clocks) then
+         call advance_clocks(self%clock, self%series, few_terms, step%duration, is_due)
+         if (is_due) then
+            step%crosses = .false.
+            step%end_time = self%time + step%duration
+         end if
+      end if
+      call move(self, system, self%law, step, motion)
+      call self%take_motion(motion)
+      self%start_acceleration = early%acceleration
+      self%acceleration = step%acceleration
+      call audit(self, step, motion)
+   end subroutine try_short_step
+
+   !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in.
+   pure subroutine derive(system, damping, step)
+      type(system_type), intent(in) :: system
+      !> Damping rate [1/s]
+      real(wp), intent(in) :: damping
+      !> The step, with the motion at its start
+      type(short_step_type), intent(inout) :: step
+
+      associate (loss => system%drag + damping, early => step%early, d => step)
+         d%jerk = (system%driving - system%stiffness * early%velocity &
+            & + damping * early%damper) - loss * early%acceleration
+         d%damper_2 = damping * (d%jerk - early%damper_rate)
+         d%snap = (damping * early%damper_rate - system%stiffness * early%acceleration) &
+            & - loss * d%jerk
+         d%damper_3 = damping * (d%snap - d%damper_2)
+         d%crackle = (damping * d%damper_2 - system%stiffness * d%jerk) - loss * d%snap
+         d%damper_4 = damping * (d%crackle - d%damper_3)
+         d%pop = (damping * d%damper_3 - system%stiffness * d%snap) - loss * d%crackle
+      end associate
+   end subroutine derive
+
+   !> Taylor coefficients of the velocity in a step.
+   pure function series_of(step) result(series)
+      type(short_step_type), intent(in) :: step
+      real(wp) :: series(0:few_terms - 1)
+
+      series(0) = step%early%velocity
+      series(1) = step%early%acceleration
+      series(2) = inverse(2) * step%jerk
+      series(3) = inverse(6) * step%snap
+      series(4) = (1.0_wp / 24.0_wp) * step%crackle
+      series(5) = (1.0_wp / 120.0_wp) * step%pop
+   end function series_of
+
+   !> Let the motion in a step be observed.
+   pure subroutine keep_series(self, step)
+      class(rigid_state_type), intent(inout) :: self
+      type(short_step_type), intent(in) :: step
+
+      self%terms = few_terms
+      self%series(:few_terms - 1) = series_of(step)
+   end subroutine keep_series
+
+   !> Where and when a step ends, if it is a short one.
+   pure subroutine find_end(system, damping, motion, window, step, is_found)
+      !> Equation of motion, and damping rate [1/s]
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: damping
+      !> The motion at the start
+      type(rigid_motion_type), intent(in) :: motion
+      !> Where the contact force holds
+      type(window_type), intent(in) :: window
+      !> The step, with its derivatives
+      type(short_step_type), intent(inout) :: step
+      !> Whether it is a short one
+      logical, intent(out) :: is_found
+
+      real(wp) :: series(0:few_terms - 1)
+      real(wp) :: distance, pace, rest, passage, longest, change, inverse_pace
+      logical :: nears
       integer :: term
 
-      is_done = .false.
-      target = merge(window%upper, window%lower, early%velocity > 0.0_wp)
-      pace = abs(early%velocity)
-      distance = sign(1.0_wp, early%velocity) * (target - self%displacement)
-      rest = window%end_time - self%time
-      if (.not. (pace > 0.0_wp .and. distance > 0.0_wp .and. rest > 0.0_wp)) return
+      is_found = .false.
+      associate (velocity => step%early%velocity)
+         step%target = merge(window%upper, window%lower, velocity > 0.0_wp)
+         pace = abs(velocity)
+         distance = sign(1.0_wp, velocity) * (step%target - motion%displacement)
+         rest = window%end_time - motion%time
+         if (.not. (pace > 0.0_wp .and. distance > 0.0_wp .and. rest > 0.0_wp)) return
 
-      nears = distance < 2.0_wp * pace * rest
-      inverse_pace = 1.0_wp / early%velocity
+         nears = distance < 2.0_wp * pace * rest
+         inverse_pace = 1.0_wp / velocity
+      end associate
       longest = rest
       passage = rest
       if (nears) then
@@ -71,73 +169,32 @@ contains
       end if
       ! Twice the sum of squares exceeds the square of the fastest rate.
       if (longest**2 * (2.0_wp * abs(system%stiffness) &
-         & + 2.0_wp * (system%drag + 2.0_wp * self%damping)**2) > max_step**2) return
+         & + 2.0_wp * (system%drag + 2.0_wp * damping)**2) > max_step**2) return
 
-      call derive(self, system, early, derivatives)
+      step%end_time = window%end_time
       if (nears) then
-         call revert(self%series, early, derivatives, distance, passage, inverse_pace, step, &
-            & is_done)
-         if (.not. is_done) return
-         crosses = step <= rest
-         if (.not. crosses) step = rest
+         call revert(step, distance, passage, inverse_pace, step%duration, is_found)
+         if (.not. is_found) return
+         step%crosses = step%duration <= rest
+         if (.not. step%crosses) step%duration = rest
       else
          ! Too far from any break to come to it in the time that is left.
+         series = series_of(step)
          change = 0.0_wp
          do term = few_terms - 1, 1, -1
-            change = (change + abs(self%series(term))) * rest
+            change = (change + abs(series(term))) * rest
          end do
          if (.not. change < 0.5_wp * pace) return
-         crosses = .false.
-         step = rest
+         is_found = .true.
+         step%crosses = .false.
+         step%duration = rest
       end if
-
-      is_done = .true.
-      end_time = window%end_time
-      if (self%has_clocks) then
-         call advance_clocks(self%clock, self%series, few_terms, step, is_due)
-         if (is_due) then
-            crosses = .false.
-            end_time = self%time + step
-         end if
-      end if
-      call move(self, system, end_time, early, derivatives, step, crosses, target)
-   end subroutine try_short_step
-
-   !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in,
-   !> and the series of the velocity.
-   subroutine derive(self, system, early, derivatives)
-      class(rigid_state_type), intent(inout) :: self
-      type(system_type), intent(in) :: system
-      !> The motion at the start of the step
-      type(motion_rates_type), intent(in) :: early
-      type(derivatives_type), intent(out) :: derivatives
-
-      associate (loss => system%drag + self%damping, d => derivatives)
-         d%jerk = (system%driving - system%stiffness * early%velocity &
-            & + self%damping * early%damper) - loss * early%acceleration
-         d%damper_2 = self%damping * (d%jerk - early%damper_rate)
-         d%snap = (self%damping * early%damper_rate - system%stiffness * early%acceleration) &
-            & - loss * d%jerk
-         d%damper_3 = self%damping * (d%snap - d%damper_2)
-         d%crackle = (self%damping * d%damper_2 - system%stiffness * d%jerk) - loss * d%snap
-         d%damper_4 = self%damping * (d%crackle - d%damper_3)
-         d%pop = (self%damping * d%damper_3 - system%stiffness * d%snap) - loss * d%crackle
-         self%series(0) = early%velocity
-         self%series(1) = early%acceleration
-         self%series(2) = inverse(2) * d%jerk
-         self%series(3) = inverse(6) * d%snap
-         self%series(4) = (1.0_wp / 24.0_wp) * d%crackle
-         self%series(5) = (1.0_wp / 120.0_wp) * d%pop
-      end associate
-   end subroutine derive
+   end subroutine find_end
 
    !> Time in which a distance is made, by reversion of the series of the displacement.
-   subroutine revert(series, early, derivatives, distance, passage, inverse_pace, time, is_right)
-      !> Coefficients of the velocity
-      real(wp), intent(in) :: series(0:)
-      !> The motion at the start
-      type(motion_rates_type), intent(in) :: early
-      type(derivatives_type), intent(in) :: derivatives
+   pure subroutine revert(step, distance, passage, inverse_pace, time, is_right)
+      !> The step, with its derivatives
+      type(short_step_type), intent(in) :: step
       !> The distance, the time at the present velocity, and one over that velocity
       real(wp), intent(in) :: distance, passage, inverse_pace
       !> The time; whether it is right
@@ -147,10 +204,10 @@ contains
       real(wp) :: change, a_2, a_3, a_4, a_5
 
       change = passage * inverse_pace
-      a_2 = early%acceleration * (inverse(2) * change)
-      a_3 = derivatives%jerk * (inverse(6) * change * passage)
-      a_4 = derivatives%snap * ((1.0_wp / 24.0_wp) * change * passage**2)
-      a_5 = derivatives%crackle * ((1.0_wp / 120.0_wp) * change * passage * passage**2)
+      a_2 = step%early%acceleration * (inverse(2) * change)
+      a_3 = step%jerk * (inverse(6) * change * passage)
+      a_4 = step%snap * ((1.0_wp / 24.0_wp) * change * passage**2)
+      a_5 = step%crackle * ((1.0_wp / 120.0_wp) * change * passage * passage**2)
       time = passage
       is_right = .not. (abs(a_2) > fair_a_2 .or. abs(a_3) > fair_a_3)
       if (.not. is_right) return
@@ -159,7 +216,7 @@ contains
          & - (7.0_wp * a_2**2 * (2.0_wp * a_2**2 - 3.0_wp * a_3) + 6.0_wp * a_2 * a_4 &
          & + 3.0_wp * a_3**2 - a_5))
       if (abs(a_2) > max_a_2 .or. abs(a_3) > max_a_3 .or. abs(a_4) > max_a_4 &
-         & .or. abs(a_5) > max_a_5) time = nearer(series, distance, time)
+         & .or. abs(a_5) > max_a_5) time = nearer(series_of(step), distance, time)
    end subroutine revert
 
    !> A time of a crossing made exact by one step of Halley's method, the error of which is cubic.
@@ -180,59 +237,75 @@ contains
          & * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
    end function nearer
 
-   !> Move, and add work and losses to the energy balance.
-   subroutine move(self, system, end_time, early, derivatives, step, crosses, target)
-      class(rigid_state_type), intent(inout) :: self
+   !> Where the slider is at the end of a step, and its acceleration there.
+   pure subroutine move(self, system, law, step, motion)
+      !> The slider, of which the drive, mass, spring and damping count
+      class(rigid_state_type), intent(in) :: self
+      !> Its equation of motion, and the contact force
       type(system_type), intent(in) :: system
-      !> Time at which it ends, if that is not at a break [s]
-      real(wp), intent(in) :: end_time
-      !> The motion at the start of the step
-      type(motion_rates_type), intent(in) :: early
-      type(derivatives_type), intent(in) :: derivatives
-      !> Length of the step [s]
-      real(wp), intent(in) :: step
-      !> Whether it ends at a break, and where that is [m]
-      logical, intent(in) :: crosses
-      real(wp), intent(in) :: target
+      type(interface_law_type), intent(in) :: law
+      !> The step
+      type(short_step_type), intent(inout) :: step
+      !> The motion
+      type(rigid_motion_type), intent(inout) :: motion
 
-      real(wp) :: square, velocity_loss, damper_loss
+      real(wp) :: square, start_time
       type(motion_rates_type) :: late
 
-      self%terms = few_terms
-      square = step**2
-      associate (d => derivatives)
-         if (crosses) then
-            self%displacement = target
-            self%time = self%time + step
+      start_time = motion%time
+      square = step%duration**2
+      associate (early => step%early, d => step, time => step%duration)
+         if (step%crosses) then
+            motion%displacement = step%target
+            motion%time = motion%time + time
          else
-            self%displacement = self%displacement + step * (early%velocity &
-               & + inverse(2) * step * (early%acceleration + inverse(3) * step * d%jerk) &
-               & + (1.0_wp / 24.0_wp) * step * square * (d%snap + inverse(5) * step * d%crackle &
+            motion%displacement = motion%displacement + time * (early%velocity &
+               & + inverse(2) * time * (early%acceleration + inverse(3) * time * d%jerk) &
+               & + (1.0_wp / 24.0_wp) * time * square * (d%snap + inverse(5) * time * d%crackle &
                & + (1.0_wp / 30.0_wp) * square * d%pop))
-            self%time = end_time
+            motion%time = step%end_time
          end if
-         self%velocity = early%velocity + (step * early%acceleration + inverse(2) * square &
-            & * ((d%jerk + inverse(3) * step * d%snap) + inverse(12) * square &
-            & * (d%crackle + inverse(5) * step * d%pop)))
-         self%damper = early%damper + (step * early%damper_rate + inverse(2) * square &
-            & * ((d%damper_2 + inverse(3) * step * d%damper_3) + inverse(12) * square * d%damper_4))
-         ! A share of (rate times step)**2 of the balance: four terms do.
-         call pull(self, system, step, inverse(2) * square * (early%velocity &
-            & + inverse(3) * step * (early%acceleration + inverse(4) * step * (d%jerk &
-            & + inverse(5) * step * d%snap))))
+         motion%velocity = early%velocity + (time * early%acceleration + inverse(2) * square &
+            & * ((d%jerk + inverse(3) * time * d%snap) + inverse(12) * square &
+            & * (d%crackle + inverse(5) * time * d%pop)))
+         motion%damper = early%damper + (time * early%damper_rate + inverse(2) * square &
+            & * ((d%damper_2 + inverse(3) * time * d%damper_3) + inverse(12) * square * d%damper_4))
       end associate
-      call arrive(self, system, early, uniform_gap(self), late)
-      ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
-      ! fastest rate, of terms that are a small part of the balance.
-      velocity_loss = step * (0.5_wp * (early%velocity**2 + late%velocity**2) &
-         & + inverse(6) * step * (early%velocity * early%acceleration &
-         & - late%velocity * late%acceleration))
-      damper_loss = step * (0.5_wp * (early%damper * early%velocity + late%damper * late%velocity) &
-         & + inverse(12) * step * (early%damper_rate * early%velocity &
-         & + early%damper * early%acceleration - late%damper_rate * late%velocity &
-         & - late%damper * late%acceleration))
-      call self%drag_loss%add(self%law%drag * velocity_loss)
-      call self%damping_loss%add(self%mass * damper_loss)
+      if (abs(motion%velocity) > 0.0_wp) motion%direction = sign(1.0_wp, motion%velocity)
+      late = motion_rates(system, self%damping, motion, drive_gap_at(self, motion), &
+         & law%stiffness * motion%displacement - law%offset + law%rate * (motion%time - start_time))
+      step%acceleration = late%acceleration
    end subroutine move
+
+   !> Add work and losses of a step to the energy balance.
+   subroutine audit(self, step, motion)
+      class(rigid_state_type), intent(inout) :: self
+      !> The step, and the motion at its end
+      type(short_step_type), intent(in) :: step
+      type(rigid_motion_type), intent(in) :: motion
+
+      real(wp) :: square, velocity_loss, damper_loss, damper_rate
+
+      square = step%duration**2
+      damper_rate = self%damping * (step%acceleration - motion%damper)
+      associate (early => step%early, time => step%duration)
+         ! A share of (rate times step)**2 of the balance: four terms do.
+         call pull(self, step%drive_gap, time, inverse(2) * square * (early%velocity &
+            & + inverse(3) * time * (early%acceleration + inverse(4) * time * (step%jerk &
+            & + inverse(5) * time * step%snap))))
+         ! From values and slopes at both ends: the error is (2 step)**4/720, in units of the
+         ! fastest rate, of terms that are a small part of the balance.
+         velocity_loss = time * (0.5_wp * (early%velocity**2 + motion%velocity**2) &
+            & + inverse(6) * time * (early%velocity * early%acceleration &
+            & - motion%velocity * step%acceleration))
+         damper_loss = time * (0.5_wp * (early%damper * early%velocity &
+            & + motion%damper * motion%velocity) &
+            & + inverse(12) * time * (early%damper_rate * early%velocity &
+            & + early%damper * early%acceleration - damper_rate * motion%velocity &
+            & - motion%damper * step%acceleration))
+      end associate
+      call self%drag_loss%add(step%drag * velocity_loss)
+      call self%damping_loss%add(self%mass * damper_loss)
+   end subroutine audit
 
 end module mesoslip_sliders_rigid_short_step

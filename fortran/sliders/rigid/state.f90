@@ -7,8 +7,8 @@ module mesoslip_sliders_rigid_state
    implicit none
    private
 
-   public :: rigid_state_type, system_type, motion_rates_type
-   public :: constants, rates, uniform_gap, pull, pull_unevenly, arrive
+   public :: rigid_state_type, system_type, motion_rates_type, rigid_motion_type
+   public :: constants, drive_gap_at, motion_rates, rates, uniform_gap, pull, pull_unevenly, arrive
    public :: few_terms, some_terms, many_terms, long_terms
 
    !> Terms of the series of steps from short to long. What a series leaves out is less than 1e-16
@@ -35,6 +35,14 @@ module mesoslip_sliders_rigid_state
       real(wp) :: damper, damper_rate
    end type motion_rates_type
 
+   !> Where the slider is, and how it moves.
+   type :: rigid_motion_type
+      !> Time [s], displacement [m], velocity [m/s], deceleration by the damper [m/s2]
+      real(wp) :: time, displacement, velocity, damper
+      !> Sign of the last velocity that was not zero
+      real(wp) :: direction
+   end type rigid_motion_type
+
    !> A rigid slider on a spring.
    type, abstract, extends(scheduled_slider_type) :: rigid_state_type
       !> Mass M [kg], stiffness of the drive's spring K [N/m], damping rate eta_S [1/s]
@@ -47,6 +55,10 @@ module mesoslip_sliders_rigid_state
       !> Taylor coefficients of the velocity in the time since then
       integer :: terms = few_terms
       real(wp) :: series(0:long_terms - 1) = 0.0_wp
+   contains
+      !> Where it is, and being put elsewhere
+      procedure, non_overridable :: motion
+      procedure, non_overridable :: take_motion
    end type rigid_state_type
 
 contains
@@ -66,17 +78,71 @@ contains
       system%drive_gap = 0.0_wp
    end function constants
 
+   !> Where the slider is, and how it moves.
+   pure function motion(self)
+      !> The slider
+      class(rigid_state_type), intent(in) :: self
+      !> Its motion
+      type(rigid_motion_type) :: motion
+
+      motion = rigid_motion_type(self%time, self%displacement, self%velocity, self%damper, &
+         & self%direction)
+   end function motion
+
+   !> Put the slider where it has come to.
+   pure subroutine take_motion(self, motion)
+      !> The slider
+      class(rigid_state_type), intent(inout) :: self
+      !> Its motion
+      type(rigid_motion_type), intent(in) :: motion
+
+      self%time = motion%time
+      self%displacement = motion%displacement
+      self%velocity = motion%velocity
+      self%damper = motion%damper
+      self%direction = motion%direction
+   end subroutine take_motion
+
+   !> How far a drive of constant velocity is ahead of the slider, which is somewhere else.
+   pure function drive_gap_at(self, motion) result(drive_gap)
+      class(rigid_state_type), intent(in) :: self
+      !> Where the slider is
+      type(rigid_motion_type), intent(in) :: motion
+      !> The gap [m]
+      real(wp) :: drive_gap
+
+      drive_gap = self%drive%value - motion%displacement &
+         & + self%drive%rate * (motion%time - self%drive%time)
+   end function drive_gap_at
+
    !> How far a drive of constant velocity is ahead of the slider.
    pure function uniform_gap(self) result(drive_gap)
       class(rigid_state_type), intent(in) :: self
       !> The gap [m]
       real(wp) :: drive_gap
 
-      drive_gap = self%drive%value - self%displacement &
-         & + self%drive%rate * (self%time - self%drive%time)
+      drive_gap = drive_gap_at(self, self%motion())
    end function uniform_gap
 
    !> Velocity and damper with their rates, from the equation of motion.
+   pure function motion_rates(system, damping, motion, drive_gap, contact_force) result(rates)
+      type(system_type), intent(in) :: system
+      !> Damping rate [1/s]
+      real(wp), intent(in) :: damping
+      !> Where the slider is
+      type(rigid_motion_type), intent(in) :: motion
+      !> How far the drive is ahead of the slider [m], and the contact force without drag [N]
+      real(wp), intent(in) :: drive_gap, contact_force
+      type(motion_rates_type) :: rates
+
+      rates%velocity = motion%velocity
+      rates%damper = motion%damper
+      rates%acceleration = ((system%spring * drive_gap - system%inverse_mass * contact_force) &
+         & - system%drag * motion%velocity) - motion%damper
+      rates%damper_rate = damping * (rates%acceleration - rates%damper)
+   end function motion_rates
+
+   !> The same of a slider under its law.
    pure function rates(self, system, drive_gap) result(motion)
       class(rigid_state_type), intent(in) :: self
       type(system_type), intent(in) :: system
@@ -84,13 +150,9 @@ contains
       real(wp), intent(in) :: drive_gap
       type(motion_rates_type) :: motion
 
-      motion%velocity = self%velocity
-      motion%damper = self%damper
-      motion%acceleration = ((system%spring * drive_gap - system%inverse_mass &
-         & * (self%law%stiffness * self%displacement - self%law%offset &
-         & + self%law%rate * (self%time - self%step_time))) &
-         & - system%drag * self%velocity) - self%damper
-      motion%damper_rate = self%damping * (motion%acceleration - motion%damper)
+      motion = motion_rates(system, self%damping, self%motion(), drive_gap, &
+         & self%law%stiffness * self%displacement - self%law%offset &
+         & + self%law%rate * (self%time - self%step_time))
    end function rates
 
    !> Observations at the end of any step.
@@ -112,14 +174,15 @@ contains
    end subroutine arrive
 
    !> Add the drive's impulse of a step to the balance, its velocity being constant.
-   subroutine pull(self, system, step, swept)
+   subroutine pull(self, drive_gap, step, swept)
       class(rigid_state_type), intent(inout) :: self
-      type(system_type), intent(in) :: system
+      !> How far the drive is ahead of the slider at the start of the step [m]
+      real(wp), intent(in) :: drive_gap
       !> Length of the step [s], and integral of the displacement over the time [m s]
       real(wp), intent(in) :: step, swept
 
       call self%drive%impulse%add(self%stiffness &
-         & * (step * (system%drive_gap + 0.5_wp * self%drive%rate * step) - swept))
+         & * (step * (drive_gap + 0.5_wp * self%drive%rate * step) - swept))
    end subroutine pull
 
    !> Add the drive's impulse and work of a step to the balance, under an acceleration.

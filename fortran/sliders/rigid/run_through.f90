@@ -1,0 +1,89 @@
+!> A rigid slider in a schedule of contacts without clocks, under a drive of constant velocity.
+!>
+!> Nearly all steps are short ones. When a step ends is known only at the end of a chain of
+!> operations, each of which waits for the one before, and whether a contact breaks or attaches then
+!> cannot be foreseen. Work and losses of the step before are added up meanwhile.
+module mesoslip_sliders_rigid_run_through
+   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_schedule, only: schedule_type
+   use mesoslip_sliders_rigid_long_step, only: take_long_step
+   use mesoslip_sliders_rigid_short_step, only: audit, derive, find_end, keep_series, move, &
+      & short_step_type
+   use mesoslip_sliders_rigid_state, only: constants, drive_gap_at, motion_rates, &
+      & rigid_motion_type, rigid_state_type, system_type
+   use mesoslip_step_filter, only: step_filter_type
+   implicit none
+   private
+
+   public :: run_through
+
+contains
+
+   !> Move through a schedule until it ends, or until a step is of interest.
+   subroutine run_through(self, schedule, filter)
+      !> The slider
+      class(rigid_state_type), intent(inout) :: self
+      !> Coming changes of the contact force
+      type(schedule_type), intent(inout) :: schedule
+      !> Which steps are of interest; the slider stops after one
+      type(step_filter_type), intent(inout) :: filter
+
+      type(system_type) :: system
+      type(interface_law_type) :: law
+      type(window_type) :: window
+      type(rigid_motion_type) :: motion
+      type(short_step_type) :: step, last
+      real(wp) :: step_time, start_displacement
+      logical :: is_short, is_pending
+
+      system = constants(self)
+      motion = self%motion()
+      is_pending = .false.
+      do
+         step_time = motion%time
+         start_displacement = motion%displacement
+         law = schedule%law()
+         window = schedule%window(motion%time)
+         system%stiffness = system%spring + law%stiffness * system%inverse_mass
+         system%drag = law%drag * system%inverse_mass
+         step%drag = law%drag
+         step%drive_gap = drive_gap_at(self, motion)
+         step%early = motion_rates(system, self%damping, motion, step%drive_gap, &
+            & law%stiffness * motion%displacement - law%offset)
+         call derive(system, self%damping, step)
+         if (is_pending) call audit(self, last, motion)
+         call find_end(system, self%damping, motion, window, step, is_short)
+         if (is_short) then
+            call move(self, system, law, step, motion)
+            last = step
+         else
+            call self%take_motion(motion)
+            self%law = law
+            self%step_time = step_time
+            self%start_displacement = start_displacement
+            system%drive_gap = step%drive_gap
+            call take_long_step(self, system, window, step%early)
+            motion = self%motion()
+            step%acceleration = self%acceleration
+         end if
+         is_pending = is_short
+
+         call filter%examine(motion%time, motion%velocity, step%early%acceleration, &
+            & step%acceleration)
+         if (filter%is_selected .or. motion%direction * schedule%direction < 0.0_wp) exit
+         call schedule%pass(motion%time, motion%displacement)
+         if (schedule%is_over .or. filter%steps >= filter%max_steps) exit
+      end do
+      if (.not. is_pending) return
+      call audit(self, last, motion)
+      call keep_series(self, last)
+      call self%take_motion(motion)
+      self%law = law
+      self%step_time = step_time
+      self%start_displacement = start_displacement
+      self%start_acceleration = last%early%acceleration
+      self%acceleration = last%acceleration
+   end subroutine run_through
+
+end module mesoslip_sliders_rigid_run_through

@@ -8,7 +8,7 @@ import os
 import shlex
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Annotated, Any
 
@@ -75,16 +75,6 @@ WITHOUT_XARRAY = {
 # How to install the libraries that the kernels are linked to.
 LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev"
 
-app = typer.Typer(
-    name="mesoslip",
-    help="Stick-slip friction of a multicontact interface.",
-    add_completion=False,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
 
 def _version(wanted: bool) -> None:
     if wanted:
@@ -94,7 +84,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _common(
     _: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version")
@@ -114,10 +103,32 @@ def _with_numpy_only(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-for _command in COMMANDS:
-    app.command(cls=pictures.PlotCommand if _command is pictures.plot else None)(
-        _command if _command in WITHOUT_XARRAY else _with_numpy_only(_command)
+def application(commands: Iterable[Callable[..., None]]) -> typer.Typer:
+    """The command line with some of its commands."""
+    made = typer.Typer(
+        name="mesoslip",
+        help="Stick-slip friction of a multicontact interface.",
+        add_completion=False,
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
     )
+    made.callback()(_common)
+    for command in commands:
+        made.command(cls=pictures.PlotCommand if command is pictures.plot else None)(
+            command if command in WITHOUT_XARRAY else _with_numpy_only(command)
+        )
+    return made
+
+
+app = application(COMMANDS)
+
+
+def _asked(arguments: Sequence[str]) -> typer.Typer:
+    """The command line with the command that is asked for, as all of them take time to build."""
+    named = [one for one in COMMANDS if one.__name__.replace("_", "-") in arguments[:1]]
+    return application(named) if named else app
 
 
 def main() -> None:
@@ -130,7 +141,7 @@ def main() -> None:
     token = COMMAND_LINE.set(typed.encode("utf-8", "backslashreplace").decode())
     status: object = 0
     try:
-        app()
+        _asked(sys.argv[1:])()
     except SystemExit as end:
         status = end.code
     except MesoslipError as error:

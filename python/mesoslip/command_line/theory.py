@@ -73,7 +73,8 @@ def curve(
     and the stiffness above which sliding is linearly stable.
     """
     from mesoslip.output import targets
-    from mesoslip.theory.force_curve import SUMMARY, ForceCurve
+    from mesoslip.theory.force_curve import ForceCurve
+    from mesoslip.theory.force_curve_dataset import SUMMARY
     from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
 
     checked = load(config, changes)

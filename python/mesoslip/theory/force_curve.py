@@ -21,8 +21,6 @@ from scipy.interpolate import BPoly
 
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.inputs import ConfigLike, as_config
-from mesoslip.output.provenance import program_attributes
-from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.renewal import POINTS, solve_renewal
 from mesoslip.theory.sliders import loading_rate
@@ -51,35 +49,6 @@ MIN_FALL = 1e-11
 ARRIVED = 0.01
 # Maximum number of panels, which fit into memory.
 MAX_PANELS = 4_000_000
-
-
-# Units and meanings of the summary of a curve.
-SUMMARY = {
-    "K_star": (
-        "N/m",
-        "K* = max(-F'(X)): without delay, slow sliding from this start has no instability with a "
-        "stiffer spring; 0 if the force does not fall",
-    ),
-    "K_star_displacement": ("m", "displacement at K*"),
-    "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
-    "stable": (
-        "1",
-        "whether K >= K*, so that without delay slow sliding from this start has no instability",
-    ),
-    "X_c": ("m", "displacement at which the slider becomes unstable, smallest X with F'(X) = -K"),
-    "F_c": ("N", "force at X_c"),
-    "F_peak": ("N", "maximum force; none if the force does not fall"),
-    "X_peak": ("m", "displacement at the maximum force"),
-    "F_steady": ("N", "force of stationary slow sliding"),
-    "D0": ("1", "F(X_c)/F_s"),
-    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
-    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
-    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
-    "error": ("1", "estimated error of the force over F_s"),
-    "slope_error": ("1", "estimated error of the slope over Nk"),
-    "digits": ("1", "reliable digits of the force"),
-    "conservation_error": ("1", "maximum relative error of the number of contacts"),
-}
 
 
 class CriticalPoint(NamedTuple):
@@ -135,6 +104,8 @@ class ForceCurve:
 
     Attributes
     ----------
+    stretch_unit
+        Mean breaking stretch F_s/(N k) [m].
     error, slope_error
         Estimated errors of the force over F_s and of its slope over Nk: the change in the last
         halving of the panels, an upper estimate.
@@ -194,7 +165,7 @@ class ForceCurve:
         if newborn_width is None:
             raise ConfigError([Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)])
         self.newborn_width = newborn_width or config.curve.newborn_width
-        self._stretch = contacts.static_force / contacts.stiffness
+        self.stretch_unit = contacts.static_force / contacts.stiffness
         self.scales = scales(config, self.newborn_width)
         self.length = config.curve_length
         self._force_unit = contacts.static_force
@@ -202,7 +173,7 @@ class ForceCurve:
 
     def _refine(self) -> None:
         parameters = law_parameters(self.config, self.newborn_width)
-        length = self.length / self._stretch
+        length = self.length / self.stretch_unit
         start, width = self._first_panels(length)
         coarse = None
         self.kernel_seconds = 0.0
@@ -275,7 +246,7 @@ class ForceCurve:
         return max(0, math.floor(-math.log10(max(self.error, 1e-16))))
 
     def _evaluate(self, polynomial: BPoly, displacement: ArrayLike, unit: float) -> Array:
-        values: Array = unit * polynomial(np.asarray(displacement, dtype=float) / self._stretch)
+        values: Array = unit * polynomial(np.asarray(displacement, dtype=float) / self.stretch_unit)
         return values
 
     def force(self, displacement: ArrayLike) -> Array:
@@ -287,24 +258,24 @@ class ForceCurve:
         slope = self._solution.slope
         if derivative > 1:
             slope = slope.derivative(derivative - 1)
-        return self._evaluate(slope, displacement, self._force_unit / self._stretch**derivative)
+        return self._evaluate(slope, displacement, self._force_unit / self.stretch_unit**derivative)
 
     def stiffness(self, displacement: ArrayLike) -> Array:
         """Stiffness of the pinned contacts, K_c(X) [N/m]."""
         return self._evaluate(
-            self._solution.stiffness, displacement, self._force_unit / self._stretch
+            self._solution.stiffness, displacement, self._force_unit / self.stretch_unit
         )
 
     def breaks(self, displacement: ArrayLike) -> Array:
         """Γ(X): breaks of a contact over displacement [1/m]."""
-        return self._evaluate(self._solution.breaks, displacement, 1 / self._stretch)
+        return self._evaluate(self._solution.breaks, displacement, 1 / self.stretch_unit)
 
     def potential(self, displacement: ArrayLike, drive_displacement: float) -> Array:
         """V_eff(X_d, X) = K (X_d - X)²/2 + ∫₀^X F [J], Eq. S42."""
         x = np.asarray(displacement, dtype=float)
         work = self._work_of_contacts
-        values: Array = 0.5 * self._spring * (drive_displacement - x) ** 2
-        values += self._force_unit * self._stretch * (work(x / self._stretch) - work(0.0))
+        values: Array = 0.5 * self.spring_stiffness * (drive_displacement - x) ** 2
+        values += self._force_unit * self.stretch_unit * (work(x / self.stretch_unit) - work(0.0))
         return values
 
     @cached_property
@@ -312,7 +283,7 @@ class ForceCurve:
         return self._solution.force.antiderivative()
 
     @property
-    def _spring(self) -> float:
+    def spring_stiffness(self) -> float:
         """K, in series with the spring of a base [N/m]; infinite for a prescribed slider, 0 for one
         that is driven by force."""
         return self.config.series_stiffness
@@ -324,13 +295,13 @@ class ForceCurve:
         width = solution.edges[1] - solution.edges[0]
         nodes = (solution.edges[:-1, None] + width * solution.point).ravel()
         nodes = np.concatenate([[0.0], nodes[nodes > 0]])
-        return self._stretch * nodes[nodes * self._stretch <= self.length]
+        return self.stretch_unit * nodes[nodes * self.stretch_unit <= self.length]
 
     def _extreme(self, function: Callable[[Array], Array], sample: int) -> tuple[float, float]:
         """Displacement and value of the minimum of a function next to one of the samples."""
         low = self.samples[max(sample - 1, 0)]
         high = self.samples[min(sample + 1, len(self.samples) - 1)]
-        scale = self._stretch
+        scale = self.stretch_unit
         found = optimize.minimize_scalar(
             lambda x: float(function(x * scale)),
             bounds=(low / scale, high / scale),
@@ -376,7 +347,7 @@ class ForceCurve:
     @property
     def stable(self) -> bool:
         """Whether K ≥ K*: slow sliding from this start has no instability; see `verdict`."""
-        return self._spring >= self.K_star[0]
+        return self.spring_stiffness >= self.K_star[0]
 
     @property
     def verdict(self) -> str:
@@ -389,7 +360,7 @@ class ForceCurve:
                 "the curve ends before the force is stationary, so that K* may be larger: choose a "
                 "longer curve.length"
             )
-        if math.isinf(self._spring):
+        if math.isinf(self.spring_stiffness):
             sentences.append("the slider follows the drive, so it has no instability")
         elif self.stable:
             sentences.append(
@@ -406,11 +377,11 @@ class ForceCurve:
     @property
     def _name(self) -> str:
         """The stiffness that is compared with K*, in words."""
-        if self._spring == self.config.spring_stiffness:
+        if self.spring_stiffness == self.config.spring_stiffness:
             return "K"
         from mesoslip.quantities import with_unit
 
-        return f"K in series with the base, {with_unit(self._spring, 'N/m', 3)},"
+        return f"K in series with the base, {with_unit(self.spring_stiffness, 'N/m', 3)},"
 
     @property
     def _with_delay(self) -> str:
@@ -438,7 +409,7 @@ class ForceCurve:
     @cached_property
     def critical_points(self) -> tuple[CriticalPoint, ...]:
         """All solutions of F'(X) = -K, the lowest first; none if sliding is smooth."""
-        spring = self._spring
+        spring = self.spring_stiffness
         if math.isinf(spring):
             return ()
         samples = self.samples
@@ -446,7 +417,7 @@ class ForceCurve:
             samples = np.unique([*samples, self.K_star[1]])
         excess = self.slope(samples) + spring
         changes = np.flatnonzero(np.diff(np.sign(excess)) != 0)
-        scale = self._stretch
+        scale = self.stretch_unit
         points = []
         for first in changes:
             low, high = samples[first : first + 2] / scale
@@ -460,7 +431,7 @@ class ForceCurve:
         force = float(self.force(displacement))
         second, third = (float(self.slope(displacement, order)) for order in (2, 3))
         unit = self._force_unit
-        extension = unit / self._spring if self._spring > 0 else math.inf
+        extension = unit / self.spring_stiffness if self.spring_stiffness > 0 else math.inf
         return CriticalPoint(
             displacement,
             force,
@@ -477,7 +448,7 @@ class ForceCurve:
         The fraction is not zero after a relaxed start while some of the first generation remain.
         The integral of the density and the fraction add up to 1.
         """
-        unit = self._stretch
+        unit = self.stretch_unit
         density, atom = stretch_density(
             self.config,
             self._solution.breaks,
@@ -488,74 +459,16 @@ class ForceCurve:
         )
         return density / unit, atom
 
+    @property
+    def solver(self) -> str:
+        """How it was solved, in words."""
+        return f"collocation at {POINTS} points of {self.panels} panels"
+
     def to_tree(self) -> xr.DataTree:
-        """The curve and its instability in the layout of an output file.
+        """The curve and its instability in the layout of an output file."""
+        from mesoslip.theory.force_curve_dataset import tree_of
 
-        Root: F, F', K_c and Γ over ``displacement``, with V_eff if a drive displacement is given;
-        derived quantities as attributes. Groups: ``critical`` (all X_c), ``stretch_density``
-        (Q at the displacements asked for).
-        """
-        # It takes longer to import than a curve to compute.
-        import xarray as xr
-
-        x = self.samples
-        curves = {
-            "contact_force": self.force(x),
-            "slope": self.slope(x),
-            "contact_stiffness": self.stiffness(x),
-            "break_rate": self.breaks(x),
-        }
-        if self.config.curve.drive_displacement is not None and math.isfinite(self._spring):
-            curves["potential"] = self.potential(x, self.config.curve.drive_displacement)
-        dimension = ("displacement",)
-        root = xr.Dataset(
-            {name: CURVE.variable(name, dimension, values) for name, values in curves.items()},
-            coords={"displacement": CURVE.variable("displacement", dimension, x)},
-            attrs=program_attributes(self.config, "curve")
-            | {name: value for name, value in self.summary().items() if value is not None}
-            | {
-                "solver": f"collocation at {POINTS} points of {self.panels} panels",
-                "kernel_seconds": self.kernel_seconds,
-            },
-        )
-        root.attrs["stable"] = str(self.stable).lower()
-        root.attrs["comment"] = self.verdict
-        points = np.array(self.critical_points).reshape(-1, len(CriticalPoint._fields))
-        critical = xr.Dataset(
-            {
-                name: CRITICAL.variable(name, ("point",), column)
-                for name, column in zip(CRITICAL, points.T, strict=True)
-            }
-        )
-        children = {"critical": xr.DataTree(critical)}
-        if self.config.curve.density_at:
-            children["stretch_density"] = xr.DataTree(self._densities())
-        return xr.DataTree(root, children=children)
-
-    def _densities(self) -> xr.Dataset:
-        """Q(x; X) at the displacements that the configuration asks for."""
-        import xarray as xr
-
-        width = self.newborn_width / self._stretch
-        back = self.config.contacts.back_force_ratio
-        low, high = min(0.0, back - 6 * width), self.scales.longest + back
-        x = self._stretch * np.linspace(low, high, 2001)
-        at = np.array(self.config.curve.density_at)
-        densities, atoms = zip(*(self.stretch_density(x, one) for one in at), strict=True)
-        dimensions = ("density_displacement", "stretch")
-        return xr.Dataset(
-            {
-                name: STRETCHES.variable(name, where, values)
-                for name, where, values in (
-                    ("stretch_density", dimensions, np.array(densities)),
-                    ("unbroken_part", dimensions[:1], np.array(atoms)),
-                )
-            },
-            coords={
-                name: STRETCHES.variable(name, (name,), values)
-                for name, values in zip(dimensions, (at, x), strict=True)
-            },
-        )
+        return tree_of(self)
 
     def summary(self) -> dict[str, float | bool | None]:
         """Derived quantities of the curve in SI units; None for those that do not exist.

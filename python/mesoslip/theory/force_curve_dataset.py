@@ -1,0 +1,113 @@
+"""A force curve in the layout of an output file, and the meanings of its derived quantities."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mesoslip.output.provenance import program_attributes
+from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mesoslip.theory.force_curve import ForceCurve
+
+# Units and meanings of the summary of a curve.
+SUMMARY = {
+    "K_star": (
+        "N/m",
+        "K* = max(-F'(X)): without delay, slow sliding from this start has no instability with a "
+        "stiffer spring; 0 if the force does not fall",
+    ),
+    "K_star_displacement": ("m", "displacement at K*"),
+    "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
+    "stable": (
+        "1",
+        "whether K >= K*, so that without delay slow sliding from this start has no instability",
+    ),
+    "X_c": ("m", "displacement at which the slider becomes unstable, smallest X with F'(X) = -K"),
+    "F_c": ("N", "force at X_c"),
+    "F_peak": ("N", "maximum force; none if the force does not fall"),
+    "X_peak": ("m", "displacement at the maximum force"),
+    "F_steady": ("N", "force of stationary slow sliding"),
+    "D0": ("1", "F(X_c)/F_s"),
+    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
+    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
+    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
+    "error": ("1", "estimated error of the force over F_s"),
+    "slope_error": ("1", "estimated error of the slope over Nk"),
+    "digits": ("1", "reliable digits of the force"),
+    "conservation_error": ("1", "maximum relative error of the number of contacts"),
+}
+# Points of a density over the stretch, and widths of the newborn stretches below their mean.
+DENSITY_POINTS, WIDTHS_BELOW = 2001, 6
+
+
+def tree_of(curve: ForceCurve) -> xr.DataTree:
+    """A curve as an output.
+
+    Root: F, F', K_c and Γ over ``displacement``, with V_eff if a drive displacement is given;
+    derived quantities as attributes. Groups: ``critical`` (all X_c), ``stretch_density``
+    (Q at the displacements asked for).
+    """
+    # It takes longer to import than a curve to compute.
+    import xarray as xr
+
+    config, x = curve.config, curve.samples
+    curves = {
+        "contact_force": curve.force(x),
+        "slope": curve.slope(x),
+        "contact_stiffness": curve.stiffness(x),
+        "break_rate": curve.breaks(x),
+    }
+    if config.curve.drive_displacement is not None and math.isfinite(curve.spring_stiffness):
+        curves["potential"] = curve.potential(x, config.curve.drive_displacement)
+    dimension = ("displacement",)
+    root = xr.Dataset(
+        {name: CURVE.variable(name, dimension, values) for name, values in curves.items()},
+        coords={"displacement": CURVE.variable("displacement", dimension, x)},
+        attrs=program_attributes(config, "curve")
+        | {name: value for name, value in curve.summary().items() if value is not None}
+        | {"solver": curve.solver, "kernel_seconds": curve.kernel_seconds},
+    )
+    root.attrs["stable"] = str(curve.stable).lower()
+    root.attrs["comment"] = curve.verdict
+    points = np.array(curve.critical_points).reshape(-1, len(CRITICAL))
+    critical = xr.Dataset(
+        {
+            name: CRITICAL.variable(name, ("point",), column)
+            for name, column in zip(CRITICAL, points.T, strict=True)
+        }
+    )
+    children = {"critical": xr.DataTree(critical)}
+    if config.curve.density_at:
+        children["stretch_density"] = xr.DataTree(_densities(curve))
+    return xr.DataTree(root, children=children)
+
+
+def _densities(curve: ForceCurve) -> xr.Dataset:
+    """Q(x; X) at the displacements that the configuration asks for."""
+    import xarray as xr
+
+    unit, back = curve.stretch_unit, curve.config.contacts.back_force_ratio
+    low = min(0.0, back - WIDTHS_BELOW * curve.newborn_width / unit)
+    x = unit * np.linspace(low, curve.scales.longest + back, DENSITY_POINTS)
+    at = np.array(curve.config.curve.density_at)
+    densities, atoms = zip(*(curve.stretch_density(x, one) for one in at), strict=True)
+    dimensions = ("density_displacement", "stretch")
+    return xr.Dataset(
+        {
+            name: STRETCHES.variable(name, where, values)
+            for name, where, values in (
+                ("stretch_density", dimensions, np.array(densities)),
+                ("unbroken_part", dimensions[:1], np.array(atoms)),
+            )
+        },
+        coords={
+            name: STRETCHES.variable(name, (name,), values)
+            for name, values in zip(dimensions, (at, x), strict=True)
+        },
+    )

@@ -110,9 +110,12 @@ contains
       !> Detached contacts during the advance; the time [s]
       real(wp), intent(in) :: detached, end_time
 
+      real(wp) :: sample(slip_trace_length)
+
+      sample(slip_trace_length) = real(self%slip, wp)
       do while (self%next_time <= end_time)
-         call self%rows%add([sample_of(slider%observe(self%next_time), detached), &
-            & real(self%slip, wp)])
+         sample(:slip_trace_length - 1) = sample_of(slider%observe(self%next_time), detached)
+         call self%rows%add(sample)
          self%samples = self%samples + 1
          self%next_time = self%start_time + real(self%samples, wp) * self%interval
       end do

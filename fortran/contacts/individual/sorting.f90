@@ -143,24 +143,29 @@ contains
       integer, intent(inout) :: contact(count)
 
       real(wp) :: unsorted_key(short_run)
-      integer :: unsorted_contact(short_run), one
+      integer :: unsorted_contact(short_run), one, other
       ! Of as many bytes as a key, so that both are compared and counted side by side.
-      integer(i8) :: smaller(short_run)
+      integer(i8) :: place(short_run), smaller
 
-      smaller(:count) = 0_i8
       do one = 1, count
          unsorted_key(one) = key(one)
          unsorted_contact(one) = contact(one)
-         smaller(:count) = smaller(:count) + merge(1_i8, 0_i8, key(one) < key)
       end do
-      if (sum(smaller(:count)) /= (count * (count - 1)) / 2) then
-         ! Keys that are equal share a number.
+      do one = 1, count
+         smaller = 0_i8
+         do other = 1, count
+            smaller = smaller + merge(1_i8, 0_i8, unsorted_key(other) < unsorted_key(one))
+         end do
+         place(one) = smaller + 1_i8
+      end do
+      if (sum(place(:count)) /= (count * (count + 1)) / 2) then
+         ! Keys that are equal share a place.
          call insertion_sort(key, contact, count)
          return
       end if
       do one = 1, count
-         key(smaller(one) + 1_i8) = unsorted_key(one)
-         contact(smaller(one) + 1_i8) = unsorted_contact(one)
+         key(place(one)) = unsorted_key(one)
+         contact(place(one)) = unsorted_contact(one)
       end do
    end subroutine sort_run
 

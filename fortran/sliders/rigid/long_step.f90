@@ -98,10 +98,13 @@ contains
       integer :: term
 
       call expand(system, self%damping, early, terms, series, damper)
-      tick = spacing(self%time)
-      if (abs(series(0)) + tick * abs(series(1)) <= tick**2 * abs(series(2))) then
-         ! The drive turns the slider before the time can grow: it is at rest and in balance.
-         series(:1) = 0.0_wp
+      ! Twice the spacing of times at most, and that without a call.
+      if (abs(series(0)) <= (epsilon(tick) * self%time)**2 * abs(series(2))) then
+         tick = spacing(self%time)
+         if (abs(series(0)) + tick * abs(series(1)) <= tick**2 * abs(series(2))) then
+            ! The drive turns the slider before the time can grow: it is at rest and in balance.
+            series(:1) = 0.0_wp
+         end if
       end if
       self%terms = terms
       self%series(:terms - 1) = series(:terms - 1)

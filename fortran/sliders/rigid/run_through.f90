@@ -8,8 +8,8 @@ module mesoslip_sliders_rigid_run_through
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_schedule, only: schedule_type
    use mesoslip_sliders_rigid_long_step, only: take_long_step
-   use mesoslip_sliders_rigid_short_step, only: audit, derive, find_end, keep_series, move, &
-      & short_step_type
+   use mesoslip_sliders_rigid_short_step, only: audit, books_of, derive, find_end, keep_series, &
+      & look_ahead, move, short_step_type, step_books_type
    use mesoslip_sliders_rigid_state, only: constants, drive_gap_at, motion_rates, &
       & rigid_motion_type, rigid_state_type, system_type
    use mesoslip_step_filter, only: step_filter_type
@@ -33,7 +33,8 @@ contains
       type(interface_law_type) :: law
       type(window_type) :: window
       type(rigid_motion_type) :: motion
-      type(short_step_type) :: step, last
+      type(short_step_type) :: step
+      type(step_books_type) :: books
       real(wp) :: step_time, start_displacement
       logical :: is_short, is_pending
 
@@ -47,16 +48,16 @@ contains
          window = schedule%window(motion%time)
          system%stiffness = system%spring + law%stiffness * system%inverse_mass
          system%drag = law%drag * system%inverse_mass
-         step%drag = law%drag
          step%drive_gap = drive_gap_at(self, motion)
          step%early = motion_rates(system, self%damping, motion, step%drive_gap, &
             & law%stiffness * motion%displacement - law%offset)
+         call look_ahead(motion, window, step)
          call derive(system, self%damping, step)
-         if (is_pending) call audit(self, last, motion)
-         call find_end(system, self%damping, motion, window, step, is_short)
+         if (is_pending) call audit(self, books, motion)
+         call find_end(system, self%damping, step, is_short)
          if (is_short) then
             call move(self, system, law, step, motion)
-            last = step
+            books = books_of(step, law%drag)
          else
             call self%take_motion(motion)
             self%law = law
@@ -76,14 +77,14 @@ contains
          if (schedule%is_over .or. filter%steps >= filter%max_steps) exit
       end do
       if (.not. is_pending) return
-      call audit(self, last, motion)
-      call keep_series(self, last)
+      call audit(self, books, motion)
+      call keep_series(self, step)
       call self%take_motion(motion)
       self%law = law
       self%step_time = step_time
       self%start_displacement = start_displacement
-      self%start_acceleration = last%early%acceleration
-      self%acceleration = last%acceleration
+      self%start_acceleration = step%early%acceleration
+      self%acceleration = step%acceleration
    end subroutine run_through
 
 end module mesoslip_sliders_rigid_run_through

@@ -15,8 +15,8 @@ module mesoslip_sliders_rigid_short_step
    implicit none
    private
 
-   public :: short_step_type
-   public :: try_short_step, derive, find_end, move, audit, keep_series
+   public :: short_step_type, step_books_type
+   public :: try_short_step, books_of, derive, look_ahead, find_end, move, audit, keep_series
 
    !> Maximum duration of a short step in units of the fastest rate
    real(wp), parameter :: max_step = 3.0e-3_wp
@@ -28,16 +28,30 @@ module mesoslip_sliders_rigid_short_step
    !> Maximum terms with which the reversion is still right to some 1e-6
    real(wp), parameter :: fair_a_2 = 2.0e-2_wp, fair_a_3 = 1.0e-3_wp
 
-   !> A short step.
-   type :: short_step_type
+   !> What the energy balance needs of a short step.
+   type :: step_books_type
       !> The motion at its start, and how far the drive is ahead of the slider there [m]
       type(motion_rates_type) :: early
       real(wp) :: drive_gap
       !> Drag of the contacts [N s/m]
       real(wp) :: drag
+      !> Derivatives of the acceleration at its start
+      real(wp) :: jerk, snap
+      !> Its duration [s], and the acceleration at its end [m/s2]
+      real(wp) :: duration, acceleration
+   end type step_books_type
+
+   !> A short step.
+   type :: short_step_type
+      !> The motion at its start, and how far the drive is ahead of the slider there [m]
+      type(motion_rates_type) :: early
+      real(wp) :: drive_gap
       !> Derivatives of the acceleration at its start, from the first to the fourth, and of the
       !> damper, from the second to the fourth
       real(wp) :: jerk, snap, crackle, pop, damper_2, damper_3, damper_4
+      !> Distance to the next break [m], time in which it ends without one [s], and one over the
+      !> velocity [s/m]
+      real(wp) :: distance, rest, inverse_pace
       !> Its duration [s]
       real(wp) :: duration
       !> Whether it ends at a break, and where that is [m]; when it ends otherwise [s]
@@ -69,9 +83,9 @@ contains
       motion = self%motion()
       step%early = early
       step%drive_gap = system%drive_gap
-      step%drag = self%law%drag
       call derive(system, self%damping, step)
-      call find_end(system, self%damping, motion, window, step, is_done)
+      call look_ahead(motion, window, step)
+      call find_end(system, self%damping, step, is_done)
       if (.not. is_done) return
       call keep_series(self, step)
       if (self%has_clocks) then
@@ -85,7 +99,7 @@ contains
       call self%take_motion(motion)
       self%start_acceleration = early%acceleration
       self%acceleration = step%acceleration
-      call audit(self, step, motion)
+      call audit(self, books_of(step, self%law%drag), motion)
    end subroutine try_short_step
 
    !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in.
@@ -131,65 +145,99 @@ contains
       self%series(:few_terms - 1) = series_of(step)
    end subroutine keep_series
 
-   !> Where and when a step ends, if it is a short one.
-   pure subroutine find_end(system, damping, motion, window, step, is_found)
-      !> Equation of motion, and damping rate [1/s]
-      type(system_type), intent(in) :: system
-      real(wp), intent(in) :: damping
+   !> Distance to the next break, and time in which a step ends without one.
+   pure subroutine look_ahead(motion, window, step)
       !> The motion at the start
       type(rigid_motion_type), intent(in) :: motion
       !> Where the contact force holds
       type(window_type), intent(in) :: window
-      !> The step, with its derivatives
+      !> The step
+      type(short_step_type), intent(inout) :: step
+
+      step%target = merge(window%upper, window%lower, motion%velocity > 0.0_wp)
+      step%distance = sign(1.0_wp, motion%velocity) * (step%target - motion%displacement)
+      step%end_time = window%end_time
+      step%rest = window%end_time - motion%time
+      step%inverse_pace = 0.0_wp
+      if (abs(motion%velocity) > 0.0_wp) step%inverse_pace = 1.0_wp / motion%velocity
+   end subroutine look_ahead
+
+   !> Whether a step is a short one, and when it ends.
+   pure subroutine find_end(system, damping, step, is_found)
+      !> Equation of motion, and damping rate [1/s]
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: damping
+      !> The step, with its derivatives, which has looked ahead
       type(short_step_type), intent(inout) :: step
       !> Whether it is a short one
       logical, intent(out) :: is_found
 
-      real(wp) :: series(0:few_terms - 1)
-      real(wp) :: distance, pace, rest, passage, longest, change, inverse_pace
-      logical :: nears
+      real(wp) :: pace
+
+      is_found = .false.
+      pace = abs(step%early%velocity)
+      if (.not. (pace > 0.0_wp .and. step%distance > 0.0_wp .and. step%rest > 0.0_wp)) return
+      ! Whether a contact breaks cannot be foreseen: this is known long before the time of that.
+      if (step%distance < pace * step%rest) then
+         call find_crossing(system, damping, step, is_found)
+      else if (step%distance < 2.0_wp * pace * step%rest) then
+         call find_crossing(system, damping, step, is_found)
+      else
+         call find_pause(system, damping, step, is_found)
+      end if
+   end subroutine find_end
+
+   !> Whether a step that comes near a break is a short one, and when it ends.
+   pure subroutine find_crossing(system, damping, step, is_found)
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: damping
+      type(short_step_type), intent(inout) :: step
+      logical, intent(out) :: is_found
+
+      real(wp) :: passage
+
+      is_found = .false.
+      passage = step%distance * abs(step%inverse_pace)
+      if (is_long(system, damping, min(step%rest, passage))) return
+      call revert(step, step%distance, passage, step%inverse_pace, step%duration, is_found)
+      if (.not. is_found) return
+      step%crosses = step%duration <= step%rest
+      if (.not. step%crosses) step%duration = step%rest
+   end subroutine find_crossing
+
+   !> Whether a step that ends before a break is a short one.
+   pure subroutine find_pause(system, damping, step, is_found)
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: damping
+      type(short_step_type), intent(inout) :: step
+      logical, intent(out) :: is_found
+
+      real(wp) :: series(0:few_terms - 1), change
       integer :: term
 
       is_found = .false.
-      associate (velocity => step%early%velocity)
-         step%target = merge(window%upper, window%lower, velocity > 0.0_wp)
-         pace = abs(velocity)
-         distance = sign(1.0_wp, velocity) * (step%target - motion%displacement)
-         rest = window%end_time - motion%time
-         if (.not. (pace > 0.0_wp .and. distance > 0.0_wp .and. rest > 0.0_wp)) return
+      if (is_long(system, damping, step%rest)) return
+      ! Too far from any break to come to it in the time that is left.
+      series = series_of(step)
+      change = 0.0_wp
+      do term = few_terms - 1, 1, -1
+         change = (change + abs(series(term))) * step%rest
+      end do
+      is_found = change < 0.5_wp * abs(step%early%velocity)
+      step%crosses = .false.
+      step%duration = step%rest
+   end subroutine find_pause
 
-         nears = distance < 2.0_wp * pace * rest
-         inverse_pace = 1.0_wp / velocity
-      end associate
-      longest = rest
-      passage = rest
-      if (nears) then
-         passage = distance * abs(inverse_pace)
-         longest = min(rest, passage)
-      end if
+   !> Whether a step is too long for a short series.
+   pure function is_long(system, damping, duration)
+      type(system_type), intent(in) :: system
+      real(wp), intent(in) :: damping, duration
+      logical :: is_long
+
       ! Twice the sum of squares exceeds the square of the fastest rate.
-      if (longest**2 * (2.0_wp * abs(system%stiffness) &
-         & + 2.0_wp * (system%drag + 2.0_wp * damping)**2) > max_step**2) return
-
-      step%end_time = window%end_time
-      if (nears) then
-         call revert(step, distance, passage, inverse_pace, step%duration, is_found)
-         if (.not. is_found) return
-         step%crosses = step%duration <= rest
-         if (.not. step%crosses) step%duration = rest
-      else
-         ! Too far from any break to come to it in the time that is left.
-         series = series_of(step)
-         change = 0.0_wp
-         do term = few_terms - 1, 1, -1
-            change = (change + abs(series(term))) * rest
-         end do
-         if (.not. change < 0.5_wp * pace) return
-         is_found = .true.
-         step%crosses = .false.
-         step%duration = rest
-      end if
-   end subroutine find_end
+      is_long = duration**2 * (2.0_wp * abs(system%stiffness) &
+         & + 2.0_wp * (system%drag + 2.0_wp * damping)**2) > max_step**2
+   end function is_long
 
    !> Time in which a distance is made, by reversion of the series of the displacement.
    pure subroutine revert(step, distance, passage, inverse_pace, time, is_right)
@@ -277,11 +325,22 @@ contains
       step%acceleration = late%acceleration
    end subroutine move
 
+   !> What the energy balance needs of a step.
+   pure function books_of(step, drag) result(books)
+      type(short_step_type), intent(in) :: step
+      !> Drag of the contacts [N s/m]
+      real(wp), intent(in) :: drag
+      type(step_books_type) :: books
+
+      books = step_books_type(step%early, step%drive_gap, drag, step%jerk, step%snap, &
+         & step%duration, step%acceleration)
+   end function books_of
+
    !> Add work and losses of a step to the energy balance.
    subroutine audit(self, step, motion)
       class(rigid_state_type), intent(inout) :: self
       !> The step, and the motion at its end
-      type(short_step_type), intent(in) :: step
+      type(step_books_type), intent(in) :: step
       type(rigid_motion_type), intent(in) :: motion
 
       real(wp) :: square, velocity_loss, damper_loss, damper_rate

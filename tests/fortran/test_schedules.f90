@@ -1,0 +1,89 @@
+!> Schedules: a run is the same to the bit whatever their length, and wherever it is cut.
+program test_schedules
+   use klein_case, only: any_work, count, forever, prepare, same
+   use mesoslip_contacts_mechanics, only: initial_steady
+   use mesoslip_loop_endings, only: ending_drive
+   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_schedule, only: max_events
+   use testing, only: check, finish
+   implicit none
+
+   call runs_ahead("ensemble", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 5.0e-4_wp)
+   call runs_ahead("ensemble", "rigid", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("ensemble", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ensemble", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("ageing", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ageing", "prescribed", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("activated", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("activated", "rigid", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("activated", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("activated", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("activated scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("activated scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call finish()
+
+contains
+
+   !> A run is the same to the bit whatever the length of its schedules, none at all included, and
+   !> wherever it is cut, put away and taken up again.
+   subroutine runs_ahead(contacts, slider, law, width, delay)
+      character(len=*), intent(in) :: contacts, slider
+      character(len=*), intent(in) :: law
+      real(wp), intent(in) :: width, delay
+
+      integer, parameter :: lengths(6) = [1, 2, 7, 32, 64, 64]
+      type(simulation_type) :: whole
+      type(simulation_type), allocatable :: now, next
+      type(error_type), allocatable :: error
+      integer(i8), allocatable :: words(:)
+      integer(i8) :: length
+      integer :: number, segment, table
+      character(len=:), allocatable :: name
+      character(len=10), parameter :: tables(4) = [character(len=10) :: &
+         & "trace", "slip_trace", "slips", "stages"]
+
+      call prepare(whole, contacts, slider, law, width, delay, 0)
+      call whole%start(initial_steady)
+      call whole%run(forever, any_work, error)
+      do number = 1, size(lengths)
+         name = contacts // ", " // slider // ", length " &
+            & // achar(iachar("0") + lengths(number) / 10) &
+            & // achar(iachar("0") + modulo(lengths(number), 10))
+         allocate (now)
+         call prepare(now, contacts, slider, law, width, delay, lengths(number))
+         call now%start(initial_steady)
+         if (number < size(lengths)) call now%run(forever, any_work, error)
+         do segment = 1, 100000
+            if (allocated(error) .or. now%ending == ending_drive) exit
+            call now%run(int(1 + segment**3 / 8, i8), any_work, error)
+            call now%save(length, error)
+            allocate (words(length))
+            call now%fetch(words, error)
+            allocate (next)
+            call prepare(next, contacts, slider, law, width, delay, modulo(segment, max_events))
+            call next%restore(words, error)
+            deallocate (words)
+            deallocate (now)
+            call move_alloc(next, now)
+         end do
+         call check(.not. allocated(error) .and. now%ending == ending_drive, &
+            & "a run with schedules ends: " // name)
+         call check(all(abs(now%energy_balance() - whole%energy_balance()) <= 0.0_wp) &
+            & .and. now%advances == whole%advances &
+            & .and. now%avalanches%avalanches == whole%avalanches%avalanches, &
+            & "schedules do not change a run: " // name)
+         do table = 1, size(tables)
+            call check(same(now%table(trim(tables(table))), whole%table(trim(tables(table)))), &
+               & "what is recorded is the same: " // name // ", " // trim(tables(table)))
+         end do
+         deallocate (now)
+      end do
+      call check(whole%contacts%breaks > 10 * count, "many contacts break: " // slider)
+   end subroutine runs_ahead
+
+end program test_schedules

@@ -31,8 +31,9 @@ contains
       type(contact_queue_type) :: queue
       type(error_type), allocatable :: error
       real(wp) :: record(record_length, count), key, position, uniform(2)
-      integer :: contact, expected, event, other
-      logical :: in_order
+      integer :: contact, expected, event, other, number, previewed, listed(8)
+      real(wp) :: listed_key(8)
+      logical :: in_order, in_preview
 
       call new_contact_queue(queue, count, 1.5_wp, error)
       call queue%clear(direction, 0.0_wp)
@@ -44,6 +45,8 @@ contains
 
       position = 0.0_wp
       in_order = .true.
+      in_preview = .true.
+      previewed = 0
       do event = 1, 6 * count
          key = queue%first_key
          expected = 0
@@ -56,6 +59,15 @@ contains
                expected = other
             end if
          end do
+         if (modulo(event, 3) == 0) then
+            call queue%preview(record, size(listed), listed, listed_key, number)
+            do other = 2, number
+               in_preview = in_preview .and. listed_key(other) >= listed_key(other - 1)
+            end do
+            if (number > 0) in_preview = in_preview .and. listed(1) == expected &
+               & .and. abs(listed_key(1) - key) <= 0.0_wp
+            previewed = previewed + number
+         end if
          call queue%pop(record, contact)
          in_order = in_order .and. contact == expected &
             & .and. abs(ahead_coordinate(record(:, contact), direction) - key) <= 0.0_wp
@@ -68,6 +80,8 @@ contains
             & position + stretch * (least + spread * uniform(1)))
       end do
       call check(in_order, "least key first: " // name)
+      call check(in_preview .and. (previewed > 0 .or. .not. spread > 0.0_wp), &
+         & "the next contacts are listed in their order: " // name)
       call check(queue%count == count, "none lost: " // name)
       do event = 1, count
          call queue%pop(record, contact)

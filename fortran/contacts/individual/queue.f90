@@ -22,6 +22,8 @@ module mesoslip_contacts_individual_queue
    !> Mean number of contacts in a bucket when keys are spread evenly.
    integer, parameter :: bucket_load = 16
    integer, parameter :: min_buckets = 64
+   !> Contacts that are sorted again for one that came later, at most
+   integer, parameter :: max_left = 2 * bucket_load
    !> Bound on bucket numbers, for keys far beyond any motion.
    real(wp), parameter :: max_bucket = 1.0e15_wp
 
@@ -61,7 +63,7 @@ module mesoslip_contacts_individual_queue
       procedure, non_overridable :: preview
       procedure, non_overridable :: remove_previewed
       procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
-         & find_first
+         & find_first, absorb_late
    end type contact_queue_type
 
 contains
@@ -209,6 +211,7 @@ contains
       if (self%front_next > self%front_count .and. self%late_count == 0) then
          call self%advance_front(record)
       end if
+      call self%absorb_late()
       number = min(limit, self%front_count - self%front_next + 1)
       associate (front => self%front_key(self%front_next:self%front_count))
          if (self%late_count > 0) then
@@ -225,6 +228,29 @@ contains
       end associate
       contact(:number) = self%front_contact(self%front_next:self%front_next + number - 1)
    end subroutine preview
+
+   !> Sort those that came later in among the front, if the first of all is one of them and that is
+   !> not much work for each.
+   subroutine absorb_late(self)
+      class(contact_queue_type), intent(inout) :: self
+
+      integer :: left
+
+      if (self%late_count == 0) return
+      left = self%front_count - self%front_next + 1
+      if (left > max_left * self%late_count) return
+      if (left > 0) then
+         if (self%front_key(self%front_next) < self%late_key(1)) return
+      end if
+      self%front_key(:left) = self%front_key(self%front_next:self%front_count)
+      self%front_contact(:left) = self%front_contact(self%front_next:self%front_count)
+      self%front_next = 1
+      self%front_count = left + self%late_count
+      self%front_key(left + 1:self%front_count) = self%late_key(:self%late_count)
+      self%front_contact(left + 1:self%front_count) = self%late_contact(:self%late_count)
+      self%late_count = 0
+      call sort(self%front_key, self%front_contact, self%front_count)
+   end subroutine absorb_late
 
    !> Take the first contacts out, which a preview showed.
    subroutine remove_previewed(self, record, number)

@@ -12,12 +12,13 @@ import pytest
 from conftest import ROOT
 from mesoslip.cycles import branch
 from mesoslip.cycles.branch import adapted
-from mesoslip.cycles.coordinates import SLIDER, Coordinates
+from mesoslip.cycles.coordinates import PINNED, SLIDER, Coordinates
 from mesoslip.cycles.cycle import master_equation
 from mesoslip.cycles.section import Motion
 from mesoslip.cycles.settling import _Settling
 from mesoslip.simulation.archive import Archive
 from mesoslip.theory.steady_sliding import SteadySliding
+from mesoslip.theory.thermal import steady_force
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
@@ -223,6 +224,58 @@ def test_passages_that_differ_by_their_errors_are_of_one_cycle(regular, alternat
     settled = {one for one, error in found[8:] if error < 1e-5}
     assert settled <= {multiple}
     assert run._spread()[0] == multiple
+
+
+@pytest.mark.parametrize(("alternation", "multiple"), [(1e-3, 1), (1e-2, 2)])
+def test_the_fine_structure_makes_no_longer_cycles(regular, alternation, multiple):
+    """Passages alternate exactly, by less than what is settled all the same, and by more."""
+    run = _Settling(Motion(regular.config), None, None, 1e-5, 0.0)
+    for number in range(12):
+        run._rows.append(np.array([0.1 * (1 + alternation * (number % 2)), 1e-5, 2e-6]))
+    found = run.result("periodic", regular.state)
+    assert found.multiple == multiple
+    assert found.error == pytest.approx(alternation if multiple == 1 else 0.0, rel=2e-3)
+
+
+def elastic_force(words) -> float:
+    """Force of the pinned contacts of a state [N]."""
+    archive = Archive(words)
+    stiffness, offset = (archive.number(PINNED, one) for one in ("stiffness", "offset"))
+    return stiffness * archive.number(SLIDER, "displacement") - offset
+
+
+def test_motion_goes_on_at_another_temperature():
+    """The steady force is that of the closed form, before and after."""
+    cold, warm = (
+        configuration(
+            "contacts.coupling=equal",
+            "contacts.initial=steady",
+            "contacts.delay=0.1ms",
+            "contacts.thermal.rate=1e5",
+            f"contacts.thermal.force_ratio={one}",
+            "slider.stiffness=30 kN/m",
+            "run.resolution=1",
+        )
+        for one in (0.01, 0.1)
+    )
+    words, before = Motion(cold).go_on(None, 20e-3)
+    changed = adapted(words, cold, warm)
+    assert elastic_force(changed) == pytest.approx(elastic_force(words), rel=1e-9)
+    after = Motion(warm).go_on(changed, 40e-3)[1]
+    forces = [steady_force(one, 3e-6) for one in (cold, warm)]
+    assert forces[1] < 0.95 * forces[0]
+    found = [float(np.mean(one["contact_force"][len(one) // 2 :])) for one in (before, after)]
+    assert found == pytest.approx(forces, rel=0.01)
+
+
+def test_motion_goes_on_though_all_contacts_are_detached():
+    fast = configuration("drive.velocity=20 um/s", "slider.stiffness=30 kN/m", "run.resolution=1")
+    words, trace = Motion(fast).go_on(None, 4e-3)
+    assert trace["detached_contacts"][-1] == pytest.approx(fast.contacts.count)
+    slow = fast.replace({"drive.velocity": 3e-6})
+    after = Motion(slow).go_on(adapted(words, fast, slow, modulation=0.02), 4e-3)[1]
+    assert after["detached_contacts"].min() < 0.9 * slow.contacts.count
+    assert np.isfinite(after["contact_force"]).all()
 
 
 @pytest.mark.parametrize(

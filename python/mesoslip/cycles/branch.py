@@ -43,6 +43,7 @@ CONTINUED = (
     "contacts.back_force_ratio",
     "contacts.threshold.relative_width",
     "contacts.ageing.*",
+    "contacts.thermal.*",
 )
 # Maximum number of passages at one value, fewer than without a state close by.
 MAX_CYCLES = 32

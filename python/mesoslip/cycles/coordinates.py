@@ -62,6 +62,8 @@ class Hats:
 
     def factors(self, points: Array, amounts: Array, change: Array) -> Array:
         """Factors of the amounts, smooth over the points, that change their sums by so much."""
+        if not amounts.size:
+            return np.empty(0)
         cell, part = self._place(points)
         bands = np.zeros((2, self.count))
         np.add.at(bands[1], cell, amounts * (1 - part) ** 2)
@@ -122,7 +124,8 @@ class Coordinates:
         """The change that modulates the density of pinned contacts over their stretch by a part."""
         pinned = np.split(self.of(words), [2, 2 + self._pinned.count])[1]
         wave = part * np.sin(2 * np.pi * np.arange(pinned.size) / pinned.size) * pinned
-        wave -= pinned * (np.sum(wave) / np.sum(pinned))
+        # All contacts may be detached.
+        wave -= pinned * (np.sum(wave) / max(float(np.sum(pinned)), EMPTY))
         return np.concatenate([np.zeros(2), wave, np.zeros(self._detached.count)])
 
     def _rows(self, archive: Archive) -> tuple[Array, Array]:
@@ -169,7 +172,8 @@ class Coordinates:
             packets[PACKET_NUMBER:, there] *= factors
             archive.set_matrix(DETACHED, "packet", packets)
             detached = archive.number(DETACHED, "number")
-        factor *= (self._count - detached) / pinned
+        if pinned > 0:
+            factor *= (self._count - detached) / pinned
         self._set_rows(archive, rows, left, factor)
         self._set_slider(
             archive,

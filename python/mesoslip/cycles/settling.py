@@ -327,10 +327,15 @@ class _Settling:
 
     def result(self, motion: str, words: Words) -> Settled:
         multiple, error = self._multiple()
-        if motion == "periodic" and error > self._tolerance:
-            multiple, error = self._spread()
-        elif motion != "periodic":
+        if motion != "periodic":
             multiple = 1
+        elif error > self._tolerance:
+            multiple, error = self._spread()
+        elif multiple > 1:
+            # What is as small as the fine structure is none of the cycle.
+            change = float(np.max(np.abs(self._differences(1)[-multiple:])))
+            if change < MAX_SPREAD:
+                multiple, error = 1, change
         changes = [
             late - early
             for late, early in zip(self._vectors[multiple:], self._vectors[:-multiple], strict=True)

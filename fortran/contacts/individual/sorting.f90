@@ -1,6 +1,6 @@
 !> Contacts in the order of a key, then of their number: sorting, and a binary heap.
 module mesoslip_contacts_individual_sorting
-   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
@@ -142,30 +142,27 @@ contains
       real(wp), intent(inout) :: key(count)
       integer, intent(inout) :: contact(count)
 
-      real(wp) :: unsorted_key(short_run)
-      integer :: unsorted_contact(short_run), one, other
-      ! Of as many bytes as a key, so that both are compared and counted side by side.
-      integer(i8) :: place(short_run), smaller
+      ! Places are reals as keys are, so that two are compared and counted at once.
+      real(wp) :: unsorted_key(short_run), place(short_run)
+      integer :: unsorted_contact(short_run), one
 
       do one = 1, count
          unsorted_key(one) = key(one)
          unsorted_contact(one) = contact(one)
       end do
+      place(:count) = 1.0_wp
       do one = 1, count
-         smaller = 0_i8
-         do other = 1, count
-            smaller = smaller + merge(1_i8, 0_i8, unsorted_key(other) < unsorted_key(one))
-         end do
-         place(one) = smaller + 1_i8
+         place(:count) = place(:count) &
+            & + merge(1.0_wp, 0.0_wp, unsorted_key(one) < unsorted_key(:count))
       end do
-      if (sum(place(:count)) /= (count * (count + 1)) / 2) then
+      if (nint(sum(place(:count))) /= (count * (count + 1)) / 2) then
          ! Keys that are equal share a place.
          call insertion_sort(key, contact, count)
          return
       end if
       do one = 1, count
-         key(place(one)) = unsorted_key(one)
-         contact(place(one)) = unsorted_contact(one)
+         key(int(place(one))) = unsorted_key(one)
+         contact(int(place(one))) = unsorted_contact(one)
       end do
    end subroutine sort_run
 

@@ -344,6 +344,23 @@ def test_what_has_no_cycle(command, tmp_path, change, words):
     assert all(word in errors for word in words)
 
 
+@pytest.mark.parametrize(
+    ("followed", "words"),
+    [
+        ("slider.stifness=100N/m:200N/m:3", ["did you mean 'slider.stiffness'"]),
+        ("slider.stiffness=100N/m:200N/m", ["KEY=FROM:TO:POINTS"]),
+        ("slider.stiffness=200N/m:100N/m:3", ["slider.stiffness", "ascending"]),
+        ("contacts.count=100:200:3", ["contacts.count", "must be one of"]),
+    ],
+)
+def test_what_cannot_be_followed(command, tmp_path, followed, words):
+    file = tmp_path / "regular.toml"
+    file.write_text(configuration().to_toml())
+    status, _, errors = command("cycle", file, "--continue", followed)
+    assert status == 2
+    assert all(word in errors for word in words)
+
+
 def test_interaction_is_left_out():
     config = mesoslip.Config.load(
         ROOT / "runs" / "klein.toml",

@@ -125,12 +125,16 @@ def _values(text: str) -> tuple[str, list[float]]:
     """Key and values of an option KEY=FROM:TO:POINTS."""
     import numpy as np
 
-    from mesoslip.configuration.keys import key_kind
+    from mesoslip.configuration.keys import key_kind, nearest_keys
     from mesoslip.errors import ConfigError, Problem
 
     key, _, span = text.partition("=")
     parts = span.split(":")
     kind = key_kind(key)
+    near = [] if kind is not None else nearest_keys(key)
+    if near:
+        message = f"has an unknown key; did you mean {near[0]!r}?"
+        raise ConfigError([Problem("", "--continue", message, text)])
     if kind is None or len(parts) != SPAN_PARTS or not parts[2].isdigit() or int(parts[2]) < 2:
         message = "must be KEY=FROM:TO:POINTS, such as drive.velocity=0.1um/s:10um/s:20"
         raise ConfigError([Problem("", "--continue", message, text)])

@@ -361,6 +361,12 @@ def test_what_cannot_be_followed(command, tmp_path, followed, words):
     assert all(word in errors for word in words)
 
 
+def test_a_reversed_drive_has_the_mirror_image(regular):
+    found = mesoslip.cycle(configuration("drive.velocity=-3um/s"), find_multipliers=False)
+    for name in ("period", "peak_force", "low_force", "slips", "slip_share", "peak_velocity"):
+        assert getattr(found, name) == getattr(regular, name), name
+
+
 def test_interaction_is_left_out():
     config = mesoslip.Config.load(
         ROOT / "runs" / "klein.toml",

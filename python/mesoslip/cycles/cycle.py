@@ -259,7 +259,8 @@ def cycle(
     ----------
     config
         A TOML file, an output, nested tables, or a `Config`; of either engine, with a rigid
-        slider and one constant velocity of the drive. Interaction is left out.
+        slider and one constant velocity of the drive. Interaction is left out. Forces and
+        velocities of the result are along the drive, whatever its direction.
     start
         Where to start: "relaxed", "steady", "uniform", another cycle or its output; by default the
         initial state of the configuration.
@@ -419,6 +420,8 @@ def _no_trace() -> Trace:
 def master_equation(config: Config) -> Config:
     """The configuration of the master equation for cycles of another one.
 
+    The drive has the positive direction: the motion of the other one is its mirror image.
+
     Raises
     ------
     ConfigError
@@ -443,6 +446,8 @@ def master_equation(config: Config) -> Config:
     velocity = tables.get("output", {}).get("slip_velocity")
     tables["output"] = {} if velocity is None else {"slip_velocity": velocity}
     tables.pop("interaction", None)
+    if config.drive_parts[-1].start_velocity < 0:
+        tables["drive"] = {"velocity": -config.drive_parts[-1].start_velocity}
     return Config.from_dict(tables)
 
 

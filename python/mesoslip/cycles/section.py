@@ -173,7 +173,7 @@ class Motion:
         kernel = self.open(words)
         pieces: list[_Piece] = []
         limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
-        watch = _Watch(level, np.sign(self.velocity))
+        watch = _Watch(level)
         now = start
         while now < limit:
             kernel.advance(CHUNK, ANY_WORK)
@@ -222,8 +222,8 @@ class _Piece(NamedTuple):
 class _Watch:
     """Looks for the passage of the force in its samples."""
 
-    def __init__(self, level: Level, direction: float) -> None:
-        self._level, self._direction = level, direction
+    def __init__(self, level: Level) -> None:
+        self._level = level
         self._was_low = False
         self._last: Array = np.empty((0, len(TRACE_COLUMNS)))
 

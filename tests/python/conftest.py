@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import gc
+import os
 import signal
 import sys
 from collections.abc import Generator
@@ -27,6 +28,10 @@ COLLECTION_THRESHOLDS = (20_000, 20, 20)
 
 # Parsers of commands, which typer makes again for each command of a test: 20 ms each.
 typer.main.get_command = functools.cache(typer.main.get_command)
+
+# No test cuts the power: none has to wait until a disk has what is written, 4 ms a file.
+# Processes of their own still wait, which tests kill.
+os.fsync = lambda file: None
 
 
 def pytest_configure():

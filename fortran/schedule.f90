@@ -30,6 +30,9 @@ module mesoslip_schedule
       integer :: broken = 0, attached = 0, moments = 0
       !> Whether it ends here
       logical :: is_over = .true.
+      !> Whether the only break listed is a bound, where contacts are to say which of them break;
+      !> whether the slider has come there
+      logical :: is_bounded = .false., at_bound = .false.
 
       !> Direction of motion, +1 or -1
       real(wp) :: direction = 1.0_wp
@@ -169,6 +172,11 @@ contains
          return
       end if
       if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
+         if (self%is_bounded) then
+            self%at_bound = .true.
+            self%is_over = .true.
+            return
+         end if
          call self%break_due(time, displacement)
       end if
       if (self%attach_time(self%attached + 1) <= time) call self%attach_due(time, displacement)

@@ -23,6 +23,8 @@ module mesoslip_contacts_ensemble
 
    !> A probability too small to meet among the keys of a ring of buckets.
    real(wp), parameter :: rare = 1.0e-4_wp
+   !> Attachments in a schedule of the way back
+   integer, parameter :: events_back = 8
    !> A normal deviate too large to meet.
    real(wp), parameter :: far_newborn = 4.0_wp
 
@@ -40,7 +42,7 @@ module mesoslip_contacts_ensemble
       procedure :: join
       procedure :: exchange
       procedure :: rebuild
-      procedure, non_overridable, private :: break_due
+      procedure, non_overridable, private :: break_due, plan_back
    end type contact_ensemble_type
 
 contains
@@ -143,7 +145,13 @@ contains
       integer :: number, event, contact(max_events)
 
       schedule%is_over = .true.
-      if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
+      schedule%at_bound = .false.
+      if (self%track%columns > 0) return
+      schedule%is_bounded = pose%direction * self%direction < 0.0_wp
+      if (schedule%is_bounded) then
+         call self%plan_back(min(limit, max_events, events_back), schedule)
+         return
+      end if
       call self%queue%preview(self%record, min(limit, max_events), self%listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return
@@ -163,6 +171,28 @@ contains
       schedule%is_over = .false.
    end subroutine plan
 
+   !> Write a schedule of what comes next on the way back: attachments, up to where a contact may
+   !> break.
+   subroutine plan_back(self, limit, schedule)
+      class(contact_ensemble_type), intent(inout) :: self
+      !> Maximum number of attachments
+      integer, intent(in) :: limit
+      !> The schedule
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: contact(max_events)
+
+      schedule%direction = -self%direction
+      schedule%breaks = 1
+      schedule%broken = 0
+      schedule%moments = 0
+      schedule%break_coordinate(1) = -self%behind
+      schedule%behind = -self%queue%first_key
+      call self%list_attachments(limit, schedule%direction, schedule, contact)
+      schedule%has_births = .false.
+      schedule%is_over = .false.
+   end subroutine plan_back
+
    !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
       !> The ensemble
@@ -177,11 +207,17 @@ contains
       call self%detach_listed(self%listed(:schedule%broken), schedule)
       if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
       call self%attach_listed(schedule, contact)
-      do event = 1, schedule%attached
-         call self%queue%insert(contact(event), &
-            & ahead_coordinate(self%record(:, contact(event)), self%direction))
-      end do
-      self%behind = schedule%behind
+      if (schedule%is_bounded) then
+         do event = 1, schedule%attached
+            call self%join(contact(event), pose)
+         end do
+      else
+         do event = 1, schedule%attached
+            call self%queue%insert(contact(event), &
+               & ahead_coordinate(self%record(:, contact(event)), self%direction))
+         end do
+         self%behind = schedule%behind
+      end if
       ! A contact that broke a moment ago and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)

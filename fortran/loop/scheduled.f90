@@ -66,8 +66,9 @@ contains
       end do
       call state%contacts%settle(state%schedule, state%slider%pose())
       call state%avalanches%count_others(state%schedule%moments, state%contacts%breaks)
-      ! The schedule was for the other direction: what is due at the turn is for contacts to say.
-      if (turns) call respond(state, before, state%contacts%law())
+      ! The schedule was for the other direction: what is due at the turn is for contacts to say, as
+      ! is what breaks on the way back.
+      if (turns .or. state%schedule%at_bound) call respond(state, before, state%contacts%law())
       call end_at_slips(state)
       call end_at_displacement(state)
       call end_if_steady(state)

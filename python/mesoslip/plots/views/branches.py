@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 # Ratio of the amplitudes of the two directions from which on they are different motions.
 DIFFERENT = 2.0
 IRREGULAR = 2
+# Room above the greatest value, over it.
+HEADROOM = 0.08
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
@@ -38,7 +40,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
         for row, (_, style) in enumerate(STYLES.items()):
             period.plot(axis.values, values[row] / scale.size, linestyle="", **style)
         period.set_ylabel(scale.label("period"))
-        period.set_ylim(bottom=0)
+        _begin_at_zero(period, values / scale.size)
         period.set_xlabel(axis.label)
     return figure
 
@@ -67,10 +69,15 @@ def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     if axis.is_logarithmic:
         logarithmic(axes, "x")
     axes.set_ylabel("amplitude over $F_s$")
-    axes.set_ylim(bottom=0)
+    _begin_at_zero(axes, ratio)
     axes.set_xlabel(axis.label)
     titles(axes, tree, beside_legend=True)
     legend_above(axes)
+
+
+def _begin_at_zero(axes: Axes, values: Array) -> None:
+    """Let the axis begin at 0, and end where the marks of the values have room."""
+    axes.set_ylim(0, (1 + HEADROOM) * float(np.nanmax(values, initial=0.0)) or None)
 
 
 def _data(tree: xr.DataTree) -> tuple[xr.Dataset, SweptKey]:

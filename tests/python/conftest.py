@@ -31,7 +31,7 @@ typer.main.get_command = functools.cache(typer.main.get_command)
 
 # No test cuts the power: none has to wait until a disk has what is written, 4 ms a file.
 # Processes of their own still wait, which tests kill.
-os.fsync = lambda file: None
+os.fsync = lambda _: None
 
 
 def pytest_configure():

@@ -33,6 +33,40 @@ subroutine set_contacts(handle, kind, length, names, values, words, seed, realiz
    call report(error, status, message)
 end subroutine set_contacts
 
+!> Give a simulation the contacts of another one, which has not been started.
+subroutine copy_contacts(handle, template, status, message)
+   !f2py threadsafe
+   use mesoslip_boundary_handles, only: find_simulation, report
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_loop_simulation, only: simulation_type
+   implicit none
+   integer(8), intent(in) :: handle(2)
+   !> Handle of the other one
+   integer(8), intent(in) :: template(2)
+   integer, intent(out) :: status
+   character(len=200), intent(out) :: message
+
+   type(simulation_type), pointer :: simulation, other
+   type(error_type), allocatable :: error
+   integer :: stat
+
+   call find_simulation(handle, .false., simulation, error)
+   if (.not. allocated(error)) call find_simulation(template, .false., other, error)
+   if (.not. allocated(error)) then
+      if (.not. allocated(other%contacts)) then
+         call raise(error, status_invalid, "the simulation to copy from has no contacts")
+      else if (other%is_started) then
+         call raise(error, status_invalid, "the simulation to copy from was started")
+      end if
+   end if
+   if (.not. allocated(error)) then
+      if (allocated(simulation%contacts)) deallocate (simulation%contacts)
+      allocate (simulation%contacts, source=other%contacts, stat=stat)
+      if (stat /= 0) call raise(error, status_memory, "there is not enough memory for the contacts")
+   end if
+   call report(error, status, message)
+end subroutine copy_contacts
+
 !> Give a simulation its slider.
 subroutine set_slider(handle, kind, length, names, values, words, status, message)
    !f2py threadsafe

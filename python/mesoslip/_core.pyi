@@ -110,6 +110,7 @@ def set_avalanches(
     snapshot_time: NDArray[np.float64],
     snapshots: int = ...,
 ) -> tuple[int, bytes]: ...
+def copy_contacts(handle: NDArray[np.int64], template: NDArray[np.int64]) -> tuple[int, bytes]: ...
 def set_contacts(
     handle: NDArray[np.int64],
     kind: str,

@@ -10,6 +10,7 @@ from dataclasses import fields
 
 import pytest
 from conftest import ROOT
+from kinds import KINDS, configuration
 from mesoslip import _core
 from mesoslip.configuration.contacts import tables as contacts
 from mesoslip.configuration.sliders.layered import SOLVERS
@@ -17,6 +18,7 @@ from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.errors import RunError
 from mesoslip.output import variables
 from mesoslip.simulation import tables
+from mesoslip.simulation.assembly import assemble
 from mesoslip.simulation.kernel import Kernel, name_list
 from mesoslip.simulation.realization import ENDINGS
 from mesoslip.theory.lives import Scales
@@ -99,6 +101,38 @@ def test_memory_that_is_refused_is_an_error():
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert "not enough memory for the populations of contacts" in done.stdout
+
+
+def with_contacts(config) -> Kernel:
+    """A kernel that has the contacts of a configuration, and nothing else."""
+    kind, kernel = config.contact_kind, Kernel()
+    kernel.set_contacts(kind.kernel_kind, kind.kernel_parameters(config), config.run.seed, 0)
+    return kernel
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_copied_contacts_are_those_made_anew(kind):
+    """Two copies run alike, and as contacts of their own; the original stays as it was."""
+    config = configuration(kind)
+    template = with_contacts(config)
+    states = []
+    for one in (template, template, config.contact_kind.kernel_parameters(config)):
+        kernel = assemble(config, one)
+        kernel.start(config.contacts.initial)
+        kernel.advance(40, 1e18)
+        states.append(kernel.save().tolist())
+        kernel.close()
+    assert states[0] == states[1] == states[2]
+
+
+def test_contacts_that_cannot_be_copied():
+    config = configuration("rigid")
+    with pytest.raises(RunError, match="has no contacts"):
+        Kernel().copy_contacts(Kernel())
+    started = assemble(config, with_contacts(config))
+    started.start("relaxed")
+    with pytest.raises(RunError, match="was started"):
+        Kernel().copy_contacts(started)
 
 
 def test_unknown_lists_of_names_are_errors():

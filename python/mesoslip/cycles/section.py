@@ -138,11 +138,16 @@ class Motion:
         force = contacts.static_force
         self.loading_time = force * (1 / spring + 2 / contacts.stiffness) / abs(self.velocity)
         self.setup_period = 2 * math.pi * math.sqrt(mass / spring)
-        self._parameters = config.contact_kind.kernel_parameters(config)
+        # Its contacts, which take longer to make than to copy.
+        self._template = Kernel()
+        kind = config.contact_kind
+        self._template.set_contacts(
+            kind.kernel_kind, kind.kernel_parameters(config), config.run.seed, 0
+        )
 
     def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
         """A kernel at a state, or at the start; the drive ends at a time [s]."""
-        kernel = assemble(self.config, self._parameters, end_time=end_time, interval=self.interval)
+        kernel = assemble(self.config, self._template, end_time=end_time, interval=self.interval)
         if words is None:
             kernel.start(self.config.contacts.initial)
         else:

@@ -19,7 +19,7 @@ NEVER = float(np.finfo(np.float64).max)
 
 def assemble(
     config: Config,
-    parameters: Parameters,
+    parameters: Parameters | Kernel,
     number: int = 0,
     *,
     start_time: float | None = None,
@@ -34,7 +34,7 @@ def assemble(
     config
         The configuration.
     parameters
-        Parameters of the contacts.
+        Parameters of the contacts, or a kernel that has the contacts and is not started.
     number
         Number of the realization.
     start_time
@@ -49,7 +49,10 @@ def assemble(
     """
     slider, contacts, output = config.slider, config.contact_kind, config.output
     kernel = Kernel()
-    kernel.set_contacts(contacts.kernel_kind, parameters, config.run.seed, number)
+    if isinstance(parameters, Kernel):
+        kernel.copy_contacts(parameters)
+    else:
+        kernel.set_contacts(contacts.kernel_kind, parameters, config.run.seed, number)
     kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
     parts = config.drive_parts
     forces = config.drive.start_forces(parts)

@@ -110,6 +110,11 @@ class Kernel:
         """Make the contacts of a kind from named parameters."""
         self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
+    def copy_contacts(self, template: Kernel) -> None:
+        """Take the contacts of another simulation, which is not started: less work than to make
+        them."""
+        self._call(_core.copy_contacts, template._handle)
+
     def set_slider(self, kind: str, parameters: Mapping[str, float | str]) -> None:
         """Make the slider of a kind from named parameters."""
         self._call(_core.set_slider, kind, *named(parameters))

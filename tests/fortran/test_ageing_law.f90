@@ -85,8 +85,9 @@ contains
    !> Rates are those of differences, and the contacts that break are those whose threshold is met.
    subroutine consistent()
       real(wp), parameter :: ages(4) = [0.0_wp, 0.5_wp, 3.0_wp, 20.0_wp], step = 1.0e-5_wp
-      real(wp) :: threshold, rate, difference
-      integer :: place
+      real(wp), parameter :: times(5) = [0.0_wp, 1.0e-4_wp, 0.02_wp, 0.06_wp, 9.0_wp]
+      real(wp) :: threshold, rate, difference, growth, later
+      integer :: place, part
 
       do place = 1, size(ages)
          call law%evaluate(0.9_wp, 1.0_wp, ages(place) + step, threshold, rate)
@@ -98,6 +99,13 @@ contains
          ! In any unit.
          call check_close(law%threshold(0.9e-8_wp, 1.0e-8_wp, ages(place) + step), &
             & 1.0e-8_wp * threshold, 1.0e-22_wp, "unit")
+         do part = 1, size(times)
+            call law%evaluate(0.9_wp, 1.0_wp, ages(place), threshold, rate)
+            call law%grow(rate, ages(place), times(part), growth, difference)
+            call law%evaluate(0.9_wp, 1.0_wp, ages(place) + times(part), later, rate)
+            call check_close(growth, later - threshold, 1.0e-15_wp, "growth from an age on")
+            call check_close(difference, rate, 1.0e-15_wp, "rate at its end")
+         end do
       end do
    end subroutine consistent
 

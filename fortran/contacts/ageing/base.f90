@@ -7,7 +7,7 @@ module mesoslip_contacts_ageing_base
    use mesoslip_contacts_individual_queue, only: contact_queue_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, &
       & row_stiffness, ahead_coordinate
-   use mesoslip_interface_law, only: pose_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_schedule, only: max_events
    implicit none
@@ -72,15 +72,20 @@ module mesoslip_contacts_ageing_base
       !> Contacts that lead, whose thresholds fall, and those of them that are near. In one array,
       !> as of several components of this type gfortran 12 frees only one
       type(list_type) :: list(lists)
+      !> Keys of the leaders, from the last to the first of them [m]; shape (count)
+      real(wp), allocatable :: leader_key(:)
       !> Where each contact is kept, shape (count)
       integer, allocatable :: kept(:)
       !> Coordinates between which [m], and time until which [s], no other contacts whose thresholds
       !> fall break than those that are near
       real(wp) :: scan_upper = huge(1.0_wp), scan_lower = -huge(1.0_wp)
       real(wp) :: scan_time = huge(1.0_wp)
-      !> Time of the last response [s], duration of the last motion that was not steady or 0, and by
-      !> how much the acceleration was another at the end of a motion since then [m/s2]
-      real(wp) :: now = 0.0_wp, duration = 0.0_wp, acceleration_jump = 0.0_wp
+      !> Time of the last response [s]
+      real(wp) :: now = 0.0_wp
+      !> Law that was offered last; acceleration of the slider under it [m/s2], and jerk, as far as
+      !> it follows from the law; error of the jerk in the last motions, and its bound [m/s3]
+      type(interface_law_type) :: law_offered
+      real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_doubt = 0.0_wp
       !> Whether the slider moves steadily in the direction of the queue, number of its motion, and
       !> the speed for which the queue is ordered [m/s]; births and solutions since that was set
       logical :: is_steady = .false.
@@ -182,14 +187,14 @@ contains
          & self%stretch, time - self%life(life_birth, contact))
    end subroutine refresh
 
-   !> Rebuild the queue from the records.
+   !> Rebuild the queue and the keys of the leaders from the records.
    subroutine rebuild(self, displacement)
       !> The contacts
       class(ageing_contacts_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
-      integer :: contact
+      integer :: contact, position
 
       call self%queue%clear(self%direction, self%direction * displacement)
       do contact = 1, self%parameters%count
@@ -198,6 +203,10 @@ contains
             call self%queue%insert(contact, &
                & ahead_coordinate(self%record(:, contact), self%direction))
          end if
+      end do
+      do position = 1, self%list(leaders)%count
+         self%leader_key(position) = ahead_coordinate(self%record(:, &
+            & self%list(leaders)%contact(position)), self%direction)
       end do
    end subroutine rebuild
 

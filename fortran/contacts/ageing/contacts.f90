@@ -5,25 +5,26 @@
 !>
 !> - under a slider that moves steadily they break there, whether thresholds grow or fall;
 !> - where its velocity changes, that of twice its speed: a slower slider takes longer, and a
-!>   threshold that grows is then higher, so a contact does not break before. The first of the queue
-!>   are solved again, until it is known which of them break next. These lead: where they do is
-!>   foreseen from the motion of the slider, and held back by what is not known of it. A slider that
-!>   comes to where a leader was to break finds it there, or a little ahead of it and foresees
-!>   again. When the slider becomes faster than the speed of the queue, all are solved again;
+!>   threshold that grows is then higher, so a contact does not break before. The first ones of the
+!>   queue are solved again, some together. These lead: where the next one breaks is foreseen from
+!>   the motion of the slider, and held back by what is not known of it. A slider that comes to
+!>   where a leader was to break finds it there, or a little ahead of it and foresees again. When
+!>   the slider becomes faster than the speed of the queue, all are solved again;
 !> - a threshold that falls is bounded by what it will be at the end of the window, which is where
 !>   and when the contact is foreseen to break, whether the slider moves or not. Few contacts do so
 !>   in most cases; of many, those are near that may break before the next scan.
 !>
 !> A contact that does not age breaks as in the ensemble without ageing, to the bit.
 module mesoslip_contacts_ageing_contacts
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, falling, in_falling, in_leaders, &
-      & in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, next_length, &
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, falling, in_falling, in_queue, &
+      & leaders, life_birth, life_length, life_limit, life_motion, near, next_length, &
       & next_speed, no_motion
    use mesoslip_contacts_ageing_falling, only: bound_falling, break_falling, scan, scan_if_needed
    use mesoslip_contacts_ageing_law, only: take_ageing_law
-   use mesoslip_contacts_ageing_leaders, only: bound_leaders, break_leaders
+   use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders
    use mesoslip_contacts_ageing_lists, only: append
-   use mesoslip_contacts_ageing_motion, only: bound_speed, follow_motion, min_ratio
+   use mesoslip_contacts_ageing_motion, only: bound_speed, compare_motion, follow_motion, &
+      & foresee_motion, min_ratio
    use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, plan_steady, &
       & queue_newborn, settle_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
@@ -43,8 +44,6 @@ module mesoslip_contacts_ageing_contacts
 
    !> A probability too small to meet among the keys of a ring of buckets.
    real(wp), parameter :: negligible = 1.0e-4_wp
-   !> How much of the acceleration jump of the slider is remembered at its next motion.
-   real(wp), parameter :: memory = 0.99_wp
    !> How near behind the slider, over the mean breaking stretch, the queue is turned round: a bound
    !> that recedes is not to be met in ever smaller steps.
    real(wp), parameter :: near_behind = 1.0e-2_wp
@@ -97,6 +96,7 @@ contains
          if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%kept(count), source=in_queue, stat=stat)
          if (stat == 0) allocate (self%list(leaders)%contact(count), source=0, stat=stat)
+         if (stat == 0) allocate (self%leader_key(count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%list(falling)%contact(count), source=0, stat=stat)
          if (stat == 0) allocate (self%list(near)%contact(count), source=0, stat=stat)
       end associate
@@ -149,6 +149,7 @@ contains
       lower = self%behind
       end_time = self%detached%next_due
       self%cost = 1.0_wp
+      call foresee_motion(self, pose, law)
       call follow_motion(self, pose)
       if (self%is_steady) then
          upper = self%queue%first_key
@@ -172,12 +173,9 @@ contains
 
       self%now = after%time
       if (self%is_steady) then
-         self%duration = 0.0_wp
-         self%acceleration_jump = abs(after%acceleration - before%acceleration)
+         self%jerk_error = 0.0_wp
       else
-         self%duration = after%time - before%time
-         self%acceleration_jump = max(abs(after%acceleration - before%acceleration), &
-            & memory * self%acceleration_jump)
+         call compare_motion(self, before, after)
       end if
       breaks = self%breaks
       self%is_unchanged = self%detached%next_due > after%time
@@ -219,8 +217,7 @@ contains
       type(pose_type), intent(in) :: pose
 
       self%now = pose%time
-      self%duration = 0.0_wp
-      self%acceleration_jump = 0.0_wp
+      self%jerk_error = 0.0_wp
       call settle_steady(self, schedule)
       ! A contact that broke a moment ago and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
@@ -255,8 +252,7 @@ contains
                call self%record_lateness(contact, pose)
                call self%detach(contact, pose%displacement, pose%time)
             else
-               call append(self%list(leaders), contact)
-               self%kept(contact) = in_leaders
+               call add_leader(self, contact)
             end if
          end do
       end if
@@ -320,13 +316,14 @@ contains
       self%behind = self%max_behind()
    end subroutine face
 
-   !> Move the coordinates of the last scan.
+   !> Move the coordinates of the last scan, and the last law.
    subroutine shift_order(self, shift)
       !> The contacts, their records moved
       class(contact_ageing_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
+      self%law_offered%offset = self%law_offered%offset - self%law_offered%stiffness * shift
       if (self%scan_upper < huge(1.0_wp)) then
          self%scan_upper = self%scan_upper - self%direction * shift
          self%scan_lower = self%scan_lower - self%direction * shift
@@ -354,8 +351,13 @@ contains
       call archive%exchange("scan_lower", self%scan_lower)
       call archive%exchange("scan_time", self%scan_time)
       call archive%exchange("now", self%now)
-      call archive%exchange("duration", self%duration)
-      call archive%exchange("acceleration_jump", self%acceleration_jump)
+      call archive%exchange("stiffness_offered", self%law_offered%stiffness)
+      call archive%exchange("offset_offered", self%law_offered%offset)
+      call archive%exchange("drag_offered", self%law_offered%drag)
+      call archive%exchange("acceleration", self%acceleration)
+      call archive%exchange("jerk", self%jerk)
+      call archive%exchange("jerk_error", self%jerk_error)
+      call archive%exchange("jerk_doubt", self%jerk_doubt)
       call archive%exchange("is_unchanged", self%is_unchanged)
       call archive%exchange("is_steady", self%is_steady)
       call archive%exchange("motion", self%motion)

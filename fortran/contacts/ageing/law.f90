@@ -25,6 +25,10 @@ module mesoslip_contacts_ageing_law
    !> Ages over tau_a beyond which nothing relaxes any more, as exp(-40) is below rounding.
    real(wp), parameter :: old = 40.0_wp
 
+   !> Time over that in which a threshold changes, up to which its growth is that of a series: what
+   !> that leaves out is below 1e-15 of it.
+   real(wp), parameter :: max_ratio = 0.02_wp
+
    !> A law of ageing.
    type :: ageing_law_type
       !> One of the ageing_ codes
@@ -46,6 +50,8 @@ module mesoslip_contacts_ageing_law
       procedure, non_overridable :: threshold
       !> Change of the rate in a second
       procedure, non_overridable :: bend
+      !> Growth of a threshold from an age on
+      procedure, non_overridable :: grow
       !> Configured threshold of the contacts that break at an age under a force
       procedure, non_overridable :: configured
       !> Whether the threshold falls with age
@@ -148,6 +154,45 @@ contains
       bend = -rate * self%inverse_time
       if (self%kind == ageing_log) bend = -rate / (self%time + age)
    end function bend
+
+   !> Growth of a threshold from an age on. In a short time it is that of a series, which takes less
+   !> time than a transcendental function.
+   elemental subroutine grow(self, rate, age, time, growth, later_rate)
+      !> The law
+      class(ageing_law_type), intent(in) :: self
+      !> Rate of the threshold at the age, in any unit for a second
+      real(wp), intent(in) :: rate
+      !> Age, and the time from then on, not negative [s]
+      real(wp), intent(in) :: age, time
+      !> Growth in this time, in that unit, and the rate at its end
+      real(wp), intent(out) :: growth, later_rate
+
+      real(wp) :: ratio, part, square
+
+      if (self%kind == ageing_log) then
+         ratio = time / (self%time + age)
+         later_rate = rate / (1.0_wp + ratio)
+         if (ratio < max_ratio) then
+            ! The logarithm of 1 + x is 2 artanh(x/(2 + x)).
+            part = ratio / (2.0_wp + ratio)
+            square = part**2
+            growth = 2.0_wp * rate * (self%time + age) * part * (1.0_wp &
+               & + square * (1.0_wp / 3.0_wp + square * (0.2_wp + square * (1.0_wp / 7.0_wp))))
+         else
+            growth = rate * (self%time + age) * log(1.0_wp + ratio)
+         end if
+      else
+         ratio = time * self%inverse_time
+         if (ratio < max_ratio) then
+            growth = rate * time * (1.0_wp - ratio * 0.5_wp * (1.0_wp - ratio &
+               & * (1.0_wp / 3.0_wp) * (1.0_wp - ratio * 0.25_wp * (1.0_wp - ratio * 0.2_wp &
+               & * (1.0_wp - ratio * (1.0_wp / 6.0_wp) * (1.0_wp - ratio * (1.0_wp / 7.0_wp)))))))
+         else
+            growth = rate * self%time * (1.0_wp - exp(-min(ratio, old)))
+         end if
+         later_rate = rate - growth * self%inverse_time
+      end if
+   end subroutine grow
 
    !> Deficit of the threshold of a contact at birth.
    elemental function lack(self, configured, mean)

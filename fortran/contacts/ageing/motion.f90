@@ -1,22 +1,27 @@
-!> Speed for which contacts that age are queued.
+!> Motion of the slider as contacts that age foresee it, and the speed for which they are queued.
 !>
 !> Where the velocity of the slider changes, they are queued for twice its speed: a slower slider
 !> takes longer, and a threshold that grows is then higher, so that a contact does not break before.
-!> When the slider becomes faster than the speed of the queue, all are solved again.
+!> When the slider becomes faster than the speed of the queue, all are solved again. Where it comes
+!> next is foreseen from its acceleration and its jerk.
 module mesoslip_contacts_ageing_motion
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, safety
    use mesoslip_contacts_ageing_steady, only: begin_steady, end_steady
-   use mesoslip_interface_law, only: pose_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
-   public :: follow_motion, bound_speed, min_ratio
+   public :: follow_motion, foresee_motion, compare_motion, bound_speed, min_ratio
 
    !> Speed of the queue over that of the slider: when it is set, and when it is too low or too high
    real(wp), parameter :: set_ratio = 2.0_wp, min_speed_ratio = 1.3_wp, max_speed_ratio = 8.0_wp
    !> Speed over that of ageing below which contacts are old where they break
    real(wp), parameter :: min_ratio = 0.05_wp
+   !> How much of an error of the jerk is remembered at the next motion
+   real(wp), parameter :: memory = 0.99_wp
+   !> Error of the jerk, relative, that is expected in any case
+   real(wp), parameter :: min_jerk_error = 1.0e-3_wp
    !> Time within which a slider becomes faster, if it does at all [s]
    real(wp), parameter :: max_time = 1.0e9_wp
 
@@ -49,7 +54,7 @@ contains
 
       real(wp) :: least
 
-      least = min_ratio * self%stretch / self%ageing%time
+      least = min_ratio * self%stretch * self%ageing%inverse_time
       if (min_speed_ratio * abs(pose%velocity) > self%speed) then
          self%speed = max(set_ratio * abs(pose%velocity), least)
          call self%order_all(pose)
@@ -61,6 +66,41 @@ contains
       end if
    end subroutine set_speed
 
+   !> Foresee the motion of the slider under a law that is offered to it. The acceleration that it
+   !> comes with is that under the law before.
+   pure subroutine foresee_motion(self, pose, law)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      !> The law
+      type(interface_law_type), intent(in) :: law
+
+      real(wp) :: change
+
+      change = (law%stiffness - self%law_offered%stiffness) * pose%displacement &
+         & - (law%offset - self%law_offered%offset) &
+         & + (law%drag - self%law_offered%drag) * pose%velocity
+      self%law_offered = law
+      self%acceleration = pose%acceleration - pose%inverse_mass * change
+      self%jerk = -(pose%own_rate**2 + pose%inverse_mass * law%stiffness) * pose%velocity &
+         & - pose%inverse_mass * law%drag * self%acceleration
+      ! What a drive or a damper may do that is as fast as the slider itself.
+      self%jerk_doubt = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
+         & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
+   end subroutine foresee_motion
+
+   !> Compare a motion with what was foreseen of it.
+   pure subroutine compare_motion(self, before, after)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: duration
+
+      duration = after%time - before%time
+      if (.not. duration > 0.0_wp) return
+      self%jerk_error = max(abs(after%acceleration - self%acceleration - self%jerk * duration) &
+         & / duration, memory * self%jerk_error)
+   end subroutine compare_motion
+
    !> End a window before the slider may become faster than the speed of the queue, by what is known
    !> of its motion.
    pure subroutine bound_speed(self, pose, end_time)
@@ -68,23 +108,15 @@ contains
       type(pose_type), intent(in) :: pose
       real(wp), intent(inout) :: end_time
 
-      real(wp) :: room, pull, acceleration_jump, time
+      real(wp) :: room, pull, bend, time
 
       room = self%speed - abs(pose%velocity)
-      pull = abs(pose%acceleration)
-      acceleration_jump = safety * self%acceleration_jump
+      pull = abs(self%acceleration)
+      bend = 0.5_wp * (abs(self%jerk) + self%jerk_doubt)
       time = min(end_time - pose%time, max_time)
-      if (2.0_wp * (pull + acceleration_jump) * time <= room) return
-      time = 0.5_wp * room / (pull + acceleration_jump)
-      if (time > self%duration .and. self%duration > 0.0_wp) then
-         ! Over a longer time than the last one, the acceleration may change by more.
-         time = max_time
-         if (2.0_wp * pull * time > 0.5_wp * room) time = 0.25_wp * room / pull
-         if (2.0_wp * acceleration_jump * time**2 > 0.5_wp * room * self%duration) then
-            time = sqrt(0.25_wp * room * self%duration / acceleration_jump)
-         end if
-         time = max(time, self%duration)
-      end if
+      if (2.0_wp * (pull + bend * time) * time <= room) return
+      if (4.0_wp * pull * time > room) time = 0.25_wp * room / pull
+      if (4.0_wp * bend * time**2 > room) time = sqrt(0.25_wp * room / bend)
       end_time = min(end_time, max(pose%time + time, nearest(pose%time, 1.0_wp)))
    end subroutine bound_speed
 

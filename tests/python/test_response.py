@@ -287,9 +287,14 @@ def sliding():
     return mesoslip.run(config)
 
 
-def test_steady_forces_of_a_run_are_those_of_theory(sliding):
+@pytest.fixture(scope="module")
+def sliding_response(sliding):
+    return mesoslip.response(sliding)
+
+
+def test_steady_forces_of_a_run_are_those_of_theory(sliding_response):
     """F/F_s = (1 + δ²)/2 at any velocity, without delay and back force."""
-    found = mesoslip.response(sliding)
+    found = sliding_response
     for row in rows_of(found, "steady"):
         assert abs(row["steady_force_ratio"] - 0.5 * 1.09) < 4 * row["steady_force_ratio_error"]
         assert row["steady_force_ratio_error"] < 5e-3
@@ -303,8 +308,8 @@ def test_steady_forces_of_a_run_are_those_of_theory(sliding):
     )
 
 
-def test_tables_have_one_unit_a_column_and_the_digits_of_errors(sliding):
-    steady, steps, _ = tables(mesoslip.response(sliding))
+def test_tables_have_one_unit_a_column_and_the_digits_of_errors(sliding, sliding_response):
+    steady, steps, _ = tables(sliding_response)
     assert steady.head[1] == "velocity (nm/s)"
     assert [row[1] for row in steady.rows] == ["100.0", "500.0"]
     assert steps.head[1:3] == ("from (nm/s)", "to (nm/s)")
@@ -432,9 +437,13 @@ def test_pictures(sliding):
     assert isinstance(whole, Figure)
     assert len(whole.axes) == 2
     axes = Figure().subplots()
-    mesoslip.plot(record(LAW, HOLDS, 4000.0), view="response", ax=axes)
-    assert len(axes.lines) >= 2
-    assert len(mesoslip.plot(record(LAW, HOLDS, 4000.0), view="response").axes) == 2
+    mesoslip.plot(sliding, view="response", ax=axes)
+    holds = mesoslip.plot(record(LAW, HOLDS, 4000.0), view="response")
+    assert len(holds.axes) == 2
+    for drawn in (axes, whole.axes[0], holds.axes[0]):
+        assert len(drawn.lines) >= 2
+        assert "law" in drawn.get_legend().texts[0].get_text()
+    assert "slip\N{NO-BREAK SPACE}law" in holds.axes[0].get_legend().texts[0].get_text()
 
 
 def test_contacts_are_the_spring_of_a_prescribed_slider():

@@ -29,15 +29,25 @@ def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     assert study.sweep_kills + study.worker_kills > 1
 
 
+# States by a file that a point is computed, which then does not end.
+ENDLESS = """
+import os, pathlib, time
+def slow(tree):
+    pathlib.Path(__file__).with_name(f"{os.getpid()}.begun").touch()
+    time.sleep(100)
+"""
+
+
 def test_workers_end_with_their_sweep_in_the_midst_of_a_point(tmp_path, sweep_file):
-    (tmp_path / "own.py").write_text("import time\ndef slow(tree):\n    time.sleep(100)\n")
+    (tmp_path / "own.py").write_text(ENDLESS)
     path = sweep_file(SIMPLE.replace("mean_force", "own.py:slow"))
     process = begin(path, tmp_path / "sweep.nc", "--pool", "processes", "--workers", "2")
-    # So that both are at work, and not still on their way to it.
     deadline = time.monotonic() + 60
-    while len(children := workers_of(process.pid)) < 2 or not all(map(seems_idle, children)):
+    while len(list(tmp_path.glob("*.begun"))) < 2:
         assert time.monotonic() < deadline
-        time.sleep(0.1)
+        time.sleep(0.02)
+    children = workers_of(process.pid)
+    assert {f"{one}.begun" for one in children} == {one.name for one in tmp_path.glob("*.begun")}
     process.kill()
     process.wait()
     deadline = time.monotonic() + 10
@@ -46,16 +56,6 @@ def test_workers_end_with_their_sweep_in_the_midst_of_a_point(tmp_path, sweep_fi
         time.sleep(0.02)
     # Workers have it too, and it would be waited for them.
     process.communicate()
-
-
-def seems_idle(process: int) -> bool:
-    """Whether a process has imported all that it needs, and sleeps."""
-    used = []
-    for _ in range(2):
-        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-        used.append(int(fields[11]) + int(fields[12]))
-        time.sleep(0.5)
-    return used[0] == used[1] > 20
 
 
 def begin(path: Path, output: Path, *more: str) -> subprocess.Popen[str]:

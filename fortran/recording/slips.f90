@@ -9,8 +9,8 @@
 !> slip is such a fall, or several that lead lower and lower, if
 !>
 !> - the block exceeds the drive's velocity by the slip velocity,
-!> - at least one contact breaks in it, or most are detached when it starts: a film that breaks as
-!>   a whole breaks just before the maximum, and
+!> - at least one contact breaks in it, or most are detached when it starts and have not broken in
+!>   the slip before: a film that breaks as a whole breaks just before the maximum, and
 !> - the force falls by more than twice what it had regained by ringing, so that the block travels
 !>   farther beyond what ringing gives back than it rings. Regained is the part of its rise that is
 !>   ringing (mesoslip_recording_minima), from a minimum in the last three quarters of a period of
@@ -83,8 +83,8 @@ module mesoslip_recording_slips
       !> Time, force and breaks at the start of a fall or slip, and at its minimum so far
       real(wp), private :: start_time = 0.0_wp, force_before = 0.0_wp, breaks_before = 0.0_wp
       real(wp), private :: end_time = 0.0_wp, force_after = 0.0_wp, breaks_after = 0.0_wp
-      !> Contacts that were detached at its start
-      real(wp), private :: detached_before = 0.0_wp
+      !> Contacts that were detached at its start, and breaks up to the end of the last slip
+      real(wp), private :: detached_before = 0.0_wp, breaks_counted = 0.0_wp
       !> Force that ringing had regained at its start [N]
       real(wp), private :: regained_force = 0.0_wp
       !> Maximum of the velocity up to the minimum of the force, and since then [m/s]
@@ -366,14 +366,14 @@ contains
    end subroutine drop_fall
 
    !> Contacts that broke up to the minimum: those that break in the fall, or if none does, those
-   !> that were detached when it started, if they were most.
+   !> that were detached when it started, if they were most; without those of the slip before.
    pure function broken_contacts(self) result(number)
       class(slip_recorder_type), intent(in) :: self
       real(wp) :: number
 
       number = self%breaks_after - self%breaks_before
       if (number < 1.0_wp .and. 2.0_wp * self%detached_before >= self%parameters%contacts) then
-         number = self%detached_before
+         number = min(self%detached_before, self%breaks_before - self%breaks_counted)
       end if
    end function broken_contacts
 
@@ -385,6 +385,7 @@ contains
          & self%force_before, self%force_after, self%direction * self%peak_velocity, &
          & self%broken_contacts()])
       self%count = self%count + 1
+      self%breaks_counted = self%breaks_after
       self%phase = phase_slow
       call self%trace%keep()
    end subroutine close_slip
@@ -465,6 +466,7 @@ contains
       call archive%exchange("force_after", self%force_after)
       call archive%exchange("breaks_before", self%breaks_before)
       call archive%exchange("breaks_after", self%breaks_after)
+      call archive%exchange("breaks_counted", self%breaks_counted)
       call archive%exchange("detached_before", self%detached_before)
       call archive%exchange("regained_force", self%regained_force)
       call archive%exchange("peak_velocity", self%peak_velocity)

@@ -246,3 +246,32 @@ def test_times_are_in_the_table(tmp_path, command):
     lasting = [float(row["duration [s]"]) for row in rows]
     np.testing.assert_array_equal(lasting, slips["duration"].values)
     assert json.loads(printed)["slips"][0]["waiting_time"] is None
+
+
+def test_contacts_that_broke_in_a_slip_make_no_other():
+    """A bundle breaks as a whole; a reversed drive then swings the free slider back and forth."""
+    fast = 1.46e-8
+    ends = ((fast, fast), (fast / 10, fast / 10), (-fast, fast), (fast, -fast), (fast, -fast))
+    tables = {
+        "slider": {"stiffness": 4.93, "mass": 1.69e-3},
+        "contacts": {
+            "count": 120,
+            "static_force": 3.03e-8,
+            "stiffness": 5.14,
+            "reattach": False,
+            "area": 6.25e-14,
+            "threshold": {"relative_width": 1.15e-4},
+        },
+        "run": {},
+        "interaction": {"strength": 1.07, "lattice": "triangular", "columns": 12, "rows": 10},
+        "drive": {
+            "stage": [
+                {"duration": duration, "start_velocity": start, "end_velocity": end}
+                for duration, (start, end) in zip((0.72, 0.45, 1.28, 0.96, 0.57), ends, strict=True)
+            ]
+        },
+        "output": {"interval": 0.05},
+    }
+    tree = mesoslip.run(tables)
+    assert tree["breaks"].item() == 120
+    assert catalogue(tree)["contacts_broken"].values.tolist() == [120]

@@ -37,7 +37,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
-.PHONY: help setup demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
+.PHONY: help setup dev demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
   claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist clean
 
 help: ## Show the targets
@@ -49,6 +49,13 @@ help: ## Show the targets
 
 setup: $(INSTALLED) ## Install missing packages, and build
 	@:
+
+# Imports compile what has changed since. Without its stamp, make setup installs the optimized build again.
+dev: $(ENVIRONMENT) ## Install an editable build, quick to compile, for work on the program
+	@rm -f $(INSTALLED)
+	@$(UV) pip install --quiet --python $(VENV)/bin/python --no-deps --no-build-isolation \
+	  --reinstall-package mesoslip -Cbuild-dir=build/dev -Csetup-args=-Dbuildtype=plain \
+	  -Csetup-args=-Doptimization=1 -Csetup-args=-Db_lto=false --editable .
 
 demo: out/klein.nc out/klein.png ## Simulate Klein's experiment, and draw it
 	@:

@@ -22,10 +22,10 @@ from .output.inputs import open_output
 from .plots.plot import plot
 from .reports.report import report
 from .simulation.realization import Realization
+from .theory.contacts.plain_sliding import SteadySliding
+from .theory.curve import curve
 from .theory.derived import derived
-from .theory.force_curve import curve
 from .theory.slip_onset import onset
-from .theory.steady_sliding import SteadySliding
 
 __all__ = [
     "Config",

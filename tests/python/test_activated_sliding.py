@@ -10,15 +10,9 @@ import numpy as np
 import pytest
 import tomli_w
 from mesoslip import Config, MesoslipError, SteadySliding
-from mesoslip.theory.activated_sliding import ActivatedSliding
-from mesoslip.theory.narrow_thresholds import rate_and_state_of_narrow_thresholds
-from mesoslip.theory.thermal import (
-    creep_velocity,
-    hold_force,
-    restart,
-    steady_force,
-    steady_slope,
-)
+from mesoslip.theory.contacts import contact_theory
+from mesoslip.theory.contacts.narrow_thresholds import rate_and_state_of_narrow_thresholds
+from mesoslip.theory.steady_sliding import sliding_of
 from oracles import aged
 from test_thermal import aged_force, unit
 
@@ -35,24 +29,26 @@ def test_steady_force_of_ageing_contacts_is_that_of_a_plain_quadrature(ageing):
         contacts__ageing=ageing,
         contacts__thermal__force_ratio=0.1,
     )
-    assert steady_force(config, config.drive_speed) == pytest.approx(aged_force(config), rel=1e-3)
+    assert contact_theory(config).steady_force(config.drive_speed) == pytest.approx(
+        aged_force(config), rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("law", ["gaussian", "uniform", "weibull"])
 def test_creep_is_the_inverse_of_the_steady_force(law):
     config = unit(1, contacts__threshold={"law": law, "relative_width": 0.2})
     for velocity in (1e-6, 1e-2):
-        force = steady_force(config, velocity)
-        assert creep_velocity(config, force) == pytest.approx(velocity, rel=1e-8)
-    assert math.isnan(creep_velocity(config, 2.0))
+        force = contact_theory(config).steady_force(velocity)
+        assert contact_theory(config).creep_velocity(force) == pytest.approx(velocity, rel=1e-8)
+    assert math.isnan(contact_theory(config).creep_velocity(2.0))
 
 
 def test_damping_of_a_slider_under_a_force_slows_its_creep():
     slider = {"kind": "force", "mass": 2.0, "damping": 3.0}
     config = unit(1, slider=slider, drive={"force": 0.3})
     velocity = 1e-2
-    force = steady_force(config, velocity) + 6.0 * velocity
-    assert creep_velocity(config, force) == pytest.approx(velocity, rel=1e-8)
+    force = contact_theory(config).steady_force(velocity) + 6.0 * velocity
+    assert contact_theory(config).creep_velocity(force) == pytest.approx(velocity, rel=1e-8)
 
 
 @pytest.mark.parametrize("delay", [0.0, 4.0])
@@ -76,12 +72,13 @@ def test_hold_and_restart_are_those_of_contacts_one_by_one(delay):
     time, force = tree["time"].values, tree["spring_force"].values[0] / count
     error = 0.5 / math.sqrt(count)
     assert abs(
-        force[(time > 700) & (time < 800)].mean() - steady_force(config, velocity) / count
+        force[(time > 700) & (time < 800)].mean()
+        - contact_theory(config).steady_force(velocity) / count
     ) < (3 * error)
     held = time[(time > 800) & (time <= 1100)]
-    expected = hold_force(config, velocity, held[9::140] - 800) / count
+    expected = contact_theory(config).hold_force(velocity, held[9::140] - 800) / count
     np.testing.assert_allclose(force[np.isin(time, held[9::140])], expected, atol=4 * error)
-    predicted = restart(config, velocity, hold)
+    predicted = contact_theory(config).restart(velocity, hold)
     again = (time >= 1100) & (time <= 1200)
     at = np.interp(velocity * (time[again] - 1100), predicted.displacement, predicted.force / count)
     np.testing.assert_allclose(force[again], at, atol=4 * error)
@@ -94,26 +91,29 @@ def test_hold_and_restart_are_those_of_contacts_one_by_one(delay):
         ).mean()
     )
     assert abs(height) < 2 * error
-    assert predicted.peak / count - steady_force(config, velocity) / count > 4 * error
+    assert (
+        predicted.peak / count - contact_theory(config).steady_force(velocity) / count > 4 * error
+    )
 
 
 def test_a_restart_without_a_hold_is_steady():
     config = unit(1, contacts__delay=5.0, contacts__ageing=LOG)
-    force = restart(config, 1e-2, 0.0).force
-    np.testing.assert_allclose(force, steady_force(config, 1e-2), rtol=2e-3)
+    force = contact_theory(config).restart(1e-2, 0.0).force
+    np.testing.assert_allclose(force, contact_theory(config).steady_force(1e-2), rtol=2e-3)
 
 
 def test_holds_in_which_newborn_contacts_break_are_refused():
     config = unit(1, contacts__back_force_ratio=0.5)
     with pytest.raises(MesoslipError, match="attach in it with the back force"):
-        hold_force(config, 1e-2, 1e6)
+        contact_theory(config).hold_force(1e-2, 1e6)
 
 
 def test_a_newborn_width_is_refused():
     config = unit(1, contacts__newborn_width=0.05)
-    for function in (steady_force, steady_slope, creep_velocity):
+    theory = contact_theory(config)
+    for function in (theory.steady_force, theory.steady_slope, theory.creep_velocity):
         with pytest.raises(MesoslipError, match="newborn_width"):
-            function(config, 0.1)
+            function(0.1)
 
 
 def klein_activated(rate: float, ratio: float, ageing: dict | None = None, **changes) -> Config:
@@ -135,20 +135,18 @@ def test_without_temperature_the_response_is_that_of_contacts_without():
     cold = SteadySliding(Config.from_dict(tables))
     frequency = np.array([10.0, 100.0, 400.0])
     np.testing.assert_allclose(
-        ActivatedSliding(warm).response(frequency), cold.response(frequency), rtol=1e-5
+        sliding_of(warm).response(frequency), cold.response(frequency), rtol=1e-5
     )
 
 
 def test_a_slow_change_has_the_steady_slope():
-    sliding = ActivatedSliding(
-        klein_activated(1e4, 0.1, {"law": "log", "time": 1e-3, "growth": 0.02})
-    )
-    slope = steady_slope(sliding.config, 1e-6) / 1e-6
+    sliding = sliding_of(klein_activated(1e4, 0.1, {"law": "log", "time": 1e-3, "growth": 0.02}))
+    slope = contact_theory(sliding.config).steady_slope(1e-6) / 1e-6
     assert complex(sliding.response_at(1e-3)).real / 1e-3 == pytest.approx(slope, rel=1e-4)
 
 
 def test_fast_motion_joins_slower_motion():
-    sliding = ActivatedSliding(klein_activated(1e4, 0.2))
+    sliding = sliding_of(klein_activated(1e4, 0.2))
     lives = sliding.lives
     limit = 20 * lives.speed / lives.scale
     below, above = sliding.response(np.array([0.999, 1.001]) * limit)
@@ -214,7 +212,7 @@ def test_response_is_that_of_cohorts_in_small_steps(ageing, delay):
     force, times = cohort_force(config, step, path, 6), times[1:]
     last = times > times[-1] - 2 * period + step / 2
     found = 2j * np.mean(force[last] * np.exp(-1j * frequency * times[last])) / amplitude
-    expected = complex(ActivatedSliding(config).response(frequency))
+    expected = complex(sliding_of(config).response(frequency))
     assert abs(found - expected) < 0.02 * abs(expected)
 
 
@@ -241,7 +239,7 @@ def test_rate_and_state_are_those_of_a_velocity_step_of_cohorts(velocity, ageing
     )
     change = (up - down) / logarithm
     displacement = velocity * times[1:]
-    found = ActivatedSliding(config).rate_and_state
+    found = sliding_of(config).rate_and_state
     early = (displacement > 6 * ratio) & (displacement < 0.5)
     direct = np.polyfit(displacement[early], change[early], 3)[-1]
     assert found.a == pytest.approx(direct, rel=0.03)
@@ -255,11 +253,11 @@ def test_the_critical_stiffness_divides_stable_from_unstable_springs():
     config = klein_activated(
         1e4, 0.1, {"law": "log", "time": 1e-3, "growth": 0.2}, **{"contacts.delay": 0.0}
     )
-    limit = ActivatedSliding(config).critical_stiffness
+    limit = sliding_of(config).critical_stiffness
     assert limit is not None
     stiffness, _ = limit
     for factor, is_stable in ((0.97, False), (1.03, True)):
-        sliding = ActivatedSliding(config.replace({"slider.stiffness": factor * stiffness}))
+        sliding = sliding_of(config.replace({"slider.stiffness": factor * stiffness}))
         assert sliding.is_stable == is_stable
 
 
@@ -275,7 +273,7 @@ def test_rate_and_state_of_narrow_thresholds(velocity, ratio, growth, back):
             "contacts.back_force_ratio": back,
         }
     )
-    found = ActivatedSliding(config, velocity).rate_and_state
+    found = sliding_of(config, velocity).rate_and_state
     narrow = rate_and_state_of_narrow_thresholds(config, velocity)
     assert found.a == pytest.approx(narrow.a, rel=0.03)
     assert found.b == pytest.approx(narrow.b, rel=0.01)
@@ -300,5 +298,5 @@ def test_run_prints_the_velocity_of_creep_under_a_force(tmp_path, command):
     assert "stick-slip" not in printed
     found = re.search(r"mean velocity in the last stage: ([\d.]+) nm/s", printed)
     assert found is not None
-    expected = creep_velocity(Config.from_dict(tables), 7.8e-6)
+    expected = contact_theory(Config.from_dict(tables)).creep_velocity(7.8e-6)
     assert float(found[1]) * 1e-9 == pytest.approx(expected, rel=0.15)

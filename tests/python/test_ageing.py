@@ -13,7 +13,7 @@ from mesoslip import Config, ConfigError
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.runner import run_realizations
-from mesoslip.theory.ageing import mean_life, restart_peak, steady_force
+from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import Contacts, aged, ageing_force, fixed_step, stationary_force
 from scipy import optimize, stats
@@ -330,17 +330,25 @@ def test_steady_force_of_the_master_equation(klein, law, width, resolution, boun
 def test_steady_force_of_info_is_that_of_the_integral(klein, law):
     config = klein(**steady(law, 0.3, 1e-6))
     for velocity in VELOCITIES:
-        assert steady_force(config, velocity) == pytest.approx(
+        assert contact_theory(config).steady_force(velocity) == pytest.approx(
             ageing_force(config, velocity), rel=1e-11
         )
-    assert steady_force(config, 0.0) == pytest.approx(steady_force(config, 1e-11), rel=1e-9)
-    assert steady_force(config, math.inf) == pytest.approx(steady_force(config, 1.0), rel=1e-6)
-    assert mean_life(config, 0.0) == pytest.approx(mean_life(config, 1e-11), rel=1e-9)
+    assert contact_theory(config).steady_force(0.0) == pytest.approx(
+        contact_theory(config).steady_force(1e-11), rel=1e-9
+    )
+    assert contact_theory(config).steady_force(math.inf) == pytest.approx(
+        contact_theory(config).steady_force(1.0), rel=1e-6
+    )
+    assert contact_theory(config).mean_life(0.0) == pytest.approx(
+        contact_theory(config).mean_life(1e-11), rel=1e-9
+    )
     plain = klein(
         **steady(law, 0.3, 1e-6, contacts__delay=5e-4, contacts__drag_rate=2e11)
         | {"contacts__ageing": LOG | {"growth": 0.0}}
     )
-    assert steady_force(plain, 1e-6) == pytest.approx(stationary_force(plain, 1e-6), rel=1e-11)
+    assert contact_theory(plain).steady_force(1e-6) == pytest.approx(
+        stationary_force(plain, 1e-6), rel=1e-11
+    )
 
 
 @pytest.mark.parametrize("slider", ["prescribed", "rigid"])
@@ -416,9 +424,9 @@ def test_restart_peak_is_that_of_its_formula(klein, growth, width):
     )
     stages = mesoslip.run(config)["stages"].to_dataset()
     peaks = stages["max_force"].values[[2, 4]]
-    steady_sliding = steady_force(config, 1e-6)
-    expected = np.array([restart_peak(config, 1e-6, hold) for hold in holds])
-    assert restart_peak(config, 1e-6, 0.0) == pytest.approx(steady_sliding, rel=1e-9)
+    steady_sliding = contact_theory(config).steady_force(1e-6)
+    expected = np.array([contact_theory(config).restart_peak(1e-6, hold) for hold in holds])
+    assert contact_theory(config).restart_peak(1e-6, 0.0) == pytest.approx(steady_sliding, rel=1e-9)
     np.testing.assert_allclose(
         peaks - steady_sliding, expected - steady_sliding, rtol=0.02, atol=2e-4 * STATIC
     )

@@ -17,8 +17,8 @@ from mesoslip.cycles.cycle import master_equation
 from mesoslip.cycles.section import Motion
 from mesoslip.cycles.settling import _Settling
 from mesoslip.simulation.archive import Archive
-from mesoslip.theory.steady_sliding import SteadySliding
-from mesoslip.theory.thermal import steady_force
+from mesoslip.theory.contacts import contact_theory
+from mesoslip.theory.contacts.plain_sliding import SteadySliding
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
@@ -262,7 +262,7 @@ def test_motion_goes_on_at_another_temperature():
     changed = adapted(words, cold, warm)
     assert elastic_force(changed) == pytest.approx(elastic_force(words), rel=1e-9)
     after = Motion(warm).go_on(changed, 40e-3)[1]
-    forces = [steady_force(one, 3e-6) for one in (cold, warm)]
+    forces = [contact_theory(one).steady_force(3e-6) for one in (cold, warm)]
     assert forces[1] < 0.95 * forces[0]
     found = [float(np.mean(one["contact_force"][len(one) // 2 :])) for one in (before, after)]
     assert found == pytest.approx(forces, rel=0.01)

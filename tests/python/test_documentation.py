@@ -282,7 +282,7 @@ def test_names_of_the_glossary_are_those_of_the_program():
     from mesoslip.analysis.rate_and_state import rows
     from mesoslip.configuration.messages import all_keys
     from mesoslip.output import variables
-    from mesoslip.theory import force_curve_dataset, slip_onset
+    from mesoslip.theory import curve, slip_onset
     from mesoslip.theory.derived import derived
 
     text = (DOCS / "glossary.md").read_text(encoding="utf-8")
@@ -294,7 +294,7 @@ def test_names_of_the_glossary_are_those_of_the_program():
         *(f"mesoslip {name}" for name in typer.main.get_command(app).commands),
         *(name for group in groups for name in group),
         *derived(ROOT / "runs" / "klein.toml"),
-        *force_curve_dataset.SUMMARY,
+        *curve.SUMMARY,
         *slip_onset.SUMMARY,
         *rows.FIT,
         *slips.MEANINGS,

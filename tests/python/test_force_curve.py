@@ -8,6 +8,7 @@ import pytest
 from conftest import long
 from mesoslip import _core
 from mesoslip.simulation.kernel import named
+from mesoslip.theory.curve import curve_tree
 from mesoslip.theory.derived import ESTIMATE_RANGE, derived, verdict
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.lives import law_parameters
@@ -315,7 +316,7 @@ def test_a_force_that_only_rises_has_no_peak_and_no_instability(klein, law, widt
     assert "does not fall" in curve.verdict
     # The widest law is far from stationary at the end of the curve, and it is said.
     assert ("longer curve.length" in curve.verdict) == (width > 1.5)
-    assert curve.to_tree().attrs["comment"] == curve.verdict
+    assert curve_tree(curve).attrs["comment"] == curve.verdict
 
 
 def test_a_stationary_start_has_no_peak(klein):

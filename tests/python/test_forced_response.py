@@ -11,7 +11,7 @@ import pytest
 from conftest import klein_tables
 from mesoslip import Config
 from mesoslip.analysis.response import rows_of, scalars_of
-from mesoslip.theory.thermal import creep_force, creep_velocity, steady_slope
+from mesoslip.theory.contacts import contact_theory
 
 SLIDER = {"kind": "force", "mass": 1.47e-3, "damping": 500.0}
 
@@ -44,11 +44,11 @@ def test_creep_velocities_are_those_of_the_theory(creep, creeping):
     rows = rows_of(found, "creep")
     assert [row["force"] for row in rows] == pytest.approx([7.6e-6, 8.2e-6])
     for row in rows:
-        expected = creep_velocity(creep, row["force"])
-        assert creep_force(creep, expected) == pytest.approx(row["force"])
+        expected = contact_theory(creep).creep_velocity(row["force"])
+        assert contact_theory(creep).creep_force(expected) == pytest.approx(row["force"])
         assert abs(row["velocity"] - expected) < 4 * row["velocity_error"] < 0.4 * expected
     slope = scalars_of(found, "creep")["creep_rate_dependence"]
-    assert slope == pytest.approx(steady_slope(creep, rows[0]["velocity"]), rel=0.2)
+    assert slope == pytest.approx(contact_theory(creep).steady_slope(rows[0]["velocity"]), rel=0.2)
     for name in ("steady", "steps", "holds", "ramps", "rate_and_state"):
         assert not rows_of(found, name)
 

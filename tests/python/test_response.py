@@ -17,7 +17,7 @@ from mesoslip import Config, FileError
 from mesoslip.analysis.rate_and_state import Loading, RateAndState, spring_slider
 from mesoslip.analysis.response import line, rows_of, scalars_of, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
-from mesoslip.theory.activated_sliding import ActivatedSliding
+from mesoslip.theory.steady_sliding import sliding_of
 from response_coverage import autoregression, steady_coverage
 
 # F_s = 18 uN and a mean breaking stretch of 9 nm.
@@ -462,7 +462,7 @@ def test_contacts_are_the_spring_of_a_prescribed_slider():
             "output.slip_interval": None,
         }
     )
-    known = ActivatedSliding(config, math.sqrt(1e-11)).rate_and_state
+    known = sliding_of(config, math.sqrt(1e-11)).rate_and_state
     found = rows_of(mesoslip.response(mesoslip.run(config), free_stiffness=True), "rate_and_state")[
         0
     ]

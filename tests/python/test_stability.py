@@ -13,8 +13,8 @@ from mesoslip import Config, SteadySliding
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.theory import steady_curve
-from mesoslip.theory.activated_sliding import ActivatedSliding, RateAndState
-from mesoslip.theory.ageing_sliding import AgeingSliding
+from mesoslip.theory.contacts.ageing_sliding import AgeingSliding
+from mesoslip.theory.contacts.thermal_sliding import RateAndStateTheory
 from mesoslip.theory.critical_spring import critical_spring
 from mesoslip.theory.steady_sliding import sliding_of, stability_boundary, steady_sliding
 from test_steady_sliding import study
@@ -88,7 +88,7 @@ def test_the_engine_answers_as_the_theory(contacts, velocity):
 
 def test_the_critical_spring_of_rate_and_state_is_that_of_rice_and_ruina():
     """Exactly, with the response of one state, at three masses."""
-    law, velocity = RateAndState(0.2e-6, 0.5e-6, 3e-9), 1e-7
+    law, velocity = RateAndStateTheory(0.2e-6, 0.5e-6, 3e-9), 1e-7
 
     def response(frequency):
         rate = 1j * frequency / velocity
@@ -193,7 +193,7 @@ def test_the_critical_spring_of_contacts_is_near_that_of_rate_and_state(klein, g
             contacts__thermal={"rate": 1e4, "force_ratio": ratio},
             slider={"mass": mass, "stiffness": 97.0, "damping": 0.0},
         )
-        found = ActivatedSliding(config)
+        found = sliding_of(config)
         expected = found.rate_and_state.critical_stiffness(config.drive_speed, mass)
         assert found.critical_stiffness is not None
         assert 0.75 < found.critical_stiffness[0] / expected < 1.35
@@ -266,5 +266,5 @@ def test_sweeps_measure_the_growth_of_creep(klein):
     config = sliding(klein, contacts__thermal=HOT, drive__velocity=1e-6)
     found = steady_sliding(config, 10**6)
     assert found is not None
-    assert found.growth_rate == ActivatedSliding(config).growth_rate
+    assert found.growth_rate == sliding_of(config).growth_rate
     assert found.work < 10**4

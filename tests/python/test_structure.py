@@ -192,12 +192,22 @@ def test_python_imports_point_one_way():
     assert result.returncode == 0, result.stdout
 
 
+# A line that asks whether contacts have a feature: by its table, or by the name of that.
+FEATURE = r"(ageing|thermal|activated|interaction|load|track)"
+FEATURE_FLAG = (
+    rf"\b{FEATURE}\s+(is|==|!=)\s|\b{FEATURE}\s*[!=]=\s*None"
+    rf"|\b(if|elif|and|or|not|bool\()\s*(not )?\(?(\w+\.)+{FEATURE}\s*(:|\)|$|and\b|or\b|else\b)"
+    rf"|[gh](et|as)attr\([^)]*[\"']{FEATURE}[\"']"
+)
+
+
 @pytest.mark.parametrize(
     "pattern",
     [
         r"isinstance\([^)]*(Slider|Contacts)\b",
         r"\bkind\s*[!=]=\s*[\"'](rigid|layered|prescribed|quasistatic)",
         r"\bengine\s*[!=]=\s*[\"'](eq|me)",
+        FEATURE_FLAG,
     ],
 )
 def test_nobody_asks_for_a_kind(pattern):
@@ -211,6 +221,22 @@ def test_nobody_asks_for_a_kind(pattern):
         if re.search(pattern, line)
     ]
     assert asking == []
+
+
+@pytest.mark.parametrize(
+    "planted",
+    [
+        "if config.contacts.ageing is not None:",
+        "thermal = 1 if contacts.thermal is None else 2",
+        "if self.config.interaction:",
+        "return not config.contacts.thermal",
+        "x = bool(contacts.ageing)",
+        'if getattr(contacts, "ageing", None):',
+        "if contacts.load != None:",
+    ],
+)
+def test_a_planted_flag_of_a_kind_is_found(planted):
+    assert re.search(FEATURE_FLAG, planted)
 
 
 def test_sliders_are_the_same_on_both_sides():

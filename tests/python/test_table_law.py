@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config, ConfigError, ThresholdLaw
-from mesoslip.theory.ageing import steady_force as ageing_force
+from mesoslip.theory.contacts import contact_theory
+from mesoslip.theory.contacts.plain_sliding import SteadySliding
 from mesoslip.theory.force_curve import ForceCurve
-from mesoslip.theory.steady_sliding import SteadySliding
-from mesoslip.theory.thermal import steady_force as thermal_force
 
 PLAIN = {
     "contacts__back_force_ratio": 0.0,
@@ -94,12 +93,10 @@ def test_theories_of_lives_agree_with_that_of_the_exponential_law(klein):
     """Ageing and activation have a quadrature of their own."""
     ageing = {"law": "log", "time": 1e-3, "growth": 0.05}
     thermal = {"rate": 1e3, "force_ratio": 0.05}
-    for key, table, force in (
-        ("contacts__ageing", ageing, ageing_force),
-        ("contacts__thermal", thermal, thermal_force),
-    ):
+    for key, table in (("contacts__ageing", ageing), ("contacts__thermal", thermal)):
+        changes = {"contacts__coupling": "equal", key: table}
         ours, theirs = (
-            force(klein(contacts__threshold=law, contacts__coupling="equal", **{key: table}), 1e-6)
+            contact_theory(klein(contacts__threshold=law, **changes)).steady_force(1e-6)
             for law in (exponential(3000), {"law": "exponential", "relative_width": 1.0})
         )
         assert ours == pytest.approx(theirs, rel=2e-3)

@@ -8,9 +8,9 @@ import pytest
 from conftest import klein_tables
 from mesoslip import Config, ConfigError
 from mesoslip.configuration.threshold_laws.table import stretch_cells
+from mesoslip.theory.contacts.plain_sliding import SteadySliding
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.life_transforms import LifeTransforms
-from mesoslip.theory.steady_sliding import SteadySliding
 
 PRESCRIBED = {
     "contacts__delay": 0.0,

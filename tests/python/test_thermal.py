@@ -11,7 +11,7 @@ import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
-from mesoslip.theory.thermal import hold_force, steady_force, steady_slope
+from mesoslip.theory.contacts import contact_theory
 from oracles import aged, fixed_step, frozen_law, uniforms
 from scipy import integrate, special
 from test_events import breaks
@@ -51,11 +51,11 @@ def unit(count: int = 1000, **changes: Any) -> Config:
 
 @pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.3721068), (1e-2, 0.4634253)])
 def test_theory_has_the_known_steady_forces(velocity, force):
-    assert steady_force(unit(1), velocity) == pytest.approx(force, abs=5e-8)
+    assert contact_theory(unit(1)).steady_force(velocity) == pytest.approx(force, abs=5e-8)
 
 
 def test_theory_has_the_known_force_of_a_hold():
-    held = hold_force(unit(1), 1e-2, [0.0, 10.0])
+    held = contact_theory(unit(1)).hold_force(1e-2, [0.0, 10.0])
     np.testing.assert_allclose(held, [0.4634253, 0.4148345], atol=5e-8)
 
 
@@ -93,7 +93,7 @@ def test_steady_force_is_that_of_a_plain_quadrature(law, ratio):
         / frozen.sf(back)
         for power in (1, 0)
     )
-    assert steady_force(config, velocity) == pytest.approx(
+    assert contact_theory(config).steady_force(velocity) == pytest.approx(
         work / (mean + velocity * delay), rel=1e-5
     )
 
@@ -102,15 +102,17 @@ def test_slope_is_the_derivative_of_the_force():
     config = unit(1, contacts__delay=3.0, contacts__back_force_ratio=0.05)
     change = 1e-4
     for velocity in (1e-8, 1e-3, 1.0):
-        around = [steady_force(config, velocity * math.exp(s * change)) for s in (-1, 1)]
+        around = [
+            contact_theory(config).steady_force(velocity * math.exp(s * change)) for s in (-1, 1)
+        ]
         slope = (around[1] - around[0]) / (2 * change)
-        assert steady_slope(config, velocity) == pytest.approx(slope, abs=1e-8)
+        assert contact_theory(config).steady_slope(velocity) == pytest.approx(slope, abs=1e-8)
 
 
 def test_slope_is_half_the_force_scale_where_no_contact_comes_to_its_threshold():
     config = unit(1, contacts__threshold__relative_width=1e-3)
     config = config.replace({"contacts.thermal.force_ratio": 0.01})
-    assert steady_slope(config, 1e-8) == pytest.approx(0.005, rel=0.02)
+    assert contact_theory(config).steady_slope(1e-8) == pytest.approx(0.005, rel=0.02)
 
 
 def breaking_stretch(config: Config, contact: int, renewal: int, velocity: float) -> float:
@@ -249,7 +251,7 @@ def test_steady_sliding_has_the_force_of_the_theory(changes):
     blocks = force[-700:].reshape(7, 100).mean(axis=1)
     error = blocks.std(ddof=1) / math.sqrt(7)
     assert error < 5e-3 * 2000
-    expected = steady_force(config, config.drive_speed)
+    expected = contact_theory(config).steady_force(config.drive_speed)
     assert abs(blocks.mean() - expected) < 4 * error
 
 
@@ -310,7 +312,7 @@ def test_a_hold_of_a_million_seconds():
     for wanted in (100.0, 1e4, 1e6 - 1e3):
         at = int(np.argmin(np.abs(time - wanted)))
         force = tree["spring_force"].values[0, at] / count
-        expected = float(hold_force(config, 1e-2, time[at])) / count
+        expected = float(contact_theory(config).hold_force(1e-2, time[at])) / count
         assert abs(force - expected) < 4 * 0.3 / math.sqrt(count)
     assert abs(float(tree["energy_residual"].values[0])) < 1e-12
 

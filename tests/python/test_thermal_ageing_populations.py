@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kinds import RELAX, configuration
 from mesoslip import Config, Realization
-from mesoslip.theory.thermal import steady_force
+from mesoslip.theory.contacts import contact_theory
 from test_thermal import unit
 from test_thermal_populations import COUNT, extrapolated_force, finished
 
@@ -32,7 +32,7 @@ def test_steady_force_is_that_of_the_theory(threshold, ageing, ratio, velocity):
         "contacts__ageing": ageing,
         "contacts__thermal": {"rate": 1.0, "force_ratio": ratio},
     }
-    expected = steady_force(unit(COUNT, **changes), velocity) / COUNT
+    expected = contact_theory(unit(COUNT, **changes)).steady_force(velocity) / COUNT
     assert extrapolated_force(velocity, 12.0, **changes) == pytest.approx(expected, rel=5e-4)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError, Realization
-from mesoslip.theory.thermal import creep_velocity, hold_force, steady_force
+from mesoslip.theory.contacts import contact_theory
 from test_thermal import unit
 
 # Units of f_s, k and ω_0.
@@ -73,7 +73,7 @@ def test_steady_force_of_other_laws_with_delay_and_back_force(threshold, ratio, 
         "contacts__back_force_ratio": 0.1,
         "contacts__delay": 0.1 / velocity,
     }
-    expected = steady_force(unit(COUNT, **changes), velocity) / COUNT
+    expected = contact_theory(unit(COUNT, **changes)).steady_force(velocity) / COUNT
     assert extrapolated_force(velocity, 12.0, **changes) == pytest.approx(expected, rel=5e-4)
 
 
@@ -93,7 +93,9 @@ def test_hold_relaxes_as_the_closed_form_over_five_decades():
     trace = finished(config).trace
     held = trace[np.searchsorted(trace[:, 0], slide + times - 1.0)]
     np.testing.assert_allclose(held[:, 0] - slide, times)
-    np.testing.assert_allclose(held[:, 5], hold_force(config, velocity, times), rtol=3e-4)
+    np.testing.assert_allclose(
+        held[:, 5], contact_theory(config).hold_force(velocity, times), rtol=3e-4
+    )
 
 
 def test_creep_under_a_force_is_the_inverse_of_the_steady_force():
@@ -103,7 +105,7 @@ def test_creep_under_a_force_is_the_inverse_of_the_steady_force():
             "drive": {"force": force * COUNT},
             "contacts__threshold__relative_width": 0.2,
         }
-        velocity = creep_velocity(unit(COUNT, **changes), force * COUNT)
+        velocity = contact_theory(unit(COUNT, **changes)).creep_velocity(force * COUNT)
         duration = 12 / velocity
         config = unit(
             COUNT,

@@ -17,7 +17,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 from mesoslip import Config
-from mesoslip.theory.ageing import restart_peak, steady_force
+from mesoslip.theory.contacts import contact_theory
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -57,7 +57,9 @@ def compare_holds() -> None:
             for engine in ("me", "eq"):
                 config, peaks = held_peaks(growth, width, engine)
                 slopes.append(per_decade(peaks))
-            expected = np.array([restart_peak(config, VELOCITY, hold) for hold in HOLDS])
+            expected = np.array(
+                [contact_theory(config).restart_peak(VELOCITY, hold) for hold in HOLDS]
+            )
             formula = per_decade(expected / config.contacts.static_force)
             print(
                 f"width {width}, growth {growth}: formula {formula:.5f}, me {slopes[0]:.5f}, "
@@ -120,7 +122,7 @@ def compare_steps() -> None:
                 tree = mesoslip.run(config)
                 time, force = tree["time"].values, tree["contact_force"].values[0]
                 static = config.contacts.static_force
-                old, new = (steady_force(config, one) for one in (before, after))
+                old, new = (contact_theory(config).steady_force(one) for one in (before, after))
                 later = time > stages[0]["duration"]
                 way_after = (time[later] - stages[0]["duration"]) * after
                 area = np.trapezoid(force[later] - new, way_after) / (old - new)
@@ -179,7 +181,7 @@ def compare_steady() -> None:
             error = blocks.std(ddof=1) / math.sqrt(20)
             tree = mesoslip.run(Config.load(RUNS / "klein.toml", own + infinite), executor=1)
             limit = tree["contact_force"].values[0][-2000:].mean() / static
-            expected = steady_force(config, velocity) / static
+            expected = contact_theory(config).steady_force(velocity) / static
             print(
                 f"{law} {width}, {1e6 * velocity:g} um/s: integral {expected:.7f}, me {limit:.7f}, "
                 f"eq {blocks.mean():.4f} +- {error:.4f}",

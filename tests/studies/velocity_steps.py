@@ -21,8 +21,9 @@ from matplotlib import pyplot as plt
 from mesoslip import Config
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.response import response_of, rows_of
-from mesoslip.theory.activated_sliding import ActivatedSliding, RateAndState
-from mesoslip.theory.thermal import steady_force
+from mesoslip.theory.contacts import contact_theory
+from mesoslip.theory.contacts.thermal_sliding import RateAndStateTheory
+from mesoslip.theory.steady_sliding import sliding_of
 
 ROOT = Path(__file__).parents[2]
 # f_T/f_s, with a growth of 0.05.
@@ -51,9 +52,9 @@ def stepped(ratio: float, velocity: float) -> Config:
     )
 
 
-def theory(config: Config, velocity: float) -> RateAndState:
+def theory(config: Config, velocity: float) -> RateAndStateTheory:
     """a, b and D_c by the formulas."""
-    return ActivatedSliding(config, velocity).rate_and_state
+    return sliding_of(config, velocity).rate_and_state
 
 
 def report(config: Config, tree: xr.DataTree, velocity: float) -> dict[str, Any]:
@@ -62,7 +63,9 @@ def report(config: Config, tree: xr.DataTree, velocity: float) -> dict[str, Any]
     static, middle = config.contacts.static_force, math.sqrt(10) * velocity
     found = mesoslip.response(tree)
     known = theory(config, middle)
-    forces = [steady_force(config, one) / static for one in (velocity, 10 * velocity)]
+    forces = [
+        contact_theory(config).steady_force(one) / static for one in (velocity, 10 * velocity)
+    ]
     print(f"{velocity:.0e} m/s, f_T = {config.contacts.thermal.force_ratio} f_s")
     for row, force in zip(rows_of(found, "steady"), (*forces, forces[0]), strict=True):
         print(
@@ -108,11 +111,15 @@ def main(target: Path) -> None:
             fits.append(report(config, tree, velocity))
             force = tree["spring_force"].values.mean(axis=0) / static
             moved = tree["displacement"].values[0] * 1e9
-            level = steady_force(config, velocity) / static
+            level = contact_theory(config).steady_force(velocity) / static
             for start, sign in ((STAGE * 1e9, 1), (2 * STAGE * 1e9, -1)):
                 inside = (moved > start - 2) & (moved < start + 14)
                 label = f"{velocity * 1e6:g} to {velocity * 1e7:g} µm/s" if sign > 0 else None
-                before = level if sign > 0 else steady_force(config, 10 * velocity) / static
+                before = (
+                    level
+                    if sign > 0
+                    else contact_theory(config).steady_force(10 * velocity) / static
+                )
                 panels[0, column].plot(
                     moved[inside] - start,
                     force[inside] - before,

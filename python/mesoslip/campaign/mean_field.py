@@ -292,7 +292,7 @@ def mean_field(config: ConfigLike) -> MeanField:
         If a cascade of contacts does not end, or there are too few lives for a table.
     """
     checked = as_config(config)
-    if checked.interaction is None:
+    if not checked.contact_kind.on_lattice:
         message = "needed: without neighbours the master equation is exact for many contacts"
         raise ConfigError([Problem("", "interaction", message)])
     if not checked.contacts.reattach:

@@ -68,12 +68,12 @@ def waiting_over_damping(tree: xr.DataTree) -> float:
 
 
 def _critical_stiffness_ratio(config: Config) -> float:
+    from mesoslip.theory.contacts import contact_theory
+
     spring = config.series_stiffness
-    contacts = config.contacts
-    depends_on_time = contacts.ageing is not None or contacts.thermal is not None
-    if not 0 < spring < math.inf or depends_on_time:
+    if not 0 < spring < math.inf or contact_theory(config).depends_on_velocity:
         return math.nan
-    length = CURVE_LENGTH * contacts.break_stretch
+    length = CURVE_LENGTH * config.contacts.break_stretch
     # F(X) depends on neither, which many maps vary.
     alike = {"slider.kind": "prescribed", "contacts.delay": 0.0, "curve.length": length}
     return _critical_stiffness(config.replace(alike)) / spring

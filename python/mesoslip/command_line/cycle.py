@@ -14,6 +14,7 @@ from mesoslip.command_line.options import (
     JsonOption,
     SetOption,
     load,
+    print_caveat,
     print_json,
     print_table,
     quantity,
@@ -76,10 +77,7 @@ def cycle(
     checked = load(config, changes)
     if output is not None:
         targets.check_output(output, [config, *([] if start is None else [start])])
-    if checked.interaction is not None and checked.interaction.strength > 0:
-        typer.echo(
-            "computed without [interaction]: the master equation has no neighbours", err=True
-        )
+    print_caveat(checked)
     if continued is not None:
         _follow(checked, continued, start, output, as_json=as_json, quiet=quiet)
         return

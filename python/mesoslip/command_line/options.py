@@ -218,3 +218,12 @@ def quantity_or_none(
 def time_of(text: str, option: str) -> float:
     """The value of an option that is a time [s]."""
     return quantity(text, option, "s", "2 s")
+
+
+def print_caveat(config: Config) -> None:
+    """Print what theory leaves out of the contacts of a configuration."""
+    from mesoslip.theory.contacts import contact_theory
+
+    caveat = contact_theory(config).caveat
+    if caveat:
+        typer.echo(caveat, err=True)

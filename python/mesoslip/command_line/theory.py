@@ -14,6 +14,7 @@ from mesoslip.command_line.options import (
     JsonOption,
     SetOption,
     load,
+    print_caveat,
     print_json,
     show,
 )
@@ -73,24 +74,26 @@ def curve(
     and the stiffness above which sliding is linearly stable.
     """
     from mesoslip.output import targets
+    from mesoslip.theory.contacts import contact_theory
+    from mesoslip.theory.curve import SUMMARY, curve_tree
     from mesoslip.theory.force_curve import ForceCurve
-    from mesoslip.theory.force_curve_dataset import SUMMARY
-    from mesoslip.theory.steady_sliding import depends_on_velocity, steady_sliding
+    from mesoslip.theory.steady_sliding import steady_sliding
 
     checked = load(config, changes)
     if output is not None:
         targets.check_output(output, [config])
-    _warn_of_interaction(checked)
-    if output is not None or depends_on_velocity(checked):
+    print_caveat(checked)
+    is_over_velocity = contact_theory(checked).depends_on_velocity
+    if output is not None or is_over_velocity:
         import_xarray()
-    if depends_on_velocity(checked):
+    if is_over_velocity:
         _steady_curve(checked, output, as_json=as_json)
         return
     force_curve = ForceCurve(checked)
     if output is not None:
         from mesoslip.output import writing
 
-        writing.write(force_curve.to_tree(), output)
+        writing.write(curve_tree(force_curve), output)
     summary = force_curve.summary()
     if as_json:
         print_json(summary)
@@ -129,7 +132,7 @@ def onset(
     checked = load(config, changes)
     if output is not None:
         targets.check_output(output, [config])
-    _warn_of_interaction(checked)
+    print_caveat(checked)
     tree = slip_onset.onset(checked)
     if output is not None:
         writing.write(tree, output)
@@ -229,11 +232,3 @@ def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
         "linear limits: a large oscillation may be possible above them too, and no more than a "
         f"small one below them: {shown_by(config)}"
     )
-
-
-def _warn_of_interaction(config: Config) -> None:
-    """Warn that the master equation ignores interaction."""
-    if config.interaction is not None and config.interaction.strength > 0:
-        typer.echo(
-            "computed without [interaction]: the master equation has no neighbours", err=True
-        )

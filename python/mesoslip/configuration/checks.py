@@ -150,22 +150,6 @@ def output_problems(config: Setting) -> Complaints:
         )
 
 
-def newborn_problems(config: Setting) -> Complaints:
-    """Errors of the width of the force at which contacts attach."""
-    contacts = config.contacts
-    width = contacts.newborn_width
-    if width == 0:
-        return
-    key = "contacts.newborn_width"
-    if contacts.ageing is not None:
-        yield Complaint(
-            key,
-            "must be 0 with contacts.ageing: whether a contact attaches is decided by its "
-            "configured threshold, not by that of a young one",
-            width,
-        )
-
-
 def curve_problems(config: Setting) -> Complaints:
     """Errors that concern the force curve."""
     width, stretch = config.curve.newborn_width, config.contacts.break_stretch

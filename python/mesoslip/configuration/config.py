@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import html
 import math
 from collections.abc import Iterable, Mapping
@@ -13,8 +14,8 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from mesoslip.configuration import checks
-from mesoslip.configuration.contacts import contact_kind
-from mesoslip.configuration.contacts.base import ContactKind
+from mesoslip.configuration.contacts import contact_kind, is_in_both_engines
+from mesoslip.configuration.contacts.base import COMMON_KEYS, ContactKind, given_keys
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
@@ -40,6 +41,8 @@ from mesoslip.quantities import with_unit
 SAMPLES_IN_RINGING = 50
 SAMPLES_IN_DELAY = 5
 SAMPLES_IN_SLIPS = 20_000
+# Tables and keys that do not describe contacts; all others have to be answered by their kind.
+OTHER_TABLES = frozenset({"title", "run", "drive", "slider", "contacts", "output", "curve"})
 
 
 class Config(Table):
@@ -131,17 +134,35 @@ class Config(Table):
         complaints = [
             *checks.drive_problems(self),
             *self.slider.problems(self),
-            *self.contact_kind.problems(self),
-            *checks.newborn_problems(self),
+            *self.contact_kind.problems(self, self.given_contact_keys),
             *checks.curve_problems(self),
         ]
         # Output intervals are compared with the duration, which a wrong drive does not have.
         return complaints or [*checks.output_problems(self)]
 
+    @cached_property
+    def given_contact_keys(self) -> frozenset[str]:
+        """Keys of [contacts] that differ from their defaults, and tables that act on contacts."""
+        beside = {name: getattr(self, name) for name in type(self).model_fields}
+        return given_keys(
+            self.contacts, {name: one for name, one in beside.items() if name not in OTHER_TABLES}
+        )
+
     @property
+    def contact_features(self) -> dict[str, Any]:
+        """Values of the given keys and tables that not all kinds of contacts answer, by key."""
+        keys = sorted(self.given_contact_keys - COMMON_KEYS)
+        return {key: functools.reduce(getattr, key.split("."), self) for key in keys}
+
+    @cached_property
     def contact_kind(self) -> ContactKind:
         """The kind of contacts."""
-        return contact_kind(self.run, self.contacts, self.interaction)
+        return contact_kind(self.run.engine, self.given_contact_keys, self.interaction)
+
+    @property
+    def has_master_equation(self) -> bool:
+        """Whether the same contacts can be followed one by one and for N → ∞."""
+        return is_in_both_engines(self.given_contact_keys)
 
     @property
     def curve_length(self) -> float:
@@ -191,11 +212,6 @@ class Config(Table):
         return steady.displacement or loading
 
     @property
-    def bond_stiffness(self) -> float:
-        """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without interaction."""
-        return 0.0 if self.interaction is None else self.interaction.bond_stiffness(self.contacts)
-
-    @property
     def spring_stiffness(self) -> float:
         """K [N/m]; infinite for a prescribed slider, 0 for one driven by a force."""
         return self.slider.spring_stiffness
@@ -208,7 +224,7 @@ class Config(Table):
     @property
     def has_avalanches(self) -> bool:
         """Whether avalanches are recorded: a break may trigger others at once."""
-        return self.interaction is not None or self.slider.jumps
+        return self.contact_kind.on_lattice or self.slider.jumps
 
     @property
     def drive_speed(self) -> float:

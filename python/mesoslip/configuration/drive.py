@@ -418,6 +418,14 @@ class Drive(Table):
         return tuple(given[part.stage] for part in parts)
 
     @property
+    def first_force(self) -> float:
+        """Constant force, or that at the start of the first stage [N]; 0 for a ramp from 0."""
+        if self.force is not None:
+            return self.force
+        stages = self.stage or ()
+        return stages[0].first_force if stages and stages[0].is_force else 0.0
+
+    @property
     def continues(self) -> bool:
         """Whether it continues after its parts, at its last velocity or with its last force."""
         return self.cycle is None and self.history is None

@@ -129,6 +129,11 @@ class Table(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    @property
+    def acts(self) -> bool:
+        """Whether the table changes what is computed."""
+        return True
+
     @model_validator(mode="before")
     @classmethod
     def _without_none(cls, values: Any) -> Any:

@@ -324,6 +324,6 @@ def values(config: Config) -> dict[str, object]:
         given["drive.stage"] = ()
     if "damping_ratio" in type(config.slider).model_fields and "slider.damping" not in given:
         given.setdefault("slider.damping_ratio", 0.0)
-    if config.interaction is not None:
+    if config.contact_kind.on_lattice:
         given.pop("contacts.count")
     return {control.key: given[control.key] for control in CONTROLS if control.key in given}

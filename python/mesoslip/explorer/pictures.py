@@ -26,6 +26,7 @@ from mesoslip.plots.lines import line
 from mesoslip.plots.trace import NAMES, UNITS, force_of
 from mesoslip.quantities import UNKNOWN, Scale, scale_for, with_unit
 from mesoslip.simulation.runner import Results
+from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.steady_sliding import steady_sliding
 
@@ -381,9 +382,8 @@ def curve_alone(config: Config) -> Theory:
         drawn, spring, critical, numbers, verdict = _curve(config, curve)
     except MesoslipError as error:
         return Theory(NOTHING, NOTHING, None, str(error), ())
-    if config.interaction is not None and config.interaction.strength > 0:
-        verdict = f"without interaction: {verdict}"
-    return Theory(drawn, spring, critical, verdict, numbers)
+    caveat = contact_theory(config).caveat
+    return Theory(drawn, spring, critical, "; ".join(filter(None, (caveat, verdict))), numbers)
 
 
 def with_steady_sliding(config: Config, curve: Theory) -> Theory:

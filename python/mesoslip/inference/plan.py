@@ -154,7 +154,7 @@ class Plan:
     def coarse_count(self) -> int | None:
         """Number of contacts of most simulations; None if all have that of the interface."""
         contacts = self.config.contacts
-        if "contacts.count" in self.prior.keys or self.config.interaction is not None:
+        if "contacts.count" in self.prior.keys or self.config.contact_kind.on_lattice:
             return None
         return self.simulated_contacts if contacts.count >= 2 * self.simulated_contacts else None
 

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import Interaction
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.results import RunResults
@@ -219,19 +218,19 @@ def _slip_traces(results: RunResults) -> GroupLayout:
 
 
 def _avalanches(results: RunResults) -> GroupLayout:
-    config = results.config
+    config, kind = results.config, results.config.contact_kind
     writer = _catalogue(results, variables.AVALANCHES, "avalanches")
     picks = {name: column("avalanches", name) for name in tables.AVALANCHE_COLUMNS}
     picks["start_time"] = picks["time"]
     names = ["start_time", "displacement", "size", "force_before", "force_drop"]
     if config.slider.jumps:
         names.append("slip")
-    if config.interaction is not None:
+    if kind.on_lattice:
         names += ["area", "width", "height", "generations"]
     for name in names:
         writer.add(name, ("avalanche",), table="avalanches", pick=picks[name])
-    if config.interaction is not None:
-        columns, lattice_rows = config.interaction.columns, config.interaction.rows
+    if kind.on_lattice:
+        lattice_rows, columns = kind.dimensions(config.contacts).values()
 
         def spans(rows: Array, owners: Array) -> Array:
             width, height = picks["width"](rows, owners), picks["height"](rows, owners)
@@ -244,7 +243,7 @@ def _avalanches(results: RunResults) -> GroupLayout:
 
 def _snapshots(results: RunResults) -> GroupLayout:
     """All contacts: dimensions ``snapshot`` and ``contact``; on a lattice ``row``, ``column``."""
-    config, lattice = results.config, results.config.interaction
+    kind, contacts = results.config.contact_kind, results.config.contacts
     writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_events")
     how: dict[str, Any] = {"table": "snapshot_events"}
     writer.add(
@@ -256,16 +255,9 @@ def _snapshots(results: RunResults) -> GroupLayout:
     )
     writer.add("displacement", ("snapshot",), pick=column("snapshot_events", "displacement"), **how)
     writer.add("avalanche_size", ("snapshot",), pick=column("snapshot_events", "size"), **how)
-    places = {"contact": config.contacts.count}
-    if lattice is None:
-        numbers = np.arange(config.contacts.count)
-        writer.add("contact", ("contact",), is_coordinate=True, values=numbers)
-    else:
-        places = {"row": lattice.rows, "column": lattice.columns}
-        assert config.contacts.area is not None
-        spacing = np.sqrt(config.contacts.area / config.contacts.count)
-        for name, sites in zip("xy", lattice_sites(lattice), strict=True):
-            writer.add(name, tuple(places), is_coordinate=True, values=spacing * sites)
+    places = kind.dimensions(contacts)
+    for name, values in kind.positions(contacts).items():
+        writer.add(name, tuple(places), is_coordinate=True, values=values)
     stretch, load, generation = (
         tables.SNAPSHOT_NUMBERS.index(name) for name in ("stretch", "load", "generation")
     )
@@ -274,7 +266,7 @@ def _snapshots(results: RunResults) -> GroupLayout:
         "load": lambda rows, _: np.where(np.isfinite(rows[..., stretch]), rows[..., load], np.nan),
         "pinned": lambda rows, _: np.isfinite(rows[..., stretch]),
     }
-    if lattice is not None:
+    if kind.on_lattice:
         picks["generation"] = lambda rows, _: rows[..., generation]
 
     def in_place(pick: Pick) -> Pick:
@@ -284,14 +276,6 @@ def _snapshots(results: RunResults) -> GroupLayout:
         writer.add(name, ("snapshot", *places), table="snapshots", pick=in_place(pick))
     sizes = {"snapshot": _count(results, "snapshots"), **places}
     return GroupLayout(sizes, writer.entries, {})
-
-
-def lattice_sites(interaction: Interaction) -> tuple[Array, Array]:
-    """Sites of the contacts in units of their distance, each of shape (rows, columns)."""
-    row, column_ = np.indices((interaction.rows, interaction.columns), dtype=float)
-    if interaction.lattice == "square":
-        return column_, row
-    return column_ + 0.5 * (row % 2), row * np.sqrt(0.75)
 
 
 def _energy(results: RunResults) -> GroupLayout:

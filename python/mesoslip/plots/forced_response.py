@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment import Experiment
 from mesoslip.analysis.response import creep_line, friction_line, response_of
 from mesoslip.configuration.config import Config
+from mesoslip.errors import MesoslipError
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.record import MAX_MARKS
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles, write_title
 from mesoslip.quantities import scale_for, with_error
-from mesoslip.theory.thermal import creep_force
+from mesoslip.theory.contacts import contact_theory
+
+Array = NDArray[np.float64]
 
 # Samples of the displacement that are drawn, and velocities of the theory.
 MAX_DOTS, THEORY_POINTS = 20_000, 30
@@ -80,10 +84,11 @@ def _draw_creep(axes: Axes, experiment: Experiment, data: Arrays) -> None:
             markersize=3,
         )
     config = experiment.config
-    if config is not None and _is_known(config):
-        grid = np.geomspace(0.5 * velocity.min(), 2 * velocity.max(), THEORY_POINTS)
-        theory = np.array([creep_force(config, one) for one in grid]) / experiment.static_force
-        axes.plot(grid / unit.size, theory, color=RED, label="$F(v)$ and damping, theory")
+    grid = np.geomspace(0.5 * velocity.min(), 2 * velocity.max(), THEORY_POINTS)
+    theory = None if config is None else _creep_forces(config, grid)
+    if theory is not None:
+        relative = theory / experiment.static_force
+        axes.plot(grid / unit.size, relative, color=RED, label="$F(v)$ and damping, theory")
         axes.legend(loc="upper left")
     logarithmic(axes, "x")
     line = creep_line(data)
@@ -95,10 +100,13 @@ def _draw_creep(axes: Axes, experiment: Experiment, data: Arrays) -> None:
     axes.set_ylabel("force over $F_s$")
 
 
-def _is_known(config: Config) -> bool:
-    """Whether the theory has the steady force."""
-    contacts = config.contacts
-    return contacts.thermal is not None and contacts.newborn_width == 0 and contacts.reattach
+def _creep_forces(config: Config, velocity: Array) -> Array | None:
+    """Forces of creep at velocities [m/s], in N; None without a theory."""
+    theory = contact_theory(config)
+    try:
+        return np.array([theory.creep_force(one) for one in velocity])
+    except MesoslipError:
+        return None
 
 
 def _draw_friction(axes: Axes, experiment: Experiment, data: Arrays) -> None:

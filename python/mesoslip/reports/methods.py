@@ -1,6 +1,6 @@
 """The method behind an output as a paragraph of a paper, with citations as in Markdown of Pandoc.
 
-Sentences about sliders have a form for each kind, chosen by the type of its table.
+Sentences about sliders and contacts have a form for each kind, chosen by the type of its table.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from functools import singledispatch
 from typing import TYPE_CHECKING
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import Ageing, Thermal
+from mesoslip.configuration.contacts.tables import Ageing, Interaction, Thermal
 from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.sliders.base import SliderTable
@@ -20,7 +20,7 @@ from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
-from mesoslip.errors import ConfigError
+from mesoslip.errors import ConfigError, Problem
 from mesoslip.quantities import column, with_unit
 
 if TYPE_CHECKING:
@@ -204,16 +204,8 @@ def _contacts(config: Config) -> Iterator[str]:
         f"{law.relative_width:.6g}, and {COUPLINGS[contacts.coupling]}."
     )
     yield _lives(config)
-    if contacts.ageing is not None:
-        yield _ageing(contacts.ageing)
-    if contacts.thermal is not None:
-        yield _thermal(contacts.thermal, contacts.contact_static_force)
-    lattice = config.interaction
-    if lattice is not None:
-        yield (
-            f"They interact with their neighbours on a periodic {lattice.lattice} lattice of "
-            f"{lattice.columns} × {lattice.rows} sites, with the strength ξ = {lattice.strength:g}."
-        )
+    for key, feature in config.contact_features.items():
+        yield feature_sentence(feature, key, config)
 
 
 def _lives(config: Config) -> str:
@@ -241,7 +233,14 @@ def _lives(config: Config) -> str:
     )
 
 
-def _ageing(ageing: Ageing) -> str:
+@singledispatch
+def feature_sentence(feature: object, key: str, config: Config) -> str:  # noqa: ARG001
+    """A sentence on the key or table that makes contacts of a kind of their own."""
+    raise ConfigError([Problem("", key, "has no sentence in reports")])
+
+
+@feature_sentence.register
+def _ageing(ageing: Ageing, key: str, config: Config) -> str:  # noqa: ARG001
     time = quantity(ageing.time, "s")
     if ageing.law == "log":
         return (
@@ -255,12 +254,22 @@ def _ageing(ageing: Ageing) -> str:
     )
 
 
-def _thermal(thermal: Thermal, static_force: float) -> str:
+@feature_sentence.register
+def _thermal(thermal: Thermal, key: str, config: Config) -> str:  # noqa: ARG001
     rate = quantity(thermal.rate, "1/s")
+    ratio = thermal.ratio(config.contacts.contact_static_force)
     return (
         "Under a force f below its threshold a contact breaks at the rate ω_0 exp((f − f_s)/f_T) "
         f"[@barel2010; @braun2011temperature], ω_0 = {rate}, f_T = "
-        f"{quantity(thermal.ratio(static_force), '1')} f_s."
+        f"{quantity(ratio, '1')} f_s."
+    )
+
+
+@feature_sentence.register
+def _interaction(lattice: Interaction, key: str, config: Config) -> str:  # noqa: ARG001
+    return (
+        f"They interact with their neighbours on a periodic {lattice.lattice} lattice of "
+        f"{lattice.columns} × {lattice.rows} sites, with the strength ξ = {lattice.strength:g}."
     )
 
 

@@ -20,16 +20,13 @@ from scipy import optimize
 from scipy.interpolate import BPoly
 
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.output.inputs import ConfigLike, as_config
+from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.renewal import POINTS, solve_renewal
 from mesoslip.theory.sliders import loading_rate
-from mesoslip.theory.steady_sliding import depends_on_velocity
 from mesoslip.theory.stretch_density import stretch_density
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.configuration.config import Config
 
 Array = NDArray[np.float64]
@@ -67,31 +64,6 @@ class CriticalPoint(NamedTuple):
     D3: float
 
 
-def curve(config: ConfigLike) -> xr.DataTree:
-    """The force curve F(X) of the master equation, and its elastic instability.
-
-    Returns
-    -------
-    xarray.DataTree
-        Root: force, slope, stiffness and rate of breaks over ``displacement``; ``K_star``, ``X_c``,
-        ``F_peak``, ``F_steady``, ``D0`` to ``D3``, ``stable`` as attributes, in SI. Group
-        ``critical``: all X_c; ``stretch_density``: the densities that ``curve.density_at`` asks
-        for. Of contacts that age or break by thermal activation: steady sliding over ``velocity``.
-
-    Raises
-    ------
-    FileError, ConfigError
-        If the configuration cannot be read or is wrong.
-    """
-    checked = as_config(config)
-    if depends_on_velocity(checked):
-        # It is imported here, as few curves need it.
-        from mesoslip.theory.steady_curve import SteadyCurve
-
-        return SteadyCurve(checked).to_tree()
-    return ForceCurve(checked).to_tree()
-
-
 class ForceCurve:
     """F(X) of a configuration, from the start of its contacts to ``curve.length``.
 
@@ -124,31 +96,7 @@ class ForceCurve:
     def __init__(self, config: Config) -> None:
         self.config = config
         contacts = config.contacts
-        if contacts.ageing is not None:
-            raise ConfigError(
-                [
-                    Problem(
-                        "",
-                        "contacts.ageing",
-                        "has no force curve: F(X) depends on how fast the slider moves; that of "
-                        "contacts with the configured thresholds is the one without this table, "
-                        "and `mesoslip info` gives the steady force of young and old contacts and "
-                        "at the velocity of the drive",
-                    )
-                ]
-            )
-        if contacts.thermal is not None:
-            raise ConfigError(
-                [
-                    Problem(
-                        "",
-                        "contacts.thermal",
-                        "has no force curve: F(X) depends on how fast the slider moves; that "
-                        "without thermal activation is the one without this table, and `mesoslip "
-                        "info` gives the steady force at the velocity of the drive",
-                    )
-                ]
-            )
+        contact_theory(config).check_force_curve()
         if contacts.newborn_width > 0 and contacts.initial == "steady":
             raise ConfigError(
                 [
@@ -463,12 +411,6 @@ class ForceCurve:
     def solver(self) -> str:
         """How it was solved, in words."""
         return f"collocation at {POINTS} points of {self.panels} panels"
-
-    def to_tree(self) -> xr.DataTree:
-        """The curve and its instability in the layout of an output file."""
-        from mesoslip.theory.force_curve_dataset import tree_of
-
-        return tree_of(self)
 
     def summary(self) -> dict[str, float | bool | None]:
         """Derived quantities of the curve in SI units; None for those that do not exist.

@@ -18,11 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
+from mesoslip.theory.contacts.steady import newborn_problems, steady_problems
 from mesoslip.theory.critical_spring import (
     NO_GROWTH,
     critical_spring,
     has_critical_spring,
 )
+from mesoslip.theory.delays import delay_law
 from mesoslip.theory.frequency_paths import (
     MAX_POINTS,
     Parts,
@@ -59,11 +61,6 @@ OUT_OF_STEP = 0.5
 OTHER_MOTION = "A large oscillation may be possible too"
 NO_AMPLITUDE = "Linear theory gives no amplitude"
 
-WITHOUT_NEWBORN_WIDTH = (
-    "has no linear stability theory for contacts that age or break by thermal activation: they "
-    "must attach with one force"
-)
-
 
 class LinearStability(abc.ABC):
     """Steady sliding of a configuration, and the growth of small perturbations of it.
@@ -83,11 +80,7 @@ class LinearStability(abc.ABC):
 
     def __init__(self, config: Config, velocity: float | None = None) -> None:
         contacts = config.contacts
-        problems = list(self._problems(config))
-        if not contacts.reattach:
-            problems.append(
-                Problem("", "contacts.reattach", "without it there is no steady sliding", False)
-            )
+        problems = [*self._problems(config), *steady_problems(config)]
         if config.slider.layer_count > MAX_LAYERS:
             message = f"linear stability is found for at most {MAX_LAYERS}"
             problems.append(Problem("", "slider.layers", message, config.slider.layer_count))
@@ -100,6 +93,7 @@ class LinearStability(abc.ABC):
             raise ConfigError(problems)
         self.config = config
         self.delay = 0.0 if config.slider.ignores_delay else contacts.delay
+        self._delays = delay_law(config)
         # Displacement in units of the breaking stretch, for a second.
         self._rate = self.velocity / contacts.break_stretch
         self._drag = contacts.count * contacts.contact_drag if self.delay > 0 else 0.0
@@ -107,8 +101,7 @@ class LinearStability(abc.ABC):
     @classmethod
     def _problems(cls, config: Config) -> Iterator[Problem]:
         """Further parts of a configuration that the theory does not have."""
-        if config.contacts.newborn_width > 0:
-            yield Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)
+        return newborn_problems(config)
 
     @property
     @abc.abstractmethod
@@ -137,15 +130,13 @@ class LinearStability(abc.ABC):
 
     def _with_wide_thresholds(self) -> Config | None:
         """The configuration with thresholds out of step; None if they are as wide already."""
-        threshold, law = self.config.contacts.threshold, self.config.contacts.ageing
+        contacts = self.config.contacts
+        threshold = contacts.threshold
         if threshold.relative_width >= OUT_OF_STEP or threshold.kind.is_sampled:
             return None
-        changes: dict[str, object] = {"contacts.threshold.relative_width": OUT_OF_STEP}
-        if law is not None and law.young_relative_width is not None:
-            width = max(law.young_relative_width, OUT_OF_STEP)
-            changes["contacts.ageing.young_relative_width"] = width
+        widths = contacts.relative_widths.items()
         try:
-            return self.config.replace(changes)
+            return self.config.replace({key: max(width, OUT_OF_STEP) for key, width in widths})
         except ConfigError:
             return None
 
@@ -181,18 +172,6 @@ class LinearStability(abc.ABC):
         values = np.asarray(rate, dtype=np.complex128)
         parts = self._parts(values.ravel())
         return ((parts.fed + parts.free * parts.births) / parts.births).reshape(values.shape)
-
-    @property
-    def _fixed_delay(self) -> float:
-        """Delay of all contacts [s]; 0 where each has its own, which do not turn the response."""
-        return self.delay if self.config.contacts.delay_law == "fixed" else 0.0
-
-    def _late(self, rate: Complex) -> tuple[Complex, Complex]:
-        """Average of e^(-λ t) over the delays t, and 1 less that to all digits."""
-        if self.config.contacts.delay_law == "exponential":
-            late: Complex = 1 / (1 + rate * self.delay)
-            return late, rate * self.delay * late
-        return np.exp(-rate * self.delay), -np.expm1(-rate * self.delay)
 
     def _characteristic(self, rate: Complex) -> tuple[Complex, Complex]:
         """An entire function with the roots of Z + Λ, over λ; and one with its extra roots, over λ.
@@ -470,10 +449,10 @@ class LinearStability(abc.ABC):
 
 def shown_by(config: Config) -> str:
     """The command that shows the motion of a configuration: `mesoslip cycle` has no layers, no
-    interaction, no changes of the drive, and no contacts that do not attach again."""
+    changes of the drive, no contacts that do not attach again or are in one engine only."""
     part = config.drive_parts[-1]
     is_constant = len(config.drive_parts) == 1 and part.start_velocity == part.end_velocity != 0
     has_cycle = config.slider.oscillator is not None and is_constant
-    if has_cycle and config.contacts.reattach and config.interaction is None:
+    if has_cycle and config.contacts.reattach and config.has_master_equation:
         return "only a run or mesoslip cycle shows it"
     return "only a run shows it"

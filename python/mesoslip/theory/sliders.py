@@ -15,6 +15,7 @@ from mesoslip.configuration.sliders.inertial import InertialSlider
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
+from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,15 +24,6 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
     Complex = NDArray[np.complexfloating[Any, Any]]
-
-
-class Quantity(NamedTuple):
-    """A derived quantity: its name, its value in SI, the unit, and its meaning."""
-
-    name: str
-    value: float
-    unit: str
-    meaning: str
 
 
 class DynamicStiffness(NamedTuple):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import STEADY
+from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.steady_sliding import sliding_of
 
@@ -130,11 +131,8 @@ def _centre(config: Config) -> float:
     """Velocity of the drive, or of steady creep under its force [m/s]."""
     if config.drive_speed > 0:
         return config.drive_speed
-    if config.contacts.thermal is not None and config.drive.is_force:
-        from mesoslip.theory.derived import first_force
-        from mesoslip.theory.thermal import creep_velocity
-
-        velocity = creep_velocity(config, first_force(config))
+    if config.drive.is_force:
+        velocity = contact_theory(config).creep_velocity(config.drive.first_force)
         if math.isfinite(velocity):
             return velocity
     raise ConfigError([Problem("", "drive.velocity", "steady sliding needs a velocity")])

@@ -1,57 +1,26 @@
-"""Linear stability of steady sliding with delay: does a small perturbation grow or decay?
-
-The master equation under a slider that moves with v t + ε e^(λt). The response of the contacts is
-
-    Λ(λ) = -N g s φ(s) (1 - e^(-λ τ_d)) / (1 - ψ(s) e^(-λ τ_d)) + drag,    s = λ/v,
-
-with g = 1/(⟨x_s - x_b⟩ + v τ_d), the Laplace transform ψ of the density of the lives x_s - x_b, and
-that of the force of a contact over its life, φ. Where delays are exponential 1/(1 + λ τ_d) stands
-for e^(-λ τ_d). The derivation is in ``docs/steady-sliding.md``.
-"""
+"""Stability of steady sliding of a configuration, by the theory that its contacts have."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mesoslip.errors import ConfigError, Problem, RunError
-from mesoslip.theory.frequency_paths import Parts, Turns
-from mesoslip.theory.life_transforms import LifeTransforms, Lives
-from mesoslip.theory.linear_stability import OUT_OF_STEP, LinearStability
-from mesoslip.theory.lives import newborn_stretch
+from mesoslip.errors import ConfigError, RunError
+from mesoslip.theory.contacts import contact_theory
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
+    from mesoslip.theory.linear_stability import LinearStability
 
 # Range of spring stiffnesses over that of all contacts in which the stable ones are sought.
 MAX_STIFFNESS, MIN_STIFFNESS = 16.0, 1e-4
 
-WITHOUT_AGEING = "has a response of its own: use mesoslip.theory.ageing_sliding.AgeingSliding"
 
-WITHOUT_ACTIVATION = (
-    "has a response of its own: use mesoslip.theory.activated_sliding.ActivatedSliding"
-)
-
-
-WITHOUT_NEWBORN_WIDTH = (
-    'has a linear stability theory for coupling = "equal" only, with thresholds of which hardly '
-    "any is below the width"
-)
-
-
-class SteadySliding(LinearStability):
-    """Steady sliding of a configuration, and the growth of small perturbations of it.
-
-    The contacts are those of the master equation, N → ∞, with delay, back force and drag, without
-    interaction.
+def sliding_of(config: Config, velocity: float | None = None) -> LinearStability:
+    """Steady sliding of a configuration, by the theory that its contacts have.
 
     Parameters
     ----------
@@ -59,114 +28,13 @@ class SteadySliding(LinearStability):
         The configuration.
     velocity
         Velocity [m/s]; that of the drive by default.
-    relative_width
-        Relative width of the threshold law; that of the configuration by default.
 
     Raises
     ------
     ConfigError
-        If contacts age or do not attach again, or there is no velocity.
+        If there is no theory for the contacts or the slider, or there is no velocity.
     """
-
-    def __init__(
-        self,
-        config: Config,
-        velocity: float | None = None,
-        *,
-        relative_width: float | None = None,
-    ) -> None:
-        super().__init__(config, velocity)
-        self.relative_width = relative_width or config.contacts.threshold.relative_width
-        self._transforms = LifeTransforms(config, self.relative_width)
-        self._stretch = config.contacts.break_stretch
-
-    @classmethod
-    def _problems(cls, config: Config) -> Iterator[Problem]:
-        if config.contacts.ageing is not None:
-            yield Problem("", "contacts.ageing", WITHOUT_AGEING)
-        if config.contacts.thermal is not None:
-            yield Problem("", "contacts.thermal", WITHOUT_ACTIVATION)
-        if newborn_stretch(config) is None:
-            yield Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)
-
-    @property
-    def lives(self) -> Lives:
-        """Averages over the lives of contacts."""
-        return self._transforms.averages
-
-    @property
-    def force(self) -> float:
-        """F(v) = N [⟨k (x_s² - x_b²)/2⟩ + ⟨m⟩ η v² τ_d]/(⟨x_s - x_b⟩ + v τ_d) [N]."""
-        lives = self.lives
-        slid = self._rate * self.delay
-        dragged = self._drag * lives.mass * self.velocity * slid
-        static = self.config.contacts.static_force
-        return (static * lives.work + dragged) / (lives.mean_life + slid)
-
-    @property
-    def slope(self) -> float:
-        """dF/dv [N s/m]: below zero sliding is weaker the faster it is."""
-        lives = self.lives
-        slid = self._rate * self.delay
-        rise = 2 * self._drag * lives.mass * slid
-        return (rise - self.force * self.delay / self._stretch) / (lives.mean_life + slid)
-
-    def _parts(self, rate: Complex) -> Parts:
-        lives, contacts = self.lives, self.config.contacts
-        s = rate / self._rate
-        transforms = self._transforms.transforms(s)
-        late, missing = self._late(rate)
-        births = 1 - transforms.life * late
-        density = 1 / (lives.mean_life + self._rate * self.delay)
-        load = lives.newborn_force - transforms.broken_force
-        load += (lives.stiffness - transforms.stiffness) / s
-        fed = -contacts.stiffness * density * load * missing
-        dragging = self._drag * density * self._rate
-        fed -= dragging * missing**2 * transforms.mass
-        free = dragging * lives.mass * (rate * self.delay + missing)
-        return Parts(fed, births, free, np.abs(transforms.life * late))
-
-    @property
-    def _turns(self) -> Turns:
-        turn = self.lives.mean_life / self._rate + self.delay
-        return Turns(turn, math.inf, self._fixed_delay)
-
-    @property
-    def is_passive(self) -> bool:
-        """Whether the force of steady contacts does not depend on the motion of the slider."""
-        return self.delay == 0
-
-    @cached_property
-    def out_of_step(self) -> SteadySliding:
-        if self.relative_width >= OUT_OF_STEP:
-            return self
-        return SteadySliding(self.config, self.velocity, relative_width=OUT_OF_STEP)
-
-    @property
-    def _ingredients(self) -> str:
-        return "delay"
-
-
-def depends_on_velocity(config: Config) -> bool:
-    """Whether slow sliding has no force of its own, so that F(X) has no curve."""
-    return config.contacts.ageing is not None or config.contacts.thermal is not None
-
-
-def sliding_of(config: Config, velocity: float | None = None) -> LinearStability:
-    """Steady sliding of a configuration, by the theory that its contacts have.
-
-    Parameters and errors are those of `LinearStability`.
-    """
-    # scipy takes long to import.
-    if config.contacts.thermal is not None:
-        from mesoslip.theory.activated_sliding import ActivatedSliding
-
-        return ActivatedSliding(config, velocity)
-    if config.contacts.ageing is not None:
-        from mesoslip.theory.ageing_sliding import AgeingSliding
-
-        return AgeingSliding(config, velocity)
-    return SteadySliding(config, velocity)
+    return contact_theory(config).sliding(velocity)
 
 
 @lru_cache(maxsize=16)
@@ -175,8 +43,6 @@ def steady_sliding(config: Config, max_work: int) -> LinearStability | None:
 
     The latest results are cached, as several functions ask for the same configuration.
     """
-    if config.interaction is not None and config.interaction.strength > 0:
-        return None
     try:
         sliding = sliding_of(config)
     except ConfigError:

@@ -12,12 +12,11 @@ from mesoslip.configuration.contacts.activated import (
     ActivatedPopulations,
 )
 from mesoslip.configuration.contacts.ageing import AgeingContacts, AgeingPopulations
-from mesoslip.configuration.contacts.base import ContactKind
+from mesoslip.configuration.contacts.base import COMMON_KEYS, ContactKind
 from mesoslip.configuration.contacts.ensemble import EnsembleContacts
 from mesoslip.configuration.contacts.lattice import LatticeContacts
 from mesoslip.configuration.contacts.populations import PopulationContacts
-from mesoslip.configuration.contacts.tables import Contacts, Interaction
-from mesoslip.configuration.tables import Run
+from mesoslip.configuration.contacts.tables import Interaction
 
 KINDS: tuple[type[ContactKind], ...] = (
     ActivatedAgeingContacts,
@@ -32,7 +31,18 @@ KINDS: tuple[type[ContactKind], ...] = (
 )
 
 
-def contact_kind(run: Run, contacts: Contacts, interaction: Interaction | None) -> ContactKind:
-    """The kind of contacts that the tables of a configuration describe."""
-    kind = next(kind for kind in KINDS if kind.is_meant(run, contacts, interaction))
-    return kind(interaction)
+def contact_kind(
+    engine: str, given: frozenset[str], interaction: Interaction | None
+) -> ContactKind:
+    """The kind of contacts of an engine that answers most of the given keys.
+
+    Those that it does not answer are among its problems.
+    """
+    kinds = [kind for kind in KINDS if kind.engine == engine and kind.features <= given]
+    return max(kinds, key=lambda kind: len(kind.features))(interaction)
+
+
+def is_in_both_engines(given: frozenset[str]) -> bool:
+    """Whether each engine has a kind of contacts that answers all given keys."""
+    features = given - COMMON_KEYS
+    return {kind.engine for kind in KINDS if kind.features == features} == {"eq", "me"}

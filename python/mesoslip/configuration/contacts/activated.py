@@ -7,21 +7,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from mesoslip.configuration.contacts.ageing import ageing_of, ageing_problems
+from mesoslip.configuration.contacts.ageing import age_problems, ageing_of
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables import (
     MAX_IDLE_BREAKS,
     MAX_IDLE_DELAY,
     Contacts,
-    Interaction,
     Thermal,
 )
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Run
 
-INITIAL_AGE = "contacts.ageing.initial_age"
 # Ages of the life of a contact that bears the back force: the first over the scales of time, and
 # their number; exponent beyond which a rate is infinite.
 MIN_AGE, AGES, MAX_EXPONENT = 1e-3, 400, 500.0
@@ -90,10 +87,8 @@ class ActivatedContacts(ContactKind):
     """Independent contacts that break by thermal activation, simulated one by one."""
 
     kernel_kind: ClassVar[str] = "activated"
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "eq" and contacts.thermal is not None
+    engine: ClassVar[str] = "eq"
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
 
     @property
     def bytes_per_contact(self) -> int:
@@ -109,7 +104,7 @@ class ActivatedContacts(ContactKind):
             | thermal_parameters(config)
         )
 
-    def problems(self, config: Setting) -> Complaints:
+    def _problems(self, config: Setting) -> Complaints:
         if self.interaction is not None:
             yield from self.interaction.problems(config.contacts)
         yield from thermal_problems(config)
@@ -119,38 +114,31 @@ class ActivatedAgeingContacts(ActivatedContacts):
     """The same contacts with thresholds that change with age."""
 
     kernel_kind: ClassVar[str] = "activated ageing"
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal", "contacts.ageing"})
     # A contact whose threshold moves breaks within a tiny gap of it.
     force_error_bound: ClassVar[float] = 1e-9
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
-        return super().is_meant(run, contacts, interaction) and contacts.ageing is not None
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
 
-    def problems(self, config: Setting) -> Complaints:
-        yield from super().problems(config)
-        # Coupling and interaction have been checked.
-        yield from (one for one in ageing_problems(config) if one.key == INITIAL_AGE)
+    def _problems(self, config: Setting) -> Complaints:
+        yield from super()._problems(config)
+        yield from age_problems(config)
 
 
 class ActivatedPopulations(PopulationContacts):
     """Infinitely many contacts that break by thermal activation."""
 
     kernel_kind: ClassVar[str] = "activated populations"
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
     # A slider that hardly oscillates is taken to creep: what energy it oscillates with is lost.
     residual_bound: ClassVar[float] = 1e-5
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "me" and contacts.thermal is not None
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | thermal_parameters(config)
 
-    def problems(self, config: Setting) -> Complaints:
-        yield from super().problems(config)
+    def _problems(self, config: Setting) -> Complaints:
+        yield from super()._problems(config)
         # PopulationContacts refuses interaction already.
         yield from (one for one in thermal_problems(config) if one.key != "interaction.strength")
         if config.contacts.initial == "uniform":
@@ -166,15 +154,11 @@ class ActivatedAgeingPopulations(ActivatedPopulations):
     """Infinitely many contacts that break by thermal activation and age."""
 
     kernel_kind: ClassVar[str] = "activated ageing populations"
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
-        return super().is_meant(run, contacts, interaction) and contacts.ageing is not None
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal", "contacts.ageing"})
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
 
-    def problems(self, config: Setting) -> Complaints:
-        yield from super().problems(config)
-        # Coupling and interaction have been checked.
-        yield from (one for one in ageing_problems(config) if one.key == INITIAL_AGE)
+    def _problems(self, config: Setting) -> Complaints:
+        yield from super()._problems(config)
+        yield from age_problems(config)

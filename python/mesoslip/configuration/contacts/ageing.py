@@ -6,10 +6,9 @@ from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.populations import PopulationContacts
-from mesoslip.configuration.contacts.tables import Ageing, Contacts, Interaction
+from mesoslip.configuration.contacts.tables import Ageing
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Run
 
 
 def ageing_of(config: Setting) -> Ageing:
@@ -20,7 +19,7 @@ def ageing_of(config: Setting) -> Ageing:
 
 def ageing_problems(config: Setting) -> Complaints:
     """Combinations that ageing contacts refuse, in both engines."""
-    contacts, ageing = config.contacts, ageing_of(config)
+    contacts = config.contacts
     if contacts.coupling != "equal":
         yield Complaint(
             "contacts.coupling",
@@ -33,6 +32,19 @@ def ageing_problems(config: Setting) -> Complaints:
             "interaction",
             "is not for ageing contacts: the engine predicts the next breaks of neighbours from "
             "thresholds that do not change",
+        )
+    yield from age_problems(config)
+
+
+def age_problems(config: Setting) -> Complaints:
+    """Those of them that concern ages alone."""
+    contacts, ageing = config.contacts, ageing_of(config)
+    if contacts.newborn_width > 0:
+        yield Complaint(
+            "contacts.newborn_width",
+            "must be 0 with contacts.ageing: whether a contact attaches is decided by its "
+            "configured threshold, not by that of a young one",
+            contacts.newborn_width,
         )
     if ageing.initial_age is not None and contacts.initial != "relaxed":
         yield Complaint(
@@ -47,13 +59,11 @@ class AgeingContacts(ContactKind):
     """Independent ageing contacts, simulated one by one."""
 
     kernel_kind: ClassVar[str] = "ageing"
+    engine: ClassVar[str] = "eq"
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.ageing"})
     bytes_per_contact: ClassVar[int] = 190
     # Breaks are predicted; the kernel reports the error of the force if one comes late.
     force_error_bound: ClassVar[float] = 1e-9
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "eq" and contacts.ageing is not None
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return (
@@ -62,7 +72,7 @@ class AgeingContacts(ContactKind):
             | {"slider_jumps": int(config.slider.jumps)}
         )
 
-    def problems(self, config: Setting) -> Complaints:
+    def _problems(self, config: Setting) -> Complaints:
         yield from ageing_problems(config)
 
 
@@ -70,15 +80,12 @@ class AgeingPopulations(PopulationContacts):
     """Infinitely many ageing contacts."""
 
     kernel_kind: ClassVar[str] = "ageing populations"
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "me" and contacts.ageing is not None and contacts.thermal is None
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.ageing"})
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
 
-    def problems(self, config: Setting) -> Complaints:
-        yield from super().problems(config)
+    def _problems(self, config: Setting) -> Complaints:
+        yield from super()._problems(config)
         # PopulationContacts refuses interaction already.
         yield from (one for one in ageing_problems(config) if one.key != "interaction")

@@ -3,13 +3,30 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
-from mesoslip.configuration.table import Complaints
+from mesoslip.configuration.table import Complaint, Complaints, Table
 from mesoslip.configuration.tables import Run
+
+Array = NDArray[Any]
+
+# Keys that every kind answers, by `common_parameters` or in its own room. Any other key or table
+# that is given belongs to the kinds that have it as a feature, and is refused by all others.
+COMMON_KEYS = frozenset(
+    f"contacts.{key}"
+    for key in (
+        *("count", "static_force", "stiffness", "area", "film_thickness", "film_density"),
+        *("drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width", "coupling"),
+        *("initial", "reattach", "threshold"),
+    )
+)
 
 
 class Block(Protocol):
@@ -44,8 +61,14 @@ class ContactKind(ABC):
     ----------
     kernel_kind
         The kernel's name of the kind.
+    engine
+        The engine that simulates it.
+    features
+        Keys and tables beyond the common ones that it answers, such as "contacts.ageing".
     is_discrete
         Whether contacts are counted in whole numbers.
+    has_neighbours
+        Whether neighbours have a share in the force at which a contact breaks.
     on_lattice
         Whether contacts have sites on a lattice.
     bytes_per_contact
@@ -63,7 +86,10 @@ class ContactKind(ABC):
     """
 
     kernel_kind: ClassVar[str]
+    engine: ClassVar[str]
+    features: ClassVar[frozenset[str]] = frozenset()
     is_discrete: ClassVar[bool] = True
+    has_neighbours: ClassVar[bool] = False
     max_realizations: ClassVar[int] = 2**31 - 1
     residual_bound: ClassVar[float] = 1e-9
     step_work_bound: ClassVar[float] = 0.0
@@ -72,11 +98,6 @@ class ContactKind(ABC):
 
     interaction: Interaction | None
 
-    @classmethod
-    @abstractmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
-        """Whether the tables of a configuration describe contacts of this kind."""
-
     @property
     @abstractmethod
     def bytes_per_contact(self) -> int: ...
@@ -84,6 +105,21 @@ class ContactKind(ABC):
     @property
     def on_lattice(self) -> bool:
         return self.interaction is not None
+
+    def dimensions(self, contacts: Contacts) -> dict[str, int]:
+        """Dimensions of the contacts in outputs, and their lengths."""
+        if self.interaction is None:
+            return {"contact": contacts.count}
+        return {"row": self.interaction.rows, "column": self.interaction.columns}
+
+    def positions(self, contacts: Contacts) -> dict[str, Array]:
+        """Coordinates of the contacts in outputs, with the shape of their dimensions; in m."""
+        if self.interaction is None:
+            return {"contact": np.arange(contacts.count)}
+        assert contacts.area is not None
+        spacing = np.sqrt(contacts.area / contacts.count)
+        x, y = self.interaction.sites
+        return {"x": spacing * x, "y": spacing * y}
 
     @abstractmethod
     def kernel_parameters(self, config: Setting) -> Parameters:
@@ -97,9 +133,30 @@ class ContactKind(ABC):
         """The same with longer steps; None where the numbers of a run do not depend on steps."""
         return None
 
+    def problems(self, config: Setting, given: frozenset[str]) -> Complaints:
+        """The combinations that this kind refuses, and the given keys that it does not answer."""
+        complaints = list(self._problems(config))
+        yield from complaints
+        for key in sorted(given - COMMON_KEYS - self.features):
+            if not any(f"{one.key}.".startswith(f"{key}.") for one in complaints):
+                yield Complaint(
+                    key, f'is not known to contacts of the kind "{self.kernel_kind}": leave it out'
+                )
+
     @abstractmethod
-    def problems(self, config: Setting) -> Complaints:
-        """The combinations that this kind refuses."""
+    def _problems(self, config: Setting) -> Complaints:
+        """The combinations that this kind refuses in its own words."""
+
+
+def given_keys(contacts: Contacts, beside: Mapping[str, Table | None]) -> frozenset[str]:
+    """Keys of [contacts] that differ from their defaults, and tables ``beside`` it that act."""
+    fields = type(contacts).model_fields
+    keys = {
+        f"contacts.{name}"
+        for name, field in fields.items()
+        if getattr(contacts, name) != field.get_default()
+    }
+    return frozenset(keys | {name for name, table in beside.items() if table and table.acts})
 
 
 def common_parameters(config: Setting) -> Parameters:

@@ -5,22 +5,15 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaints
-from mesoslip.configuration.tables import Run
 
 
 class EnsembleContacts(ContactKind):
     """Independent contacts; with [interaction] of strength 0 they have sites on a lattice."""
 
     kernel_kind: ClassVar[str] = "ensemble"
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
-        if contacts.ageing is not None:
-            return False
-        return run.engine == "eq" and (interaction is None or interaction.strength == 0)
+    engine: ClassVar[str] = "eq"
 
     @property
     def bytes_per_contact(self) -> int:
@@ -32,6 +25,6 @@ class EnsembleContacts(ContactKind):
             columns, rows = self.interaction.columns, self.interaction.rows
         return common_parameters(config) | {"columns": columns, "rows": rows}
 
-    def problems(self, config: Setting) -> Complaints:
+    def _problems(self, config: Setting) -> Complaints:
         if self.interaction is not None:
             yield from self.interaction.problems(config.contacts)

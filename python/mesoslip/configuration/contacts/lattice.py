@@ -5,25 +5,27 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.contacts.tables import Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaints
-from mesoslip.configuration.tables import Run
+
+
+def lattice_of(config: Setting) -> Interaction:
+    """The table of the lattice of contacts with neighbours."""
+    assert config.interaction is not None
+    return config.interaction
 
 
 class LatticeContacts(ContactKind):
     """Contacts with bonds between neighbours (S25 to S27)."""
 
     kernel_kind: ClassVar[str] = "lattice"
+    engine: ClassVar[str] = "eq"
+    has_neighbours: ClassVar[bool] = True
+    features: ClassVar[frozenset[str]] = frozenset({"interaction"})
     bytes_per_contact: ClassVar[int] = 236
 
     interaction: Interaction
-
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:
-        if contacts.ageing is not None:
-            return False
-        return run.engine == "eq" and interaction is not None and interaction.strength > 0
 
     def kernel_parameters(self, config: Setting) -> Parameters:
         return common_parameters(config) | {
@@ -33,5 +35,5 @@ class LatticeContacts(ContactKind):
             "rows": self.interaction.rows,
         }
 
-    def problems(self, config: Setting) -> Complaints:
+    def _problems(self, config: Setting) -> Complaints:
         yield from self.interaction.problems(config.contacts)

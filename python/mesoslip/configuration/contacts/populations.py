@@ -5,10 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Run
 
 # Minimum step of the master equation, relative to the mean breaking stretch.
 MIN_STEP = 2e-5
@@ -20,6 +18,7 @@ class PopulationContacts(ContactKind):
     """Populations of contacts that attached at the same displacement, for N → ∞."""
 
     kernel_kind: ClassVar[str] = "populations"
+    engine: ClassVar[str] = "me"
     is_discrete: ClassVar[bool] = False
     on_lattice: ClassVar[bool] = False
     bytes_per_contact: ClassVar[int] = 0
@@ -29,17 +28,13 @@ class PopulationContacts(ContactKind):
     force_error_bound: ClassVar[float] = 0.02
     remedy: ClassVar[str] = "a smaller run.resolution helps: the error falls with its square"
 
-    @classmethod
-    def is_meant(cls, run: Run, contacts: Contacts, interaction: Interaction | None) -> bool:  # noqa: ARG003
-        return run.engine == "me" and contacts.ageing is None and contacts.thermal is None
-
     def kernel_parameters(self, config: Setting) -> Parameters:
         return common_parameters(config) | {"resolution": config.run.resolution}
 
     def coarse_parameters(self, config: Setting, coarsening: float) -> Parameters:
         return self.kernel_parameters(config) | {"resolution": coarsening * config.run.resolution}
 
-    def problems(self, config: Setting) -> Complaints:
+    def _problems(self, config: Setting) -> Complaints:
         run = config.run
         if self.interaction is not None:
             yield Complaint(

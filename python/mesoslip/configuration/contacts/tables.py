@@ -396,6 +396,20 @@ class Contacts(Table):
         young = self.ageing.configured(self.back_force_ratio, self.threshold.relative_width, 0.0)
         return max(self.back_force_ratio, young)
 
+    def threshold_at(self, configured: Array, age: ArrayLike) -> Array:
+        """Thresholds at an age [s], from the configured ones; both relative to the static force."""
+        if self.ageing is None:
+            return np.broadcast_to(configured, np.broadcast_shapes(configured.shape, np.shape(age)))
+        return self.ageing.threshold(configured, self.threshold.relative_width, age)
+
+    @property
+    def relative_widths(self) -> dict[str, float]:
+        """Keys of the relative widths of thresholds, and their values."""
+        widths = {"contacts.threshold.relative_width": self.threshold.relative_width}
+        if self.ageing is not None and self.ageing.young_relative_width is not None:
+            widths["contacts.ageing.young_relative_width"] = self.ageing.young_relative_width
+        return widths
+
     @property
     def contact_static_force(self) -> float:
         """f_s [N]."""
@@ -465,6 +479,19 @@ class Interaction(Table):
                 f"a site (is {self.rows})",
             )
         return self
+
+    @property
+    def acts(self) -> bool:
+        """Whether neighbours exert forces; without, contacts only have sites."""
+        return self.strength > 0
+
+    @property
+    def sites(self) -> tuple[Array, Array]:
+        """Sites of the contacts in units of their distance, each of shape (rows, columns)."""
+        row, column = np.indices((self.rows, self.columns), dtype=float)
+        if self.lattice == "square":
+            return column, row
+        return column + 0.5 * (row % 2), row * np.sqrt(0.75)
 
     @property
     def neighbours(self) -> int:

@@ -46,8 +46,7 @@ def breaking(before: xr.Dataset, after: xr.Dataset | None) -> NDArray[np.bool_]:
 def thresholds(tree: xr.DataTree, snapshot: xr.Dataset) -> Array | None:
     """Stretches at which the pinned contacts of a snapshot break [m]; None if their neighbours
     have a share in it."""
-    interaction = config_of(tree).interaction
-    if interaction is not None and interaction.strength != 0:
+    if config_of(tree).contact_kind.has_neighbours:
         return None
     stretch, load = snapshot["stretch"].values.ravel(), snapshot["load"].values.ravel()
     known = np.abs(np.nan_to_num(load)) > MIN_LOAD

@@ -16,7 +16,7 @@ DIGITS = 5
 
 def curve(subjects: Sequence[Subject]) -> Section:
     """Numbers of force curves."""
-    from mesoslip.theory.force_curve_dataset import SUMMARY
+    from mesoslip.theory.curve import SUMMARY
 
     return _numbers("Force curve", subjects, SUMMARY)
 

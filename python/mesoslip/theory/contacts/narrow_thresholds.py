@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mesoslip.configuration.contacts.activated import thermal_of
 from mesoslip.errors import MesoslipError
-from mesoslip.theory.activated_sliding import RateAndState
+from mesoslip.theory.contacts.thermal_sliding import RateAndStateTheory
+from mesoslip.theory.delays import mean_delay
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 STEPS, TOLERANCE = 200, 1e-12
 
 
-def rate_and_state_of_narrow_thresholds(config: Config, velocity: float) -> RateAndState:
+def rate_and_state_of_narrow_thresholds(config: Config, velocity: float) -> RateAndStateTheory:
     """a, b and D_c of contacts of one threshold f(t), for f_T ≪ f_s and without delay.
 
     They break in the mean at the stretch x = f(T) - f_T [E₁(z) + ln z + γ], of the age
@@ -38,7 +40,7 @@ def rate_and_state_of_narrow_thresholds(config: Config, velocity: float) -> Rate
 
     Returns
     -------
-    RateAndState
+    RateAndStateTheory
         The parameters.
 
     Raises
@@ -48,9 +50,8 @@ def rate_and_state_of_narrow_thresholds(config: Config, velocity: float) -> Rate
     """
     from scipy.special import exp1
 
-    contacts, thermal = config.contacts, config.contacts.thermal
-    assert thermal is not None
-    if contacts.delay > 0 and not config.slider.ignores_delay:
+    contacts, thermal = config.contacts, thermal_of(config)
+    if mean_delay(config) > 0:
         raise MesoslipError("rate and state of narrow thresholds are known without contacts.delay")
     ratio, back = thermal.ratio(contacts.contact_static_force), contacts.back_force_ratio
     speed = velocity / contacts.break_stretch
@@ -69,13 +70,11 @@ def rate_and_state_of_narrow_thresholds(config: Config, velocity: float) -> Rate
     net = (activated - grown) / (2 * approach)
     distance = (stretch - back) * (activated / 6 + grown / 3) / (activated + grown)
     static = contacts.static_force
-    return RateAndState(static * a, static * (a - net), distance * contacts.break_stretch)
+    return RateAndStateTheory(static * a, static * (a - net), distance * contacts.break_stretch)
 
 
 def _threshold(config: Config, age: float) -> tuple[float, float]:
     """Mean threshold over f_s at an age, and its change in a second."""
-    law, width = config.contacts.ageing, config.contacts.threshold.relative_width
-    if law is None:
-        return 1.0, 0.0
-    before, here, after = law.threshold(1.0, width, age * np.array([1 - 1e-5, 1.0, 1 + 1e-5]))
+    ages = age * np.array([1 - 1e-5, 1.0, 1 + 1e-5])
+    before, here, after = config.contacts.threshold_at(np.ones(1), ages)
     return float(here), float(after - before) / (2e-5 * age)

@@ -1,4 +1,4 @@
-"""A force curve in the layout of an output file, and the meanings of its derived quantities."""
+"""The force curve, or steady sliding over velocity, in the layout of an output file."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
+from mesoslip.theory.contacts import contact_theory
+from mesoslip.theory.force_curve import ForceCurve
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from mesoslip.theory.force_curve import ForceCurve
 
 # Units and meanings of the summary of a curve.
 SUMMARY = {
@@ -46,8 +47,33 @@ SUMMARY = {
 DENSITY_POINTS, WIDTHS_BELOW = 2001, 6
 
 
-def tree_of(curve: ForceCurve) -> xr.DataTree:
-    """A curve as an output.
+def curve(config: ConfigLike) -> xr.DataTree:
+    """The force curve F(X) of the master equation, and its elastic instability.
+
+    Returns
+    -------
+    xarray.DataTree
+        Root: force, slope, stiffness and rate of breaks over ``displacement``; ``K_star``, ``X_c``,
+        ``F_peak``, ``F_steady``, ``D0`` to ``D3``, ``stable`` as attributes, in SI. Group
+        ``critical``: all X_c; ``stretch_density``: the densities that ``curve.density_at`` asks
+        for. Of contacts that age or break by thermal activation: steady sliding over ``velocity``.
+
+    Raises
+    ------
+    FileError, ConfigError
+        If the configuration cannot be read or is wrong.
+    """
+    checked = as_config(config)
+    if contact_theory(checked).depends_on_velocity:
+        # Few curves need it.
+        from mesoslip.theory.steady_curve import SteadyCurve
+
+        return SteadyCurve(checked).to_tree()
+    return curve_tree(ForceCurve(checked))
+
+
+def curve_tree(curve: ForceCurve) -> xr.DataTree:
+    """A force curve as an output.
 
     Root: F, F', K_c and Γ over ``displacement``, with V_eff if a drive displacement is given;
     derived quantities as attributes. Groups: ``critical`` (all X_c), ``stretch_density``

@@ -1,6 +1,6 @@
 """Linear stability of steady sliding with thermally activated breaking, with and without ageing.
 
-As `steady_sliding`, with a response of the contacts that depends on the hazards. A contact of the
+As for plain contacts, with a response of the contacts that depends on the hazards. A contact of the
 age a, under a slider moving with v t + ε e^(λt), has the perturbed hazard
 
     δH(a) = ε e^(λ t') D(a),    D(a) = ∫_0^a (k h/f_T) (e^(λ a') - 1) da',
@@ -12,17 +12,16 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.theory.activated_lives import ActivatedLives
-from mesoslip.theory.activated_response import MAX_TURN, ActivatedResponse, Motion
+from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives
+from mesoslip.theory.contacts.thermal_response import MAX_TURN, Motion, ThermalResponse
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.sliders import mode_frequencies
-from mesoslip.theory.thermal import steady_force, steady_slope
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -49,14 +48,14 @@ SMOOTH_FROM, THINNING = 1.5, 3
 POINTS_A_MODE = 2
 
 
-class RateAndState(NamedTuple):
-    """Parameters of rate and state that describe activated contacts near a velocity.
+class RateAndStateTheory(NamedTuple):
+    """Parameters of rate and state that describe contacts near a velocity.
 
     Attributes
     ----------
     a
         Direct effect [N]: N f_T times the shares of contacts that are pinned, and of those that
-        break before they come to their thresholds. After a step of the velocity by a factor r they
+        break before they reach their thresholds. After a step of the velocity by a factor r they
         break at a force that is higher by f_T ln r.
     b
         Evolution effect [N]: a - dF/d ln v.
@@ -78,19 +77,21 @@ class RateAndState(NamedTuple):
         return (self.b - self.a) / self.slip_distance * (1 + inertia)
 
 
-class ActivatedSliding(LinearStability):
+class ThermalSliding(LinearStability):
     """Steady sliding of contacts that break by thermal activation.
 
-    Parameters and errors are those of `LinearStability`; contacts may age.
+    Parameters and errors are those of `LinearStability`.
     """
 
-    @cached_property
-    def lives(self) -> ActivatedLives:
-        """Lives of the contacts, to six digits."""
-        return ActivatedLives(self.config, self.velocity, coarseness=COARSENESS)
+    lives_type: ClassVar[type[ThermalLives]] = ThermalLives
 
     @cached_property
-    def _responses(self) -> dict[int, ActivatedResponse]:
+    def lives(self) -> ThermalLives:
+        """Lives of the contacts, to six digits."""
+        return self.lives_type(self.config, self.velocity, coarseness=COARSENESS)
+
+    @cached_property
+    def _responses(self) -> dict[int, ThermalResponse]:
         return {}
 
     def _motion(self, rate: Complex) -> Motion:
@@ -107,17 +108,17 @@ class ActivatedSliding(LinearStability):
             result[:, some] = here(rate[some])
         return Motion(*result)
 
-    def _response(self, level: int) -> ActivatedResponse:
+    def _response(self, level: int) -> ThermalResponse:
         if level not in self._responses:
             fineness = 2 ** max(0, level)
             lives = self._finer_lives(fineness) if self._are_reached else self.lives
             length = COARSENESS / self._breaking_rate / fineness
-            self._responses[level] = ActivatedResponse(lives, length)
+            self._responses[level] = ThermalResponse(lives, length)
         return self._responses[level]
 
-    def _finer_lives(self, fineness: int) -> ActivatedLives:
+    def _finer_lives(self, fineness: int) -> ThermalLives:
         """Lives with as many thresholds as their ends need, at which the response has no spread."""
-        return ActivatedLives(
+        return self.lives_type(
             self.config,
             self.velocity,
             coarseness=COARSENESS,
@@ -127,7 +128,7 @@ class ActivatedSliding(LinearStability):
 
     @cached_property
     def _are_reached(self) -> bool:
-        """Whether contacts come to their thresholds."""
+        """Whether contacts reach their thresholds."""
         return float(np.sum(self.lives.weight * self.lives.reached)) > HARDLY
 
     @cached_property
@@ -140,17 +141,17 @@ class ActivatedSliding(LinearStability):
 
     @property
     def force(self) -> float:
-        return steady_force(self.config, self.velocity)
+        return self.lives_type(self.config, self.velocity).force
 
     @property
     def slope(self) -> float:
-        return steady_slope(self.config, self.velocity) / self.velocity
+        return self.lives_type(self.config, self.velocity).force_slope / self.velocity
 
     def _parts(self, rate: Complex) -> Parts:
         stiffness = self.config.contacts.stiffness
         density = 1 / (self.lives.life + self.delay)
         lost, held, number, load = self._motion(rate)
-        late, detached = self._late(rate)
+        late, detached = self._delays.late(rate)
         births = rate * number * late + detached
         # Drag of a velocity [N s/m], and 1/s to N/m.
         drag = self._drag * density
@@ -192,12 +193,12 @@ class ActivatedSliding(LinearStability):
         return lives.speed / lives.scale
 
     @cached_property
-    def rate_and_state(self) -> RateAndState:
+    def rate_and_state(self) -> RateAndStateTheory:
         """a, b and D_c near this velocity; a one-state law need not describe the contacts."""
         lives = self.lives
         life = lives.life + self.delay
         hazards, _ = lives.accumulated(lives.hazard)
-        # Contacts that break later bear on, and attach later with the back force.
+        # Contacts that break later bear force for longer, and attach later with the back force.
         later = lives.mean((lives.stretch - lives.back) * lives.survival * hazards)
         a = self.config.contacts.static_force * self._breaking_rate * later / life
         net = self.velocity * self.slope
@@ -206,7 +207,7 @@ class ActivatedSliding(LinearStability):
         rate = SLOW / life
         here, twice = (self.response_at(one + 0j).real / one for one in (rate, 2 * rate))
         area = self.velocity**2 * float((twice - here) / rate)
-        return RateAndState(
+        return RateAndStateTheory(
             a, a - net, (area + a * self.velocity / self._breaking_rate) / (a - net)
         )
 
@@ -226,7 +227,7 @@ class ActivatedSliding(LinearStability):
         spread = math.sqrt(max(2 * half_square - lives.life**2, 1e-12 * lives.life**2))
         # Faster than contacts break, the response has no cycles of births any more.
         until = min(AVERAGED_OUT / spread, SMOOTH_FROM * self._breaking_rate)
-        return Turns(lives.life + self.delay, until, self._fixed_delay)
+        return Turns(lives.life + self.delay, until, self._delays.turning)
 
     @property
     def work(self) -> int:
@@ -239,5 +240,14 @@ class ActivatedSliding(LinearStability):
 
     @property
     def _ingredients(self) -> str:
-        contacts = self.config.contacts
-        return "temperature" + (" and ageing" if contacts.ageing is not None else "")
+        return "temperature"
+
+
+class ThermalAgeingSliding(ThermalSliding):
+    """The same of contacts whose thresholds change with age."""
+
+    lives_type: ClassVar[type[ThermalLives]] = ThermalAgeingLives
+
+    @property
+    def _ingredients(self) -> str:
+        return "temperature and ageing"

@@ -11,6 +11,7 @@ threshold at the latest, at the age T.
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.errors import MesoslipError
-from mesoslip.theory import ageing
+from mesoslip.configuration.contacts.activated import thermal_of
+from mesoslip.configuration.contacts.ageing import ageing_of
+from mesoslip.theory.contacts import ageing_lives
+from mesoslip.theory.contacts.steady import check_steady
+from mesoslip.theory.delays import drag_impulse, mean_delay
 from mesoslip.theory.thresholds import threshold_quadrature
 
 if TYPE_CHECKING:
@@ -39,11 +43,15 @@ MIN_HAZARD, MAX_HAZARD = 1e-14, 40.0
 SEARCH_PANELS, MAX_PANEL = 60, 1.0
 # Panels over the ages in which young thresholds change.
 AGEING_PANELS = 36
+# Panels and points of the hazard in a hold of contacts that age.
+HOLD_PANELS, HOLD_POINTS = 24, 4
+# Change of ln v for derivatives of the force of contacts that age.
+SLOPE_STEP = 1e-3
 # Exponents whose exponential functions are numbers.
 MAX_EXPONENT = 700.0
 
 
-class ActivatedLives:
+class ThermalLives:
     """Quadratures over thresholds and ages; forces over f_s, stretches over f_s/k, times in s.
 
     Parameters
@@ -63,8 +71,9 @@ class ActivatedLives:
 
     Raises
     ------
-    MesoslipError
-        If contacts attach with forces of a distribution (``contacts.newborn_width``).
+    ConfigError
+        If contacts do not attach again, or attach with different forces
+        (``contacts.newborn_width``).
 
     Attributes
     ----------
@@ -88,14 +97,10 @@ class ActivatedLives:
         threshold_panel: float | None = None,
         max_threshold_panels: int = MAX_PANELS,
     ) -> None:
-        contacts, thermal = config.contacts, config.contacts.thermal
-        assert thermal is not None
-        if contacts.newborn_width > 0:
-            raise MesoslipError(
-                "the friction of activated contacts is known without contacts.newborn_width: they "
-                "must attach with one force"
-            )
+        contacts, thermal = config.contacts, thermal_of(config)
+        check_steady(config)
         self.config = config
+        self.velocity = velocity
         self.speed = velocity / contacts.break_stretch
         """Stretch in a second."""
         self.back = contacts.back_force_ratio
@@ -127,12 +132,7 @@ class ActivatedLives:
 
     def threshold_at(self, age: Array) -> Array:
         """f_s(t), shape (thresholds, points)."""
-        law = self.config.contacts.ageing
-        if law is None:
-            return np.broadcast_to(
-                self.threshold, np.broadcast_shapes(self.threshold.shape, age.shape)
-            )
-        return law.threshold(self.threshold, self.config.contacts.threshold.relative_width, age)
+        return self.config.contacts.threshold_at(self.threshold, age)
 
     def mean(self, values: Array) -> float:
         """⟨∫ values dt⟩ [s times the unit of the values]."""
@@ -157,10 +157,7 @@ class ActivatedLives:
 
     @cached_property
     def approach(self) -> Array:
-        """v minus the velocity at which a threshold grows where it is reached, [1/s]."""
-        law = self.config.contacts.ageing
-        if law is None:
-            return np.full_like(self.end, self.speed)
+        """v minus the velocity at which a threshold grows where it is reached [1/s]."""
         change = 1e-6 * self.end
         growth = self.threshold_at(self.end + change) - self.threshold_at(self.end - change)
         return self.speed - growth / (2 * change)
@@ -187,13 +184,46 @@ class ActivatedLives:
         return np.minimum(hazard, MAX_EXPONENT), np.minimum(last, MAX_EXPONENT)
 
     def _end(self) -> Array:
-        if self.config.contacts.ageing is None:
-            return (self.threshold - self.back) / self.speed
-        return ageing.lives(self.config, self.threshold[:, 0], self.speed)[:, None]
+        return (self.threshold - self.back) / self.speed
+
+    def young_ages(self, max_age: float, count: int) -> Array:
+        """Ages up to a maximum within which young thresholds change [s], shape (at most count,)."""
+        del max_age, count
+        return np.zeros(0)
+
+    def hazard_held(self, hold: float) -> Array:
+        """Hazard in a hold [s] of contacts that were pinned before, shape (thresholds, points)."""
+        return np.asarray(self.rate * hold)
+
+    @cached_property
+    def force(self) -> float:
+        """F(v) = N (k ⟨∫ x S dt⟩ + m η v τ_d)/(⟨∫ S dt⟩ + τ_d) [N]."""
+        static = self.config.contacts.static_force
+        return (static * self.work + self._drag) / (self.life + self.delay)
+
+    @cached_property
+    def force_slope(self) -> float:
+        """dF/d ln v [N]; (f_T/f_s) F_s/2 for one high threshold."""
+        static = self.config.contacts.static_force
+        # The hazard at a stretch is proportional to 1/v, and so is the age.
+        life = self.life + self.delay
+        work = static * self.work + self._drag
+        broken = self.hazard * self.survival
+        work_slope = static * (self.mean(self.stretch * broken) - self.work) + self._drag
+        life_slope = self.mean(broken) - self.life
+        return work_slope / life - work * life_slope / life**2
+
+    @property
+    def delay(self) -> float:
+        """Mean delay [s]."""
+        return mean_delay(self.config)
+
+    @property
+    def _drag(self) -> float:
+        return drag_impulse(self.config, self.velocity)
 
     def _edges(self, max_panel: float, coarseness: float) -> Array:
         """Ends of the panels over ages, (thresholds, panels + 1); none breaks in the first."""
-        law = self.config.contacts.ageing
         end, start = self.end, np.zeros_like(self.end)
         length = self.scale / self.speed
         # The middle of a panel has less than its mean rate: contacts are broken by the age found.
@@ -218,15 +248,43 @@ class ActivatedLives:
         longest = min(MAX_PANEL * coarseness * length, max_panel)
         count = max(MIN_PANELS, math.ceil(float(np.max(end - start)) / longest))
         edges = start + (end - start) * np.linspace(0, 1, count + 1)
-        if law is not None:
-            # Young thresholds change within the ageing time: panels of equal ratios.
-            max_age = float(np.max(end))
-            young = np.geomspace(
-                0.1 * min(law.time, max_age), max_age, math.ceil(AGEING_PANELS / coarseness)
-            )
-            young = young[young > np.min(start)]
-            edges = np.sort(np.concatenate([edges, np.clip(young, start, end)], axis=1), axis=1)
+        young = self.young_ages(float(np.max(end)), math.ceil(AGEING_PANELS / coarseness))
+        young = young[young > np.min(start)]
+        edges = np.sort(np.concatenate([edges, np.clip(young, start, end)], axis=1), axis=1)
         return np.concatenate([np.zeros_like(end), edges], axis=1)
+
+
+class ThermalAgeingLives(ThermalLives):
+    """The same of contacts whose thresholds change with age."""
+
+    def _end(self) -> Array:
+        return ageing_lives.lives(self.config, self.threshold[:, 0], self.speed)[:, None]
+
+    def young_ages(self, max_age: float, count: int) -> Array:
+        # Panels of equal ratios.
+        return np.geomspace(0.1 * min(ageing_of(self.config).time, max_age), max_age, count)
+
+    def hazard_held(self, hold: float) -> Array:
+        if hold == 0:
+            return np.zeros_like(self.rate)
+        point, weight = np.polynomial.legendre.leggauss(HOLD_POINTS)
+        # Thresholds change with the logarithm of the age.
+        first = 1e-2 * min(ageing_of(self.config).time, hold)
+        edges = np.concatenate([[0.0], np.geomspace(first, hold, HOLD_PANELS)])
+        hazard = np.zeros_like(self.rate)
+        for low, high in itertools.pairwise(edges):
+            half = (high - low) / 2
+            for at, share in zip(low + half * (1 + point), half * weight, strict=True):
+                hazard += share * self.rate_at(self.age + at, self.stretch)
+        return hazard
+
+    @cached_property
+    def force_slope(self) -> float:
+        up, down = (
+            type(self)(self.config, self.velocity * math.exp(sign * SLOPE_STEP)).force
+            for sign in (1, -1)
+        )
+        return (up - down) / (2 * SLOPE_STEP)
 
 
 @cache

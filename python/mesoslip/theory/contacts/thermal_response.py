@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.theory.activated_lives import AGEING_PANELS, POINTS, ActivatedLives, cumulative
+from mesoslip.theory.contacts.thermal_lives import AGEING_PANELS, POINTS, ThermalLives, cumulative
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -58,7 +58,7 @@ class _Panel(NamedTuple):
     """⟨S(a) h(a')⟩ with the weights of a' < a in the panel, shape (points, points)."""
 
 
-class ActivatedResponse:
+class ThermalResponse:
     """Averages over thresholds and ages, with panels of a length.
 
     Parameters
@@ -69,7 +69,7 @@ class ActivatedResponse:
         Length of the panels over the ages at which contacts break [s].
     """
 
-    def __init__(self, lives: ActivatedLives, length: float) -> None:
+    def __init__(self, lives: ThermalLives, length: float) -> None:
         self.lives = lives
         self._point, self._share = np.polynomial.legendre.leggauss(POINTS)
         self._begin = float(np.min(lives.edges[:, 1]))
@@ -93,12 +93,8 @@ class ActivatedResponse:
         end = float(np.max(lives.edges[:, -1]))
         count = max(1, math.ceil((end - self._begin) / length))
         edges: Array = np.linspace(self._begin, end, count + 1)
-        law = lives.config.contacts.ageing
-        if law is not None:
-            # Young thresholds change within the ageing time: panels of equal ratios.
-            young = np.geomspace(0.1 * min(law.time, end), end, AGEING_PANELS // 2)
-            edges = np.unique(np.concatenate([edges, young[young > self._begin]]))
-        return edges
+        young = lives.young_ages(end, AGEING_PANELS // 2)
+        return np.union1d(edges, young[young > self._begin])
 
     def _panel(self, start: float, end: float, hazard: Array) -> tuple[_Panel, Array, Array]:
         """A panel, and ⟨S⟩ and ⟨S H⟩ at its points with their weights.

@@ -1,7 +1,7 @@
 """Linear stability of steady sliding of contacts that age, without temperature.
 
-A contact breaks at the age T at which its force comes to its threshold. Under a slider that moves
-with v t + ε e^(λt) it comes to it earlier by ε e^(λt') (e^(λT) - 1)/c, with the velocity c at which
+A contact breaks at the age T at which its force reaches its threshold. Under a slider that moves
+with v t + ε e^(λt) this is earlier by ε e^(λt') (e^(λT) - 1)/c, with the velocity c at which
 its stretch approaches that at which it breaks. The rest is as in ``docs/temperature.md``, where no
 contact breaks below its threshold.
 """
@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.theory import ageing
+from mesoslip.theory.contacts.ageing_lives import lives, steady_force
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.thresholds import threshold_quadrature
@@ -53,12 +53,11 @@ class AgeingSliding(LinearStability):
 
     @cached_property
     def _ends(self) -> _Ends:
-        contacts, law = self.config.contacts, self.config.contacts.ageing
-        assert law is not None
+        contacts = self.config.contacts
         weight, threshold = threshold_quadrature(self.config, PANELS, POINTS)
-        age = ageing.lives(self.config, threshold, self._rate)
-        width, change = contacts.threshold.relative_width, AGE_STEP * age
-        later, earlier = (law.threshold(threshold, width, age + d) for d in (change, -change))
+        age = lives(self.config, threshold, self._rate)
+        change = AGE_STEP * age
+        later, earlier = (contacts.threshold_at(threshold, age + d) for d in (change, -change))
         approach = self._rate - (later - earlier) / (2 * change)
         return _Ends(weight, age, contacts.back_force_ratio + self._rate * age, approach)
 
@@ -69,12 +68,12 @@ class AgeingSliding(LinearStability):
 
     @property
     def force(self) -> float:
-        return ageing.steady_force(self.config, self.velocity)
+        return steady_force(self.config, self.velocity)
 
     @property
     def slope(self) -> float:
         up, down = (
-            ageing.steady_force(self.config, self.velocity * math.exp(sign * SLOPE_STEP))
+            steady_force(self.config, self.velocity * math.exp(sign * SLOPE_STEP))
             for sign in (1, -1)
         )
         return (up - down) / (2 * SLOPE_STEP * self.velocity)
@@ -87,7 +86,7 @@ class AgeingSliding(LinearStability):
         missing[self._are_out_of_step(rate)] = 1.0
         lost, lost_load = missing @ share, missing @ (share * ends.stretch)
         number, load = self._transforms(rate)
-        late, detached = self._late(rate)
+        late, detached = self._delays.late(rate)
         births = rate * number * late + detached
         drag = self._drag * density
         fed = rate * lost * density * stiffness * load * late + drag * self._rate * lost * detached
@@ -128,7 +127,7 @@ class AgeingSliding(LinearStability):
     def _turns(self) -> Turns:
         ends = self._ends
         spread = math.sqrt(max(0.0, float(ends.weight @ (ends.age - self._life) ** 2)))
-        return Turns(self._life + self.delay, AVERAGED_OUT / spread, self._fixed_delay)
+        return Turns(self._life + self.delay, AVERAGED_OUT / spread, self._delays.turning)
 
     @property
     def is_passive(self) -> bool:

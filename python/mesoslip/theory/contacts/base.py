@@ -1,0 +1,135 @@
+"""The interface of the theories of all kinds of contacts, whose base refuses every question."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar, NoReturn
+
+from mesoslip.errors import ConfigError, Problem
+from mesoslip.theory.quantity import Quantity
+
+if TYPE_CHECKING:
+    from mesoslip.configuration.config import Config
+    from mesoslip.theory.linear_stability import LinearStability
+
+# Keys whose effect every theory has, or states as a limit of its own. A key that is not here and
+# not among the features of a theory is one that it does not know.
+KNOWN_KEYS = frozenset(
+    f"contacts.{key}"
+    for key in (
+        *("count", "static_force", "stiffness", "area", "film_thickness", "film_density"),
+        *("drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width", "coupling"),
+        *("initial", "reattach", "threshold"),
+    )
+)
+
+
+class ContactTheory:
+    """Theory of contacts under a slider that slides steadily or slowly.
+
+    A kind overrides the questions that it answers; all others end with a ConfigError that names
+    the key which has no theory.
+
+    Attributes
+    ----------
+    features
+        Keys and tables beyond the known ones that the theory accounts for.
+    caveat
+        What results leave out; empty if nothing.
+    """
+
+    features: ClassVar[frozenset[str]] = frozenset()
+    caveat: ClassVar[str] = ""
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+
+    @property
+    def depends_on_velocity(self) -> bool:
+        """Whether slow sliding has no force of its own, so that there is no force curve F(X)."""
+        self._refuse("no theory of slow sliding")
+
+    def check_force_curve(self) -> None:
+        """Refuse contacts without a force curve F(X)."""
+        self._refuse("no force curve")
+
+    def sliding(self, velocity: float | None = None) -> LinearStability:
+        """Steady sliding at a velocity [m/s], that of the drive by default, and its stability."""
+        del velocity
+        self._refuse("no linear stability theory")
+
+    def steady_force(self, velocity: float) -> float:
+        """Force of steady sliding at a positive velocity [m/s], with delay and drag [N]."""
+        del velocity
+        self._refuse("no theory of steady sliding")
+
+    def creep_force(self, velocity: float) -> float:
+        """Force under which a slider creeps at a velocity [m/s], its damping included [N]."""
+        del velocity
+        self._refuse("no theory of creep")
+
+    def creep_velocity(self, force: float) -> float:
+        """Velocity of steady creep under a positive force [N]; NaN if none bears it [m/s]."""
+        del force
+        self._refuse("no theory of creep")
+
+    def quantities(self) -> Iterator[Quantity]:
+        """Quantities that follow from the keys of the contacts, for ``mesoslip info``."""
+        self._refuse("no derived quantities")
+
+    def _refuse(self, missing: str) -> NoReturn:
+        """Raise an error that names the key without a theory."""
+        features = self.config.given_contact_keys - KNOWN_KEYS
+        raise ConfigError(
+            [Problem("", key, f"has {missing}: leave it out") for key in sorted(features)]
+            or [Problem("", "contacts", f"have {missing}")]
+        )
+
+    @property
+    def K_star_estimate(self) -> float:  # noqa: N802
+        """Estimate S48 of K* [N/m]."""
+        contacts = self.config.contacts
+        rise = 1 - contacts.back_force_ratio
+        return contacts.stiffness * rise / contacts.threshold.relative_width
+
+    def common_quantities(self) -> Iterator[Quantity]:
+        """Quantities that contacts of all known kinds have."""
+        contacts = self.config.contacts
+        static, stiffness = contacts.contact_static_force, contacts.contact_stiffness
+        yield Quantity(
+            "contact_static_force", static, "N", "mean static threshold of a contact, f_s = F_s/N"
+        )
+        yield Quantity("contact_stiffness", stiffness, "N/m", "mean stiffness of a contact, k")
+        yield Quantity(
+            "break_stretch",
+            contacts.break_stretch,
+            "m",
+            "mean stretch at which a contact breaks, f_s/k",
+        )
+        if contacts.contact_mass > 0:
+            yield Quantity(
+                "contact_mass", contacts.contact_mass, "kg", "mass of a contact, m = rho (A/N) h"
+            )
+        if contacts.area is not None:
+            area = contacts.area / contacts.count
+            spacing = "distance between neighbours, a = (A/N)^(1/2)"
+            yield Quantity("contact_spacing", math.sqrt(area), "m", spacing)
+            yield Quantity("contact_radius", math.sqrt(area / math.pi), "m", "radius of a contact")
+        yield Quantity(
+            "threshold_acceptance",
+            contacts.threshold.probability_above(contacts.min_threshold),
+            "1",
+            "probability that a drawn threshold exceeds the back force" + self._ages,
+        )
+        yield Quantity(
+            "K_star_estimate",
+            self.K_star_estimate,
+            "N/m",
+            "estimate of K*, above which slow sliding without delay is stable, "
+            "Nk (f_s - f_b)/Delta f_s (S48); mesoslip curve computes K*, which depends on the "
+            "threshold law",
+        )
+
+    # Ages of contacts whose thresholds have to exceed the back force, in words.
+    _ages: ClassVar[str] = ""

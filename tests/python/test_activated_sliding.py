@@ -300,3 +300,33 @@ def test_run_prints_the_velocity_of_creep_under_a_force(tmp_path, command):
     assert found is not None
     expected = contact_theory(Config.from_dict(tables)).creep_velocity(7.8e-6)
     assert float(found[1]) * 1e-9 == pytest.approx(expected, rel=0.15)
+
+
+def test_drag_is_part_of_the_direct_effect():
+    """The force of the master equation jumps by it at a step of the velocity, before any evolves."""
+    wide = {
+        "contacts.drag_rate": 2e15,
+        "contacts.delay": 5e-4,
+        "contacts.threshold.relative_width": 0.3,
+        "contacts.back_force_ratio": 0.0,
+    }
+    config = klein_activated(1e4, 0.02, **wide)
+    velocity, logarithm = 1e-5, 0.02
+    found = sliding_of(config, velocity).rate_and_state
+    length = config.contacts.break_stretch
+    jumps = []
+    for sign in (1, -1):
+        after = velocity * math.exp(sign * logarithm / 2)
+        tables = config.to_dict()
+        tables["run"] = {"engine": "me"}
+        tables["slider"] = {"kind": "prescribed"}
+        stages = ((14 * length, velocity), (0.1 * length, after))
+        stage = [{"duration": d / one, "velocity": one} for d, one in stages]
+        tables["drive"] = {"stage": stage}
+        tables["output"] = {"interval": 1e-3 * length / velocity}
+        tree = mesoslip.run(Config.from_dict(tables))
+        moved = tree["displacement"].values[0] - 14 * length
+        jumps.append(np.interp(2e-3 * length, moved, tree["contact_force"].values[0]))
+    direct = (jumps[0] - jumps[1]) / logarithm
+    assert found.a == pytest.approx(direct, rel=0.02)
+    assert found.slip_distance > 0

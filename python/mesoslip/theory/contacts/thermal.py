@@ -185,7 +185,10 @@ class ThermalTheory(ContactTheory):
         except ConfigError:
             return
         yield Quantity(
-            "direct_effect", found.a, "N", "a of rate and state: N f_T of the pinned contacts"
+            "direct_effect",
+            found.a,
+            "N",
+            "a of rate and state: N f_T of the pinned contacts, and the drag of the detached",
         )
         yield Quantity("evolution_effect", found.b, "N", "b of rate and state: a - dF/d ln v")
         yield Quantity(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives
 from mesoslip.theory.contacts.thermal_response import MAX_TURN, Motion, ThermalResponse
+from mesoslip.theory.delays import drag_impulse
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.sliders import mode_frequencies
@@ -55,8 +56,8 @@ class RateAndStateTheory(NamedTuple):
     ----------
     a
         Direct effect [N]: N f_T times the shares of contacts that are pinned, and of those that
-        break before they reach their thresholds. After a step of the velocity by a factor r they
-        break at a force that is higher by f_T ln r.
+        break before they reach their thresholds, and the drag of the detached ones. After a step of
+        the velocity by a factor r contacts break at a force that is higher by f_T ln r.
     b
         Evolution effect [N]: a - dF/d ln v.
     slip_distance
@@ -200,15 +201,16 @@ class ThermalSliding(LinearStability):
         hazards, _ = lives.accumulated(lives.hazard)
         # Contacts that break later bear force for longer, and attach later with the back force.
         later = lives.mean((lives.stretch - lives.back) * lives.survival * hazards)
-        a = self.config.contacts.static_force * self._breaking_rate * later / life
+        activated = self.config.contacts.static_force * self._breaking_rate * later / life
+        a = activated + drag_impulse(self.config, self.velocity) / life
         net = self.velocity * self.slope
-        # Λ = λ Λ'(0) + λ² Λ''(0)/2 + ...: the area is v² Λ''(0)/2 for each unit of ln r. The direct
-        # effect comes as 1 - e^(-k X/f_T), which the area has too.
+        # Λ = λ Λ'(0) + λ² Λ''(0)/2 + ...: the area is v² Λ''(0)/2 for each unit of ln r. Drag changes
+        # at once; the direct effect of activation rises as 1 - e^(-k X/f_T), which the area has too.
         rate = SLOW / life
         here, twice = (self.response_at(one + 0j).real / one for one in (rate, 2 * rate))
         area = self.velocity**2 * float((twice - here) / rate)
         return RateAndStateTheory(
-            a, a - net, (area + a * self.velocity / self._breaking_rate) / (a - net)
+            a, a - net, (area + activated * self.velocity / self._breaking_rate) / (a - net)
         )
 
     @cached_property

@@ -303,7 +303,7 @@ def test_run_prints_the_velocity_of_creep_under_a_force(tmp_path, command):
 
 
 def test_drag_is_part_of_the_direct_effect():
-    """The force of the master equation jumps by it at a step of the velocity, before any evolves."""
+    """The force of the master equation jumps by it at a step of the velocity."""
     wide = {
         "contacts.drag_rate": 2e15,
         "contacts.delay": 5e-4,

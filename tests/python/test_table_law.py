@@ -199,3 +199,57 @@ def test_what_is_wrong_with_the_keys(threshold, key, words):
     (problem,) = caught.value.problems
     assert problem.key == f"contacts.threshold.{key}"
     assert words in problem.message
+
+
+def two_peaks(number: int, seed: int) -> dict[str, object]:
+    """Samples of half N(0.6, 0.05) and half N(1.4, 0.05)."""
+    rng = np.random.default_rng(seed)
+    peak = np.where(rng.random(number) < 0.5, 0.6, 1.4)
+    return {"law": "table", "samples": rng.normal(peak, 0.05).tolist()}
+
+
+# K* over Nk by cells of the law itself, of 4000 cells of equal width.
+@pytest.mark.parametrize(("back", "exact"), [(0.0, 4.606), (0.2, 4.022)])
+def test_the_critical_stiffness_of_samples_is_that_of_their_law(klein, back, exact):
+    """The slope of F needs a density, which the gaps between samples do not give: it was 38.9."""
+    config = klein(
+        contacts__coupling="equal",
+        contacts__back_force_ratio=back,
+        contacts__threshold=two_peaks(4000, seed=3),
+        curve={"length": 3e-8},
+    )
+    curve = ForceCurve(config)
+    unit = config.contacts.stiffness
+    error = curve.K_star_error / unit
+    assert error < 0.6
+    assert abs(curve.K_star[0] / unit - exact) < error
+    assert curve.error < 0.03
+
+
+def test_the_force_of_many_samples_becomes_that_of_steady_sliding(klein):
+    """The rough density of 4000 samples was sampled at points, and lost a sixth of the force."""
+    config = klein(
+        contacts__coupling="equal",
+        contacts__back_force_ratio=0.0,
+        contacts__threshold=two_peaks(4000, seed=1),
+        curve={"length": 3e-7},
+    )
+    curve = ForceCurve(config)
+    assert curve.force(curve.samples[-1]) == pytest.approx(curve.steady_force, rel=5e-3)
+
+
+def test_samples_have_no_derivatives_of_a_density(klein):
+    config = klein(contacts__threshold=two_peaks(500, seed=2), curve={"length": 3e-8})
+    summary = ForceCurve(config).summary()
+    assert summary["X_c"] is not None
+    assert summary["D2"] is None
+    assert summary["D3"] is None
+    with pytest.raises(ConfigError, match="samples do not give"):
+        mesoslip.onset(config)
+
+
+def test_a_spring_within_the_error_of_the_critical_stiffness_is_left_open(klein):
+    config = klein(contacts__threshold=two_peaks(500, seed=2), curve={"length": 3e-8})
+    near = config.replace({"slider.stiffness": 1.01 * ForceCurve(config).K_star[0]})
+    assert "less than the error of K*" in ForceCurve(near).verdict
+    assert "less than the error of K*" not in ForceCurve(config).verdict

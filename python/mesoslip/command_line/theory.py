@@ -74,6 +74,7 @@ def curve(
     and the stiffness above which sliding is linearly stable.
     """
     from mesoslip.output import targets
+    from mesoslip.quantities import percent, with_unit
     from mesoslip.theory.contacts import contact_theory
     from mesoslip.theory.curve import SUMMARY, curve_tree
     from mesoslip.theory.force_curve import ForceCurve
@@ -105,7 +106,14 @@ def curve(
         if sliding is not None:
             typer.echo(sliding.summary)
         _print_limits(checked, force_curve.K_star[0])
-    if force_curve.error > checked.curve.tolerance:
+    if force_curve.is_sampled:
+        typer.echo(
+            f"thresholds are samples: the force has an error of {percent(force_curve.error)} of "
+            "the static force, and K* one of "
+            f"{with_unit(force_curve.K_star_error, 'N/m', ERROR_DIGITS)}",
+            err=True,
+        )
+    elif force_curve.error > checked.curve.tolerance:
         typer.echo(
             f"the force has {force_curve.digits} digits: its threshold law is not smooth, or too "
             "narrow for this length (curve.length), and curve.tolerance would take too much work",
@@ -199,7 +207,7 @@ def _digits(name: str, curve: ForceCurve) -> int:
         return ERROR_DIGITS
     reliable = curve.digits
     if name in OF_SLOPE:
-        error = curve.slope_error * curve.config.contacts.stiffness
+        error = curve.K_star_error
         steepest = abs(curve.K_star[0])
         reliable = int(math.log10(steepest / error)) + 1 if 0 < error < steepest else ERROR_DIGITS
     return max(ERROR_DIGITS, min(COMPUTED_DIGITS, reliable))

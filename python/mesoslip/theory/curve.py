@@ -23,6 +23,11 @@ SUMMARY = {
         "K* = max(-F'(X)): without delay, slow sliding from this start has no instability with a "
         "stiffer spring; 0 if the force does not fall",
     ),
+    "K_star_error": (
+        "N/m",
+        "estimated error of K*; for samples of thresholds two standard deviations, and half of the "
+        "correction for the bandwidth",
+    ),
     "K_star_displacement": ("m", "displacement at K*"),
     "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
     "stable": (
@@ -38,7 +43,12 @@ SUMMARY = {
     "D1": ("1", "v_d (K M)^(1/2)/F_s"),
     "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
     "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
-    "error": ("1", "estimated error of the force over F_s"),
+    "bandwidth": (
+        "1",
+        "bandwidth with which the density of samples of thresholds is estimated, relative to the "
+        "breaking stretch",
+    ),
+    "error": ("1", "estimated error of the force over F_s, with that of samples of thresholds"),
     "slope_error": ("1", "estimated error of the slope over Nk"),
     "digits": ("1", "reliable digits of the force"),
     "conservation_error": ("1", "maximum relative error of the number of contacts"),

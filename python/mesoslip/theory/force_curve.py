@@ -23,6 +23,7 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.renewal import POINTS, solve_renewal
+from mesoslip.theory.sampled_law import WIDER, sampled_law
 from mesoslip.theory.sliders import loading_rate
 from mesoslip.theory.stretch_density import stretch_density
 
@@ -40,6 +41,10 @@ WITHOUT_NEWBORN_WIDTH = (
 FIRST_WIDTH = 0.7
 # Maximum multiplications of a finer solution, which take about a second.
 MAX_WORK = 2e9
+# The same with a density estimated from samples, whose error is larger.
+MAX_SMOOTHED_WORK = 2e8
+# Displacements at which the error of an estimated density is considered.
+ERROR_POINTS = 400
 # A force counts as falling if it falls by more than this fraction of F_s, and than its error.
 MIN_FALL = 1e-11
 # A curve has reached the stationary force if it ends within this fraction of it.
@@ -93,7 +98,7 @@ class ForceCurve:
         thermal activation.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, *, _widening: float | None = None) -> None:
         self.config = config
         contacts = config.contacts
         contact_theory(config).check_force_curve()
@@ -115,17 +120,25 @@ class ForceCurve:
         self.newborn_width = newborn_width or config.curve.newborn_width
         self.stretch_unit = contacts.static_force / contacts.stiffness
         self.scales = scales(config, self.newborn_width)
+        self._sampled = sampled_law(config)
+        self._widening = _widening
         self.length = config.curve_length
         self._force_unit = contacts.static_force
         self._refine()
 
     def _refine(self) -> None:
         parameters = law_parameters(self.config, self.newborn_width)
+        if self._sampled is not None and self._widening is not None:
+            parameters |= self._sampled.parameters(self._widening)
+        elif self._sampled is not None and self._has_equal_cells:
+            # The solver of cells with stiffnesses does not sample a rough density at points.
+            ones = (1.0,) * np.size(parameters["threshold_weights"])
+            parameters |= {"coupling": "table", "threshold_stiffnesses": ones}
         length = self.length / self.stretch_unit
         start, width = self._first_panels(length)
         coarse = None
         self.kernel_seconds = 0.0
-        self.error = self.slope_error = math.inf
+        self._solution_error = self.slope_error = math.inf
         while True:
             begin = time.perf_counter()
             panels = math.ceil((length - start) / width)
@@ -146,9 +159,11 @@ class ForceCurve:
             self.kernel_seconds += time.perf_counter() - begin
             if coarse is not None:
                 inside = np.linspace(max(0.0, start), length, 20011)[1:-1]
-                self.error = float(np.max(np.abs(fine.force(inside) - coarse.force(inside))))
+                self._solution_error = float(
+                    np.max(np.abs(fine.force(inside) - coarse.force(inside)))
+                )
                 self.slope_error = float(np.max(np.abs(fine.slope(inside) - coarse.slope(inside))))
-            is_exact = self.error <= self.config.curve.tolerance
+            is_exact = self._solution_error <= self.config.curve.tolerance
             if is_exact or (coarse is not None and self._is_too_much(2 * panels, width / 2)):
                 break
             coarse = fine
@@ -156,12 +171,24 @@ class ForceCurve:
         self._solution = fine
         self.panels = panels
         self.conservation_error = fine.conservation_error if self.config.contacts.reattach else 0.0
-        self.error = max(self.error, self.conservation_error)
+        self._solution_error = max(self._solution_error, self.conservation_error)
+
+    @property
+    def _has_equal_cells(self) -> bool:
+        """Whether contacts of a table have one stiffness and attach with one force."""
+        return self.config.contacts.coupling == "equal" and self.newborn_width == 0
+
+    @property
+    def error(self) -> float:
+        """Estimated error of the force over F_s: of the solution, and of samples of thresholds."""
+        sampling = 0.0 if self._sampled is None else self._sampled.force_error
+        return self._solution_error + sampling
 
     def _is_too_much(self, panels: int, width: float) -> bool:
         """Whether a solution would take too much work."""
         band = min(panels, (self.scales.longest - self.scales.shortest) / width + 3)
-        return panels * band * POINTS * (3 + 2 * POINTS) > MAX_WORK
+        max_work = MAX_WORK if self._widening is None else MAX_SMOOTHED_WORK
+        return panels * band * POINTS * (3 + 2 * POINTS) > max_work
 
     def _first_panels(self, length: float) -> tuple[float, float]:
         """Start and width of the panels, with their edges where the density is discontinuous."""
@@ -267,18 +294,58 @@ class ForceCurve:
         for lives the likelier to end the younger they are: wide laws whose density diverges at 0,
         or the exponential one (M. Brown, Ann. Probab. 8 (1980) 227: ages grow with displacement).
         """
-        if not self.falls:
-            return 0.0, math.inf
+        if not self.is_sampled:
+            return self._steepest if self.falls else (0.0, math.inf)
+        stiffness, displacement = self._smoothed._steepest
+        # The bias of a density estimate is of second order in the bandwidth.
+        wider = ForceCurve(self.config, _widening=WIDER)._steepest[0]
+        return max(0.0, 2 * stiffness - wider), displacement
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether thresholds are known by samples.
+
+        F(X) is that of the cells around them, as in runs; K* and X_c need a density, and are those
+        of an estimated one.
+        """
+        return self._sampled is not None
+
+    @cached_property
+    def _smoothed(self) -> ForceCurve:
+        """The curve of the estimated density of samples; itself if the law has a formula."""
+        if self._sampled is None or self._widening is not None:
+            return self
+        return ForceCurve(self.config, _widening=1.0)
+
+    @cached_property
+    def K_star_error(self) -> float:  # noqa: N802
+        """Error of K* [N/m]: of the solution, and of samples of thresholds, two standard
+        deviations and half of the correction for the bandwidth."""
+        smoothed = self._smoothed
+        error = smoothed.slope_error * self._force_unit / self.stretch_unit
+        if self._sampled is None:
+            return error
+        stretch = np.linspace(0, self.scales.first_longest, ERROR_POINTS)[1:]
+        slope = smoothed.slope(stretch * self.stretch_unit)
+        sampling = self._sampled.slope_error(stretch) * self.config.contacts.stiffness
+        steepest = smoothed._steepest[0]
+        # The maximum may be anywhere that the errors allow.
+        above = float(np.nanmax(sampling - slope)) - steepest
+        return error + math.hypot(above, (self.K_star[0] - max(steepest, 0.0)) / 2)
+
+    @cached_property
+    def _steepest(self) -> tuple[float, float]:
+        """Maximum of -F'(X) [N/m] and its displacement [m]."""
         sample = int(np.argmin(self.slope(self.samples)))
         displacement, slope = self._extreme(self.slope, sample)
         return -slope, displacement
 
     @cached_property
     def falls(self) -> bool:
-        """Whether the force falls anywhere on the curve by more than its error."""
+        """Whether the force falls anywhere on the curve by more than the error of its solution."""
         force = self.force(self.samples)
         fall = np.max(np.maximum.accumulate(force) - force) / self._force_unit
-        return bool(fall > max(self.error, MIN_FALL))
+        return bool(fall > max(self._solution_error, MIN_FALL))
 
     @cached_property
     def peak(self) -> tuple[float, float]:
@@ -308,6 +375,11 @@ class ForceCurve:
                 "the curve ends before the force is stationary, so that K* may be larger: choose a "
                 "longer curve.length"
             )
+        if self._is_open:
+            sentences.append(
+                f"{self._name} differs from K* by less than the error of K*, which the samples of "
+                "thresholds leave"
+            )
         if math.isinf(self.spring_stiffness):
             sentences.append("the slider follows the drive, so it has no instability")
         elif self.stable:
@@ -321,6 +393,12 @@ class ForceCurve:
                 f"the first slip starts{self._after_slip}"
             )
         return "; ".join(sentences)
+
+    @property
+    def _is_open(self) -> bool:
+        """Whether samples of thresholds do not decide between the spring and K*."""
+        difference = abs(self.spring_stiffness - self.K_star[0])
+        return self.is_sampled and difference < self.K_star_error
 
     @property
     def _name(self) -> str:
@@ -357,12 +435,14 @@ class ForceCurve:
     @cached_property
     def critical_points(self) -> tuple[CriticalPoint, ...]:
         """All solutions of F'(X) = -K, the lowest first; none if sliding is smooth."""
+        if self._smoothed is not self:
+            return self._smoothed.critical_points
         spring = self.spring_stiffness
         if math.isinf(spring):
             return ()
         samples = self.samples
         if self.falls:
-            samples = np.unique([*samples, self.K_star[1]])
+            samples = np.unique([*samples, self._steepest[1]])
         excess = self.slope(samples) + spring
         changes = np.flatnonzero(np.diff(np.sign(excess)) != 0)
         scale = self.stretch_unit
@@ -378,6 +458,9 @@ class ForceCurve:
     def _critical_point(self, displacement: float) -> CriticalPoint:
         force = float(self.force(displacement))
         second, third = (float(self.slope(displacement, order)) for order in (2, 3))
+        if self.is_sampled:
+            # Samples do not give derivatives of a density.
+            second = third = math.nan
         unit = self._force_unit
         extension = unit / self.spring_stiffness if self.spring_stiffness > 0 else math.inf
         return CriticalPoint(
@@ -416,19 +499,19 @@ class ForceCurve:
         """Derived quantities of the curve in SI units; None for those that do not exist.
 
         ``X_c`` and ``D0``, ``D2``, ``D3`` belong to the lowest solution of F'(X) = -K, which does
-        not exist if sliding is stable; ``D1`` needs a drive that moves and a slider with a mass. A
-        force that does not fall has neither ``F_peak`` nor a displacement at K*, which is 0.
+        not exist if sliding is stable; ``D2`` and ``D3`` need a law with a formula, as samples of
+        thresholds do not give derivatives of a density; ``bandwidth`` is that of samples; ``D1``
+        needs a drive that moves and a slider with a mass. A force that does not fall has neither
+        ``F_peak`` nor a displacement at K*, which is 0.
         """
         critical = self.critical_points[0] if self.critical_points else None
-        contacts = self.config.contacts
         force, peak_displacement = self.peak
         stiffness, stiffness_displacement = self.K_star
         return {
             "K_star": stiffness,
-            "K_star_displacement": stiffness_displacement if self.falls else None,
-            "K_star_estimate": contacts.stiffness
-            * (1 - contacts.back_force_ratio)
-            / contacts.threshold.relative_width,
+            "K_star_error": self.K_star_error,
+            "K_star_displacement": stiffness_displacement if stiffness > 0 else None,
+            "K_star_estimate": contact_theory(self.config).K_star_estimate,
             "stable": self.stable,
             "X_c": critical.displacement if critical else None,
             "F_c": critical.force if critical else None,
@@ -437,8 +520,9 @@ class ForceCurve:
             "F_steady": self.steady_force,
             "D0": critical.D0 if critical else None,
             "D1": loading_rate(self.config.slider, self.config),
-            "D2": critical.D2 if critical else None,
-            "D3": critical.D3 if critical else None,
+            "D2": critical.D2 if critical and self._sampled is None else None,
+            "D3": critical.D3 if critical and self._sampled is None else None,
+            "bandwidth": self._sampled.bandwidth if self._sampled else None,
             "error": self.error,
             "slope_error": self.slope_error,
             "digits": self.digits,

@@ -185,6 +185,11 @@ def onset(config: ConfigLike) -> xr.DataTree:
         kind = config.slider.kind
         raise ConfigError([Problem("", "slider.kind", "must be rigid for the onset of slip", kind)])
     curve = ForceCurve(config)
+    if curve.is_sampled:
+        message = "has no onset: S46 needs derivatives of the density, which samples do not give"
+        raise ConfigError(
+            [Problem("", "contacts.threshold.law", message, config.contacts.threshold.law)]
+        )
     summary = curve.summary()
     if summary["D1"] is None:
         raise ConfigError([Problem("", "drive", "must move for the onset of slip")])

@@ -204,8 +204,9 @@ class ThermalSliding(LinearStability):
         activated = self.config.contacts.static_force * self._breaking_rate * later / life
         a = activated + drag_impulse(self.config, self.velocity) / life
         net = self.velocity * self.slope
-        # Λ = λ Λ'(0) + λ² Λ''(0)/2 + ...: the area is v² Λ''(0)/2 for each unit of ln r. Drag changes
-        # at once; the direct effect of activation rises as 1 - e^(-k X/f_T), which the area has too.
+        # Λ = λ Λ'(0) + λ² Λ''(0)/2 + ...: the area is v² Λ''(0)/2 for each unit of ln r. Drag
+        # changes at once; the direct effect of activation rises as 1 - e^(-k X/f_T), which the area
+        # has too.
         rate = SLOW / life
         here, twice = (self.response_at(one + 0j).real / one for one in (rate, 2 * rate))
         area = self.velocity**2 * float((twice - here) / rate)

@@ -15,7 +15,7 @@ module mesoslip_contacts_threshold_laws_base
    implicit none
    private
 
-   public :: threshold_law_type, take_relative_width
+   public :: threshold_law_type
 
    !> A law of relative thresholds, conditional on u > minimum.
    type, abstract :: threshold_law_type
@@ -36,8 +36,10 @@ module mesoslip_contacts_threshold_laws_base
       !> proportional to squares
       real(wp) :: mean_square_stiffness = 1.0_wp
    contains
-      !> Take the parameters of the law
-      procedure(take_interface), deferred :: take
+      !> Take the parameters of the law: its relative width, unless a law has others
+      procedure :: take
+      !> Compute the constants of the law from its width
+      procedure :: set_constants
       !> Quantile, density and survival function before rejection
       procedure(function_interface), deferred :: plain_quantile
       procedure(function_interface), deferred :: plain_density
@@ -65,18 +67,6 @@ module mesoslip_contacts_threshold_laws_base
    end type threshold_law_type
 
    abstract interface
-      !> Take the parameters of the law.
-      subroutine take_interface(self, parameters, error)
-         import :: error_type, parameters_type, threshold_law_type
-         implicit none
-         !> The law
-         class(threshold_law_type), intent(inout) :: self
-         !> Named values
-         type(parameters_type), intent(inout) :: parameters
-         !> Set if one is missing, or the law does not exist
-         type(error_type), allocatable, intent(inout) :: error
-      end subroutine take_interface
-
       !> A function of the law before rejection.
       pure function function_interface(self, argument) result(value)
          import :: threshold_law_type, wp
@@ -92,21 +82,28 @@ module mesoslip_contacts_threshold_laws_base
 
 contains
 
-   !> Take the width of a law that has no other parameter.
-   subroutine take_relative_width(self, parameters, error)
-      !> The law
+   !> Take the parameters of the law: its relative width, unless a law has others.
+   subroutine take(self, parameters, error)
       class(threshold_law_type), intent(inout) :: self
       !> Named values
       type(parameters_type), intent(inout) :: parameters
-      !> Set if the width is missing or not positive
+      !> Set if one is missing, or the law does not exist
       type(error_type), allocatable, intent(inout) :: error
 
       call parameters%take("relative_width", self%width, error)
       if (allocated(error)) return
       if (.not. self%width > 0.0_wp) then
          call raise(error, status_invalid, "the relative width of a threshold law must be positive")
+         return
       end if
-   end subroutine take_relative_width
+      call self%set_constants()
+   end subroutine take
+
+   !> Compute the constants of the law from its width; by default there are none.
+   subroutine set_constants(self)
+      class(threshold_law_type), intent(inout) :: self
+
+   end subroutine set_constants
 
    !> Reject thresholds at or below a minimum.
    subroutine reject_below(self, minimum, error)

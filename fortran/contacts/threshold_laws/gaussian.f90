@@ -1,9 +1,7 @@
 !> Normal law.
 module mesoslip_contacts_threshold_laws_gaussian
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_contacts_threshold_laws_base, only: take_relative_width, threshold_law_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
@@ -14,37 +12,17 @@ module mesoslip_contacts_threshold_laws_gaussian
 
    real(wp), parameter :: sqrt_2 = sqrt(2.0_wp), sqrt_2_pi = sqrt(2.0_wp * acos(-1.0_wp))
 
-   !> Normal law.
    type, extends(threshold_law_type) :: gaussian_law_type
    contains
-      procedure :: take
-      procedure :: plain_quantile
-      procedure :: plain_density
-      procedure :: plain_survival
+      procedure :: plain_quantile, plain_density, plain_survival
       procedure :: quantiles
    end type gaussian_law_type
 
 contains
 
-   !> Take the parameters of the law.
-   subroutine take(self, parameters, error)
-      !> The law
-      class(gaussian_law_type), intent(inout) :: self
-      !> Its relative width, by name
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if the width is missing or not positive
-      type(error_type), allocatable, intent(inout) :: error
-
-      call take_relative_width(self, parameters, error)
-   end subroutine take
-
-   !> Threshold that is exceeded with a given probability, before rejection.
    pure function plain_quantile(self, argument) result(value)
-      !> The law
       class(gaussian_law_type), intent(in) :: self
-      !> Probability to exceed the threshold
       real(wp), intent(in) :: argument
-      !> Relative threshold
       real(wp) :: value
 
       value = 1.0_wp - self%width * inverse_normal(argument)
@@ -82,13 +60,9 @@ contains
       end do
    end subroutine quantiles
 
-   !> Probability density before rejection.
    pure function plain_density(self, argument) result(value)
-      !> The law
       class(gaussian_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability density
       real(wp) :: value
 
       real(wp) :: z
@@ -97,13 +71,9 @@ contains
       value = exp(-0.5_wp * z**2) / (sqrt_2_pi * self%width)
    end function plain_density
 
-   !> Survival function before rejection.
    pure function plain_survival(self, argument) result(value)
-      !> The law
       class(gaussian_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability to exceed it
       real(wp) :: value
 
       value = 0.5_wp * erfc((argument - 1.0_wp) / (sqrt_2 * self%width))

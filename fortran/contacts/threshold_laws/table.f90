@@ -29,9 +29,7 @@ module mesoslip_contacts_threshold_laws_table
       real(wp), private :: low(max_cells) = 0.0_wp, stiffness(max_cells) = 1.0_wp
    contains
       procedure :: take
-      procedure :: plain_quantile
-      procedure :: plain_density
-      procedure :: plain_survival
+      procedure :: plain_quantile, plain_density, plain_survival
       procedure :: cell_edges
       procedure :: stretch_cells
       procedure :: stiffness_at

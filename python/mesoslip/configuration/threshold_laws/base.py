@@ -26,27 +26,18 @@ class Keys(Protocol):
 
 @dataclass(frozen=True)
 class ThresholdLawKind:
-    """A law of the relative thresholds, whose mean is 1.
-
-    Attributes
-    ----------
-    name
-        Name of the law, in files and in the kernels.
-    max_width
-        Maximum relative width.
-    if_wider
-        Why a larger one is wrong, as the end of a message.
-    jumps
-        Ends of the law's support at which its density is not continuous.
-    is_sampled
-        Whether it is made of samples, not of a width.
-    """
+    """A law of the relative thresholds, whose mean is 1."""
 
     name: str
+    """The name in files and in the kernels."""
     max_width: float = MAX_WIDTH
+    """Maximum relative width."""
     if_wider: str = ""
+    """Why a larger width is wrong, as the end of a message."""
     jumps: Literal["none", "lower", "both"] = "none"
+    """Ends of the support at which the density is discontinuous."""
     is_sampled: bool = False
+    """Whether the law is made of samples, not of a width."""
 
     def width_problem(self, width: float) -> str:
         """The error of a relative width; empty if it is possible."""

@@ -228,7 +228,7 @@ class TableLaw(ThresholdLawKind):
         }
 
 
-TABLE = TableLaw("table", jumps="lower", is_sampled=True)
+LAW = TableLaw("table", jumps="lower", is_sampled=True)
 
 
 def read_samples(path: Path) -> dict[str, list[float]]:

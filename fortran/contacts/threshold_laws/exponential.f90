@@ -7,6 +7,7 @@ module mesoslip_contacts_threshold_laws_exponential
 
    public :: exponential_law_type
 
+   !> Shifted exponential law, 1 - width + width e, e being an exponential deviate.
    type, extends(threshold_law_type) :: exponential_law_type
    contains
       procedure :: plain_quantile, plain_density, plain_survival
@@ -14,18 +15,16 @@ module mesoslip_contacts_threshold_laws_exponential
 
 contains
 
-   pure function plain_quantile(self, argument) result(value)
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(exponential_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = (1.0_wp - self%width) - self%width * log(argument)
    end function plain_quantile
 
-   pure function plain_density(self, argument) result(value)
+   pure real(wp) function plain_density(self, argument) result(value)
       class(exponential_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       real(wp) :: z
 
@@ -34,10 +33,9 @@ contains
       if (z >= 0.0_wp) value = exp(-z) / self%width
    end function plain_density
 
-   pure function plain_survival(self, argument) result(value)
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(exponential_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = exp(-max(0.0_wp, (argument - (1.0_wp - self%width)) / self%width))
    end function plain_survival

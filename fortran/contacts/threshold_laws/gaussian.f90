@@ -12,6 +12,7 @@ module mesoslip_contacts_threshold_laws_gaussian
 
    real(wp), parameter :: sqrt_2 = sqrt(2.0_wp), sqrt_2_pi = sqrt(2.0_wp * acos(-1.0_wp))
 
+   !> Normal law.
    type, extends(threshold_law_type) :: gaussian_law_type
    contains
       procedure :: plain_quantile, plain_density, plain_survival
@@ -20,10 +21,9 @@ module mesoslip_contacts_threshold_laws_gaussian
 
 contains
 
-   pure function plain_quantile(self, argument) result(value)
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(gaussian_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = 1.0_wp - self%width * inverse_normal(argument)
    end function plain_quantile
@@ -60,10 +60,9 @@ contains
       end do
    end subroutine quantiles
 
-   pure function plain_density(self, argument) result(value)
+   pure real(wp) function plain_density(self, argument) result(value)
       class(gaussian_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       real(wp) :: z
 
@@ -71,10 +70,9 @@ contains
       value = exp(-0.5_wp * z**2) / (sqrt_2_pi * self%width)
    end function plain_density
 
-   pure function plain_survival(self, argument) result(value)
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(gaussian_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = 0.5_wp * erfc((argument - 1.0_wp) / (sqrt_2 * self%width))
    end function plain_survival

@@ -10,6 +10,7 @@ module mesoslip_contacts_threshold_laws_lognormal
 
    real(wp), parameter :: sqrt_2 = sqrt(2.0_wp), sqrt_2_pi = sqrt(2.0_wp * acos(-1.0_wp))
 
+   !> Law of exp(mu + sigma z), z being a normal deviate.
    type, extends(threshold_law_type) :: lognormal_law_type
       !> sigma and mu
       real(wp), private :: sigma = 0.0_wp, mu = 0.0_wp
@@ -28,18 +29,16 @@ contains
       self%is_logarithmic = .true.
    end subroutine set_constants
 
-   pure function plain_quantile(self, argument) result(value)
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(lognormal_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = exp(self%mu - self%sigma * inverse_normal(argument))
    end function plain_quantile
 
-   pure function plain_density(self, argument) result(value)
+   pure real(wp) function plain_density(self, argument) result(value)
       class(lognormal_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       real(wp) :: z
 
@@ -47,10 +46,9 @@ contains
       value = exp(-0.5_wp * z**2) / (sqrt_2_pi * self%sigma * argument)
    end function plain_density
 
-   pure function plain_survival(self, argument) result(value)
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(lognormal_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = 1.0_wp
       if (argument > 0.0_wp) then

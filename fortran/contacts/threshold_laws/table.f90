@@ -185,13 +185,11 @@ contains
    end function cell_edges
 
    !> Threshold that is exceeded with a given probability, before rejection.
-   pure function plain_quantile(self, argument) result(value)
+   pure real(wp) function plain_quantile(self, argument) result(value)
       !> The law
       class(table_law_type), intent(in) :: self
       !> Probability to exceed the threshold
       real(wp), intent(in) :: argument
-      !> Relative threshold
-      real(wp) :: value
 
       integer :: cell
 
@@ -205,13 +203,11 @@ contains
    end function plain_quantile
 
    !> Probability density before rejection.
-   pure function plain_density(self, argument) result(value)
+   pure real(wp) function plain_density(self, argument) result(value)
       !> The law
       class(table_law_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability density
-      real(wp) :: value
 
       integer :: cell
 
@@ -223,13 +219,11 @@ contains
    end function plain_density
 
    !> Survival function before rejection.
-   pure function plain_survival(self, argument) result(value)
+   pure real(wp) function plain_survival(self, argument) result(value)
       !> The law
       class(table_law_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability to exceed it
-      real(wp) :: value
 
       real(wp) :: part
       integer :: cell

@@ -7,6 +7,7 @@ module mesoslip_contacts_threshold_laws_uniform
 
    public :: uniform_law_type
 
+   !> Uniform law on 1 +- sqrt(3) width.
    type, extends(threshold_law_type) :: uniform_law_type
       !> Half the width of the interval
       real(wp), private :: half = 0.0_wp
@@ -25,27 +26,24 @@ contains
       self%cells = 1
    end subroutine set_constants
 
-   pure function plain_quantile(self, argument) result(value)
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(uniform_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = 1.0_wp + self%half * (1.0_wp - 2.0_wp * argument)
    end function plain_quantile
 
-   pure function plain_density(self, argument) result(value)
+   pure real(wp) function plain_density(self, argument) result(value)
       class(uniform_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = 0.0_wp
       if (abs(argument - 1.0_wp) <= self%half) value = 0.5_wp / self%half
    end function plain_density
 
-   pure function plain_survival(self, argument) result(value)
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(uniform_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = min(1.0_wp, max(0.0_wp, 0.5_wp * (1.0_wp - (argument - 1.0_wp) / self%half)))
    end function plain_survival

@@ -7,6 +7,7 @@ module mesoslip_contacts_threshold_laws_weibull
 
    public :: weibull_law_type
 
+   !> Weibull's law.
    type, extends(threshold_law_type) :: weibull_law_type
       !> Scale lambda, and shape
       real(wp), private :: scale = 0.0_wp, shape = 1.0_wp
@@ -25,18 +26,16 @@ contains
       self%is_logarithmic = .true.
    end subroutine set_constants
 
-   pure function plain_quantile(self, argument) result(value)
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(weibull_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = self%scale * (-log(argument))**(1.0_wp / self%shape)
    end function plain_quantile
 
-   pure function plain_density(self, argument) result(value)
+   pure real(wp) function plain_density(self, argument) result(value)
       class(weibull_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       real(wp) :: z
 
@@ -44,10 +43,9 @@ contains
       value = self%shape / self%scale * z**(self%shape - 1.0_wp) * exp(-z**self%shape)
    end function plain_density
 
-   pure function plain_survival(self, argument) result(value)
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(weibull_law_type), intent(in) :: self
       real(wp), intent(in) :: argument
-      real(wp) :: value
 
       value = 1.0_wp
       if (argument > 0.0_wp) value = exp(-(argument / self%scale)**self%shape)

@@ -78,7 +78,6 @@ contains
 
    !> Set the parts of a drive.
    subroutine open(self, part_end, start_rate, end_rate, stage_of_part, error)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> End of each part [s]; rates at its start and at its end
       real(wp), intent(in) :: part_end(:), start_rate(:), end_rate(:)
@@ -99,7 +98,6 @@ contains
 
    !> Set the values at which the parts start; otherwise the value is continuous.
    subroutine set_values(self, start_value, error)
-      !> The drive, open
       class(drive_type), intent(inout) :: self
       !> Value at the start of each part
       real(wp), intent(in) :: start_value(:)
@@ -117,7 +115,6 @@ contains
 
    !> Whether the parts are set.
    pure function is_open(self)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Whether they are
       logical :: is_open
@@ -127,7 +124,6 @@ contains
 
    !> Take the rate of the first part.
    subroutine begin(self, time)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -138,7 +134,6 @@ contains
 
    !> Take the rate of the next part.
    subroutine take_next_part(self, time)
-      !> The drive, not in its last part
       class(drive_type), intent(inout) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -149,7 +144,6 @@ contains
 
    !> Count the first part as the present one; its rate is not taken.
    pure subroutine rewind(self)
-      !> The drive
       class(drive_type), intent(inout) :: self
 
       self%part = 1
@@ -174,7 +168,6 @@ contains
 
    !> Turn round within a part.
    subroutine turn_round(self, time)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -198,7 +191,6 @@ contains
 
    !> End of the present part.
    pure function end_of_part(self) result(time)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Time [s]; huge if it has none
       real(wp) :: time
@@ -208,7 +200,6 @@ contains
 
    !> Time at which the drive changes next: its part ends, or it turns round.
    pure function next_change(self) result(time)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Time [s]
       real(wp) :: time
@@ -218,7 +209,6 @@ contains
 
    !> Whether no part comes after the present one.
    pure function is_last_part(self) result(is_last)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Whether it is the last one
       logical :: is_last
@@ -228,7 +218,6 @@ contains
 
    !> Whether the stage ends with the present part.
    pure function is_stage_over(self) result(is_over)
-      !> The drive, not in its last part
       class(drive_type), intent(in) :: self
       !> Whether it does
       logical :: is_over
@@ -238,7 +227,6 @@ contains
 
    !> Number of the present stage.
    pure function stage(self) result(number)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Its number
       integer :: number
@@ -248,7 +236,6 @@ contains
 
    !> A stage begins: its impulse and its extremes count from here.
    subroutine begin_stage(self)
-      !> The drive
       class(drive_type), intent(inout) :: self
 
       self%extremes = extremes_type()
@@ -257,7 +244,6 @@ contains
 
    !> Impulse on the slider in the present stage.
    pure function stage_impulse(self) result(impulse)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Impulse [N s]
       real(wp) :: impulse
@@ -267,7 +253,6 @@ contains
 
    !> Take a rate and an acceleration.
    subroutine change(self, time, rate, acceleration)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s], rate now, and acceleration from now on
       real(wp), intent(in) :: time, rate, acceleration
@@ -290,7 +275,6 @@ contains
 
    !> Value at a time.
    pure function at(self, time) result(value)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Time, until the drive changes [s]
       real(wp), intent(in) :: time
@@ -303,7 +287,6 @@ contains
 
    !> Rate at a time.
    pure function rate_at(self, time) result(rate)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Time, until the drive changes [s]
       real(wp), intent(in) :: time
@@ -319,7 +302,6 @@ contains
 
    !> Work done so far.
    pure function work(self)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Work [J]
       real(wp) :: work
@@ -329,7 +311,6 @@ contains
 
    !> Count time and value from now on, a displacement from another origin.
    subroutine rebase(self, time, shift)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s], and displacement of the new origin [m]; 0 for a force
       real(wp), intent(in) :: time, shift
@@ -341,7 +322,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

@@ -26,7 +26,6 @@ contains
 
    !> Take a force into account; of equal ones the first stays.
    pure subroutine note(self, force, time, displacement)
-      !> The extremes
       class(extremes_type), intent(inout) :: self
       !> Force [N], its time [s], displacement of the slider then [m]
       real(wp), intent(in) :: force, time, displacement
@@ -45,7 +44,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The extremes
       class(extremes_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

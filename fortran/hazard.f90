@@ -55,7 +55,6 @@ contains
 
    !> Clocks for a slider.
    pure subroutine offer(self, displacement, clock)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
@@ -80,7 +79,6 @@ contains
 
    !> Let readings go on by what was added in an advance.
    pure subroutine go_on(self, clock)
-      !> The clocks
       class(hazard_type), intent(inout) :: self
       !> The same after the advance; what was added is taken away
       type(hazard_clock_type), intent(inout) :: clock(clocks)
@@ -101,7 +99,6 @@ contains
 
    !> End a window before an exponent is beyond all numbers.
    pure subroutine limit_window(self, window)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> The window
       type(window_type), intent(inout) :: window
@@ -114,7 +111,6 @@ contains
 
    !> Exponent of the rate of a clock.
    pure function rate_exponent(self, number, displacement) result(exponent)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the clock
       integer, intent(in) :: number
@@ -127,7 +123,6 @@ contains
 
    !> Whether the reference of a clock has to move to the slider, which is noted.
    subroutine is_far(self, number, displacement, far)
-      !> The clocks
       class(hazard_type), intent(inout) :: self
       !> Number of the clock
       integer, intent(in) :: number
@@ -147,7 +142,6 @@ contains
 
    !> Exponent of the factor between a contact's deviate and what its clock goes on by.
    pure function life_exponent(self, number, limit, origin) result(exponent)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number
@@ -161,7 +155,6 @@ contains
    !> Reading at which a contact breaks; never if it is beyond all numbers: it is found again when
    !> the reference has moved.
    pure function key(self, number, left, limit, origin)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number
@@ -180,7 +173,6 @@ contains
 
    !> Remaining deviate of a contact now.
    pure function left(self, number, key, deviate, limit, origin)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number

@@ -119,7 +119,6 @@ contains
 
    !> Contact force until the next event.
    pure function law(self)
-      !> The schedule
       class(schedule_type), intent(in) :: self
       !> The law
       type(interface_law_type) :: law
@@ -131,7 +130,6 @@ contains
 
    !> Where the next event is.
    pure function window(self, time)
-      !> The schedule, not at its end
       class(schedule_type), intent(in) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -152,7 +150,6 @@ contains
 
    !> Number of contacts that broke.
    pure function break_count(self) result(number)
-      !> The schedule
       class(schedule_type), intent(in) :: self
       !> Their number
       integer :: number
@@ -162,7 +159,6 @@ contains
 
    !> Let what is due happen: first contacts break, then contacts attach.
    subroutine pass(self, time, displacement)
-      !> The schedule
       class(schedule_type), intent(inout) :: self
       !> Time [s] and displacement of the slider [m]
       real(wp), intent(in) :: time, displacement

@@ -36,7 +36,6 @@ contains
 
    !> Select a step, or skip it if it is of no interest.
    pure subroutine examine(self, time, velocity, start_acceleration, acceleration)
-      !> The filter
       class(step_filter_type), intent(inout) :: self
       !> Time [s] and velocity [m/s] at the end of the step, accelerations at its start and at its
       !> end [m/s2]

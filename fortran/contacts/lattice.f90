@@ -77,7 +77,6 @@ contains
 
    !> Set up contacts on a lattice.
    subroutine new_contact_lattice(self, parameters, interaction, error)
-      !> The contacts
       type(contact_lattice_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -137,7 +136,6 @@ contains
 
    !> Draw all contacts for the start of a run, and let go those that cannot bear their neighbours.
    subroutine initialize(self, state)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
@@ -154,7 +152,6 @@ contains
 
    !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -169,7 +166,6 @@ contains
 
    !> Break all contacts that are due and those that they push over, then attach what is to attach.
    subroutine respond(self, before, after)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
       !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
@@ -268,7 +264,6 @@ contains
 
    !> Greatest coordinate at which a pinned contact breaks on the way back.
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
       class(contact_lattice_type), intent(in) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -283,7 +278,6 @@ contains
 
    !> Force of its neighbours on a contact that attaches.
    pure function neighbour_force(self, contact, displacement) result(force)
-      !> The contacts
       class(contact_lattice_type), intent(in) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -308,7 +302,6 @@ contains
    !> Put a contact that has attached into the order of breaking; its neighbours break elsewhere
    !> now.
    subroutine join(self, contact, pose)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -417,7 +410,6 @@ contains
 
    !> Sum what contacts keep of their neighbours, which differences of origins are.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
       class(contact_lattice_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
@@ -431,7 +423,6 @@ contains
 
    !> Recompute the order of breaking from the records.
    subroutine rebuild(self, displacement)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
@@ -451,7 +442,6 @@ contains
 
    !> How the contacts are.
    pure subroutine snapshot(self, time, displacement, values)
-      !> The contacts
       class(contact_lattice_type), intent(in) :: self
       !> Time [s], displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
@@ -473,7 +463,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

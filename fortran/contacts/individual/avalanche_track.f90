@@ -44,7 +44,6 @@ contains
 
    !> Set up a track without an avalanche.
    subroutine new_avalanche_track(self, columns, rows, error)
-      !> The track
       type(avalanche_track_type), intent(out) :: self
       !> Columns and rows of the lattice; no columns when contacts are not on one
       integer, intent(in) :: columns, rows
@@ -65,7 +64,6 @@ contains
 
    !> A contact breaks; if it breaks again in the same avalanche it keeps its generation.
    pure subroutine add(self, contact)
-      !> The track
       class(avalanche_track_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -79,7 +77,6 @@ contains
 
    !> Columns and rows that the avalanche reaches over, on a lattice without edges.
    pure subroutine extent(self, width, height)
-      !> The track
       class(avalanche_track_type), intent(in) :: self
       !> Columns of the smallest rectangle around the avalanche, and its rows
       integer, intent(out) :: width, height
@@ -137,7 +134,6 @@ contains
 
    !> Forget the avalanche.
    pure subroutine clear(self)
-      !> The track
       class(avalanche_track_type), intent(inout) :: self
 
       integer :: site
@@ -151,7 +147,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The track
       class(avalanche_track_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

@@ -52,7 +52,6 @@ contains
 
    !> Allocate what is drawn for each contact apart from thresholds.
    subroutine allocate_draws(self, parameters, error)
-      !> The births
       class(births_type), intent(inout) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -73,7 +72,6 @@ contains
 
    !> Draw all contacts for the start of a run.
    subroutine draw_all(self, parameters, state, record)
-      !> The births
       class(births_type), intent(inout) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -153,7 +151,6 @@ contains
 
    !> Have the threshold of a contact at its next birth drawn, with those of others.
    subroutine request(self, contact, parameters, record)
-      !> The births
       class(births_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -174,7 +171,6 @@ contains
    !>
    !> The second deviate of a birth is that of the delay before it: the first is its threshold's.
    subroutine draw(self, parameters, record)
-      !> The births
       class(births_type), intent(inout) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -348,7 +344,6 @@ contains
 
    !> Write what has been drawn to an archive, or read it.
    subroutine exchange(self, archive)
-      !> The births, none of which is still to be drawn
       class(births_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

@@ -48,7 +48,6 @@ contains
 
    !> Set up an empty tree.
    subroutine new_break_tree(self, capacity, error)
-      !> The tree
       type(break_tree_type), intent(out) :: self
       !> Largest number of a contact
       integer, intent(in) :: capacity
@@ -79,7 +78,6 @@ contains
 
    !> Put a contact in, or change it.
    pure subroutine set(self, contact, coordinate)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -91,7 +89,6 @@ contains
 
    !> Take a contact out.
    pure subroutine remove(self, contact)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -162,7 +159,6 @@ contains
 
    !> Forget all contacts.
    pure subroutine clear(self)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
 
       self%minimum = never
@@ -170,7 +166,6 @@ contains
 
    !> Put a contact in, to be followed by arrange.
    pure subroutine put(self, contact, coordinate)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -182,7 +177,6 @@ contains
 
    !> Rebuild the tree from its contacts.
    pure subroutine arrange(self)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
 
       integer :: level, node, nodes
@@ -199,7 +193,6 @@ contains
 
    !> Coordinate at which the first contact breaks.
    pure function first(self) result(coordinate)
-      !> The tree
       class(break_tree_type), intent(in) :: self
       !> The coordinate, huge without contacts [m]
       real(wp) :: coordinate
@@ -209,7 +202,6 @@ contains
 
    !> A contact that breaks at a coordinate: the first one, or of many the lowest in number.
    pure function due(self, coordinate) result(contact)
-      !> The tree
       class(break_tree_type), intent(in) :: self
       !> Coordinate of the slider [m]
       real(wp), intent(in) :: coordinate

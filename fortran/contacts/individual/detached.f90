@@ -54,7 +54,6 @@ contains
 
    !> Set up without contacts.
    subroutine new_detached_contacts(self, capacity, attach, in_order, error)
-      !> The detached contacts
       type(detached_contacts_type), intent(out) :: self
       !> Number of contacts in all
       integer, intent(in) :: capacity
@@ -75,7 +74,6 @@ contains
 
    !> Put a contact in, behind all others if all wait for the same delay.
    pure subroutine push(self, contact, due, drag)
-      !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -216,7 +214,6 @@ contains
 
    !> The contact that attaches next.
    pure subroutine find_next(self, contact)
-      !> The detached contacts, at least one
       class(detached_contacts_type), intent(inout) :: self
       !> Its number
       integer, intent(out) :: contact
@@ -231,7 +228,6 @@ contains
 
    !> Take the contact out that attaches next.
    pure subroutine pop(self, contact, drag)
-      !> The detached contacts, at least one
       class(detached_contacts_type), intent(inout) :: self
       !> Its number, and its drag while it was detached [N s/m]
       integer, intent(out) :: contact
@@ -308,7 +304,6 @@ contains
 
    !> The next contacts to attach, and their times.
    pure subroutine preview(self, limit, number, contact, due, drag)
-      !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
       !> Maximum number
       integer, intent(in) :: limit
@@ -352,7 +347,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

@@ -70,7 +70,6 @@ contains
 
    !> Set up an empty queue.
    subroutine new_contact_queue(self, capacity, span, error)
-      !> The queue
       type(contact_queue_type), intent(out) :: self
       !> Maximum number of contacts
       integer, intent(in) :: capacity
@@ -103,7 +102,6 @@ contains
 
    !> Forget all contacts.
    pure subroutine clear(self, direction, coordinate)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Direction of motion, +1 or -1
       real(wp), intent(in) :: direction
@@ -132,7 +130,6 @@ contains
 
    !> Put a contact in.
    subroutine insert(self, contact, key)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Number of the contact, not in the queue
       integer, intent(in) :: contact
@@ -161,7 +158,6 @@ contains
 
    !> Take the first contact out.
    subroutine pop(self, record, contact)
-      !> The queue, not empty
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
@@ -193,7 +189,6 @@ contains
 
    !> The first contacts, in their order: no other contact has the key of one of them.
    subroutine preview(self, record, limit, contact, key, number)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
@@ -254,7 +249,6 @@ contains
 
    !> Take the first contacts out, which a preview showed.
    subroutine remove_previewed(self, record, number)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)

@@ -72,7 +72,6 @@ contains
 
    !> Set up without contacts.
    subroutine new_scan_order(self, capacity, error)
-      !> The order
       type(scan_order_type), intent(out) :: self
       !> Number of contacts
       integer, intent(in) :: capacity
@@ -96,7 +95,6 @@ contains
 
    !> Forget all contacts.
    pure subroutine clear(self)
-      !> The order
       class(scan_order_type), intent(inout) :: self
 
       self%key = none
@@ -105,7 +103,6 @@ contains
 
    !> Forget which contacts come next, so that putting one in takes less time.
    pure subroutine rest(self)
-      !> The order
       class(scan_order_type), intent(inout) :: self
 
       self%horizon = -none
@@ -118,7 +115,6 @@ contains
 
    !> The lowest key, once.
    pure function lowest(self) result(key)
-      !> The order
       class(scan_order_type), intent(in) :: self
       !> The key, huge without contacts
       real(wp) :: key
@@ -139,7 +135,6 @@ contains
 
    !> Put a contact in, or change its key.
    pure subroutine put(self, contact, key)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -159,7 +154,6 @@ contains
 
    !> Take a contact out.
    pure subroutine remove(self, contact)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -169,7 +163,6 @@ contains
 
    !> Count all keys from another origin and in another unit, which keeps their order.
    pure subroutine rescale(self, origin, factor, count, is_done)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> The origin, and one over the unit
       real(wp), intent(in) :: origin, factor
@@ -203,7 +196,6 @@ contains
 
    !> The lowest key, to be asked for again and again.
    pure subroutine first(self, key)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> The key, huge without contacts
       real(wp), intent(out) :: key
@@ -221,7 +213,6 @@ contains
 
    !> A contact the key of which has come: the first one.
    pure subroutine due(self, reading, contact)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> Upper bound of the key
       real(wp), intent(in) :: reading
@@ -444,7 +435,6 @@ contains
 
    !> The first contacts in their order: no other contact has the key of one of them.
    pure subroutine preview(self, limit, contact, key, number)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> Maximum number
       integer, intent(in) :: limit

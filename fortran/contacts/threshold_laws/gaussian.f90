@@ -7,7 +7,7 @@ module mesoslip_contacts_threshold_laws_gaussian
 
    public :: gaussian_law_type, inverse_normal
 
-   !> Distance of a probability from one half up to which a deviate is in the middle of the law
+   !> Maximum distance of a probability from 1/2 in the middle of the law
    real(wp), parameter :: middle = 0.425_wp
 
    real(wp), parameter :: sqrt_2 = sqrt(2.0_wp), sqrt_2_pi = sqrt(2.0_wp * acos(-1.0_wp))
@@ -28,16 +28,11 @@ contains
       value = 1.0_wp - self%width * inverse_normal(argument)
    end function plain_quantile
 
-   !> Thresholds that are exceeded with given probabilities.
-   !>
-   !> Nearly all normal deviates are from the middle of the law, where no choice is to be made: they
-   !> are found side by side, and those of the tails, which are listed, one by one.
+   !> Most normal deviates are in the middle of the law, where the formula has no branch: they are
+   !> computed in one vectorized loop, those in the tails one by one.
    pure subroutine quantiles(self, probability, threshold)
-      !> The law
       class(gaussian_law_type), intent(in) :: self
-      !> Probabilities to exceed the thresholds, 0 < probability < 1
       real(wp), intent(in), contiguous :: probability(:)
-      !> Relative thresholds, shape that of probability
       real(wp), intent(out), contiguous :: threshold(:)
 
       integer :: draw, tail, tails, in_tail(size(probability) + 1)
@@ -48,7 +43,7 @@ contains
          centred = self%acceptance * probability(draw) - 0.5_wp
          threshold(draw) = max(1.0_wp - self%width * middle_normal(centred), min_threshold)
       end do
-      ! Listed without a branch, of which one in seven would be guessed wrong.
+      ! Listed without a branch, which would be predicted wrongly one time in seven.
       tails = 0
       do draw = 1, size(probability)
          in_tail(tails + 1) = draw
@@ -124,7 +119,7 @@ contains
 
    !> Inverse of the standard normal distribution function in the middle of the law.
    elemental function middle_normal(centred) result(z)
-      !> Probability less one half, at most 0.425 in size
+      !> Probability minus 1/2, at most 0.425 in size
       real(wp), intent(in) :: centred
       !> The deviate that is not exceeded with this probability
       real(wp) :: z

@@ -59,7 +59,7 @@ contains
       real(wp) :: lower, upper
       integer :: iteration
 
-      ! The squared width is Gamma(1 + 2/shape)/Gamma(1 + 1/shape)**2 - 1 and falls with the shape.
+      ! The squared width, Gamma(1 + 2/shape)/Gamma(1 + 1/shape)**2 - 1, falls with the shape.
       lower = log(0.05_wp)
       upper = log(1.3_wp / min(width, 1.0_wp) + 1.0_wp)
       do iteration = 1, 100

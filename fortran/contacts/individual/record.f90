@@ -15,9 +15,9 @@ module mesoslip_contacts_individual_record
    integer, parameter :: row_stiffness = 2
    !> Stretch at which the contact breaks, in either direction [m]
    integer, parameter :: row_limit = 3
-   !> How often the contact has been born again: a whole number
+   !> Number of renewals, a whole number
    integer, parameter :: row_renewal = 4
-   !> Relative threshold that the contact will have when it is born the next time
+   !> Relative threshold of the next birth; 0 if it has not been drawn
    integer, parameter :: row_next = 5
 
 contains
@@ -34,7 +34,7 @@ contains
       coordinate = direction * record(row_origin) + record(row_limit)
    end function ahead_coordinate
 
-   !> Coordinate along the direction of motion at which a pinned contact breaks on the way back.
+   !> Coordinate along the direction of motion at which a pinned contact breaks in backward motion.
    pure function behind_coordinate(record, direction) result(coordinate)
       !> Record of the contact
       real(wp), intent(in) :: record(record_length)

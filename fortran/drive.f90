@@ -42,32 +42,17 @@ module mesoslip_drive
       real(wp), allocatable, private :: start_value(:)
    contains
       !> Set the parts, and their start values
-      procedure, non_overridable :: open
-      procedure, non_overridable :: set_values
-      procedure, non_overridable :: is_open
-      !> Start the first part or the next; return to the first; reverse within a part
-      procedure, non_overridable :: begin
-      procedure, non_overridable :: take_next_part
-      procedure, non_overridable :: rewind
-      procedure, non_overridable :: turn_round
+      procedure, non_overridable :: open, set_values, is_open
+      !> Start the first part or the next, return to the first, reverse within a part
+      procedure, non_overridable :: begin, take_next_part, rewind, turn_round
       !> Time at which the part ends, or the drive changes
-      procedure, non_overridable :: end_of_part
-      procedure, non_overridable :: next_change
+      procedure, non_overridable :: end_of_part, next_change
       !> Whether the current part is the last one, and whether the next is of another stage
-      procedure, non_overridable :: is_last_part
-      procedure, non_overridable :: is_stage_over
-      !> Number of the stage, and start of one
-      procedure, non_overridable :: stage
-      procedure, non_overridable :: begin_stage
-      !> Impulse on the slider in the current stage
-      procedure, non_overridable :: stage_impulse
-      !> Set rate and acceleration
-      procedure, non_overridable :: change
-      !> Value and rate at a time
-      procedure, non_overridable :: at
-      procedure, non_overridable :: rate_at
-      !> Work done so far
-      procedure, non_overridable :: work
+      procedure, non_overridable :: is_last_part, is_stage_over
+      !> Number of the current stage, start of a stage, and impulse on the slider in it
+      procedure, non_overridable :: stage, begin_stage, stage_impulse
+      !> Set rate and acceleration; value and rate at a time; work done so far
+      procedure, non_overridable :: change, at, rate_at, work
       !> Move the time and the origin of the value
       procedure, non_overridable :: rebase
       !> Write the state to an archive, or read it
@@ -188,19 +173,17 @@ contains
          & / (self%part_end(self%part) - start)
    end function part_acceleration
 
-   !> End of the current part.
+   !> End of the current part [s]; huge for a part without end.
    pure function end_of_part(self) result(time)
       class(drive_type), intent(in) :: self
-      !> Time [s]; huge for a part without end
       real(wp) :: time
 
       time = self%part_end(self%part)
    end function end_of_part
 
-   !> Time at which the drive changes next: its part ends, or it reverses.
+   !> Time at which the drive changes next [s]: its part ends, or it reverses.
    pure function next_change(self) result(time)
       class(drive_type), intent(in) :: self
-      !> Time [s]
       real(wp) :: time
 
       time = min(self%part_end(self%part), self%turn)
@@ -238,10 +221,9 @@ contains
       self%earlier_impulse = accumulator_type()
    end subroutine begin_stage
 
-   !> Impulse on the slider in the current stage.
+   !> Impulse on the slider in the current stage [N s].
    pure function stage_impulse(self) result(impulse)
       class(drive_type), intent(in) :: self
-      !> Impulse [N s]
       real(wp) :: impulse
 
       impulse = self%earlier_impulse%total() + self%impulse%total()
@@ -269,24 +251,22 @@ contains
       end if
    end subroutine change
 
-   !> Value at a time.
+   !> Value at a time: displacement from the moving origin [m], or force [N].
    pure function at(self, time) result(value)
       class(drive_type), intent(in) :: self
       !> Time, until the drive changes [s]
       real(wp), intent(in) :: time
-      !> Displacement from the moving origin [m], or force [N]
       real(wp) :: value
 
       value = self%value &
          & + (self%rate + 0.5_wp * self%acceleration * (time - self%time)) * (time - self%time)
    end function at
 
-   !> Rate at a time.
+   !> Rate at a time [m/s or N/s].
    pure function rate_at(self, time) result(rate)
       class(drive_type), intent(in) :: self
       !> Time, until the drive changes [s]
       real(wp), intent(in) :: time
-      !> Rate [m/s or N/s]
       real(wp) :: rate
 
       rate = self%rate
@@ -296,10 +276,9 @@ contains
       rate = self%direction * max(0.0_wp, self%direction * rate)
    end function rate_at
 
-   !> Work done so far.
+   !> Work done so far [J].
    pure function work(self)
       class(drive_type), intent(in) :: self
-      !> Work [J]
       real(wp) :: work
 
       work = self%earlier_work%total() + self%rate * self%impulse%total()

@@ -36,18 +36,14 @@ module mesoslip_hazard
       real(wp) :: next(clocks) = never
    contains
       !> Clocks for a slider, and their readings after it has advanced them
-      procedure, non_overridable :: offer
-      procedure, non_overridable :: advance
+      procedure, non_overridable :: offer, advance
       !> End a window before an exponent overflows
       procedure, non_overridable :: limit_window
       !> Exponent of the rate of a clock, and whether its reference must move
-      procedure, non_overridable :: rate_exponent
-      procedure, non_overridable :: is_far
-      !> Exponent of the factor between a deviate and the increase of the clock, and the key
-      procedure, non_overridable :: life_exponent
-      procedure, non_overridable :: key
-      !> Remaining deviate of a contact
-      procedure, non_overridable :: left
+      procedure, non_overridable :: rate_exponent, is_far
+      !> Exponent of the factor between a deviate and the increase of the clock, the key of a
+      !> contact, and its remaining deviate
+      procedure, non_overridable :: life_exponent, key, left
    end type hazard_type
 
 contains

@@ -103,8 +103,7 @@ module mesoslip_schedule
          & tiny_stretch = 0.0_wp
    contains
       !> Contact force until the next event, and the window until then
-      procedure, non_overridable :: law
-      procedure, non_overridable :: window
+      procedure, non_overridable :: law, window
       !> Number of contacts that broke
       procedure, non_overridable :: break_count
       !> Make the events that are due at a time and a displacement

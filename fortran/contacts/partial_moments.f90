@@ -36,10 +36,8 @@ module mesoslip_contacts_partial_moments
       real(wp), allocatable :: edge(:), cell_density(:)
       real(wp), allocatable, private :: above_edge(:, :)
    contains
-      !> Moments above a threshold, to rounding
-      procedure, non_overridable :: above
-      !> Moments above a threshold by interpolation, to about 1e-12
-      procedure, non_overridable :: interpolate
+      !> Moments above a threshold: to rounding, and by interpolation to about 1e-12
+      procedure, non_overridable :: above, interpolate
       procedure, non_overridable, private :: density, sum_cells, above_in_cells
    end type partial_moments_type
 

@@ -16,11 +16,8 @@ module mesoslip_contacts_threshold_coordinate
    type :: threshold_coordinate_type
       integer, private :: kind = linear
    contains
-      !> Coordinate of a threshold
-      procedure, non_overridable :: at
-      !> Threshold at a coordinate, and its derivative
-      procedure, non_overridable :: threshold
-      procedure, non_overridable :: slope
+      !> Coordinate of a threshold; threshold at a coordinate, and its derivative
+      procedure, non_overridable :: at, threshold, slope
    end type threshold_coordinate_type
 
 contains

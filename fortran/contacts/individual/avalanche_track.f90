@@ -29,12 +29,10 @@ module mesoslip_contacts_individual_avalanche_track
       !> State of the track, shape (track_length, columns rows)
       integer, allocatable :: contact(:, :)
    contains
-      !> Add a contact that breaks
-      procedure, non_overridable :: add
+      !> Add a contact that breaks, clear the avalanche
+      procedure, non_overridable :: add, clear
       !> Columns and rows of the smallest rectangle around the avalanche
       procedure, non_overridable :: extent
-      !> Clear the avalanche
-      procedure, non_overridable :: clear
       !> Write the state to an archive, or read it
       procedure, non_overridable :: exchange
    end type avalanche_track_type

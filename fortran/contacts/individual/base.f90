@@ -57,28 +57,20 @@ module mesoslip_contacts_individual_base
       procedure :: behind_of
       !> Force of the neighbours on an attaching contact
       procedure :: neighbour_force
-      !> Shift the origin in the data of a kind
+      !> Shift the origin in further data of a kind
       procedure :: shift_order
-      !> Allocate the records
-      procedure, non_overridable :: allocate_records
-      !> Draw all contacts at the start of a run
-      procedure, non_overridable :: draw
-      !> Detach a contact that breaks
-      procedure, non_overridable :: detach
-      !> Attach all contacts that are due
-      procedure, non_overridable :: attach_due
+      !> Allocate the records, and draw all contacts at the start of a run
+      procedure, non_overridable :: allocate_records, draw
+      !> Detach a contact that breaks, and attach all contacts that are due
+      procedure, non_overridable :: detach, attach_due
       !> Sort all contacts again from the records, and recompute the bound behind
-      procedure, non_overridable :: rebuild_queue
-      !> Maximum coordinate at which any contact breaks after a reversal
-      procedure, non_overridable :: max_behind
+      procedure, non_overridable :: rebuild_queue, max_behind
       !> Window between two coordinates
       procedure, non_overridable :: window_between
-      !> The next attachments, for a schedule
-      procedure, non_overridable :: list_attachments
-      procedure, non_overridable :: list_births
+      !> List the next attachments and births in a schedule
+      procedure, non_overridable :: list_attachments, list_births
       !> Update records and sums after a schedule, but not the order of breaking
-      procedure, non_overridable :: detach_listed
-      procedure, non_overridable :: attach_listed
+      procedure, non_overridable :: detach_listed, attach_listed
       procedure, non_overridable, private :: attach_next, draw_births, give_birth, list_lives, &
          & sum_totals
    end type individual_contacts_type
@@ -435,10 +427,9 @@ contains
       self%behind = self%max_behind()
    end subroutine rebuild_queue
 
-   !> Maximum coordinate at which any contact breaks after a reversal.
+   !> Maximum coordinate at which any contact breaks after a reversal [m].
    pure function max_behind(self) result(coordinate)
       class(individual_contacts_type), intent(in) :: self
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       integer :: contact
@@ -450,12 +441,11 @@ contains
       end do
    end function max_behind
 
-   !> Maximum coordinate at which a pinned contact breaks after a reversal.
+   !> Maximum coordinate at which a pinned contact breaks after a reversal [m].
    pure function behind_of(self, contact) result(coordinate)
       class(individual_contacts_type), intent(in) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       coordinate = behind_coordinate(self%record(:, contact), self%direction)

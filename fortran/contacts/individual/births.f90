@@ -40,10 +40,8 @@ module mesoslip_contacts_individual_births
       procedure, non_overridable :: allocate_draws
       !> Draw all contacts for the start of a run
       procedure, non_overridable :: draw_all
-      !> Request the draws of the next birth of a contact
-      procedure, non_overridable :: request
-      !> Draw all requested births
-      procedure, non_overridable :: draw
+      !> Request the draws of the next birth of a contact, and make all requested draws
+      procedure, non_overridable :: request, draw
       !> Write the draws to an archive, or read them
       procedure, non_overridable :: exchange
    end type births_type
@@ -313,12 +311,11 @@ contains
       end do
    end subroutine draw_sliding
 
-   !> Drag of a contact while it is detached.
+   !> Drag of a contact while it is detached [N s/m].
    pure function drag_of(parameters, stiffness) result(drag)
       type(contact_parameters_type), intent(in) :: parameters
       !> Stiffness of the contact [N/m]
       real(wp), intent(in) :: stiffness
-      !> Drag [N s/m]
       real(wp) :: drag
 
       drag = parameters%drag

@@ -28,20 +28,12 @@ module mesoslip_contacts_individual_break_tree
       !> Coordinate at which a contact, or the first one below a node, breaks, shape (positions)
       real(wp), allocatable :: minimum(:)
    contains
-      !> Insert a contact, or change it
-      procedure, non_overridable :: set
-      !> Remove a contact
-      procedure, non_overridable :: remove
-      !> Remove all contacts
-      procedure, non_overridable :: clear
-      !> Insert a contact, followed by arrange
-      procedure, non_overridable :: put
-      !> Rebuild the tree from its contacts
-      procedure, non_overridable :: arrange
-      !> Coordinate at which the first contact breaks
-      procedure, non_overridable :: first
-      !> A contact that breaks up to a coordinate
-      procedure, non_overridable :: due
+      !> Insert or change a contact, remove one, remove all
+      procedure, non_overridable :: set, remove, clear
+      !> Insert contacts, then rebuild the tree
+      procedure, non_overridable :: put, arrange
+      !> Coordinate at which the first contact breaks, and a contact that breaks up to a coordinate
+      procedure, non_overridable :: first, due
    end type break_tree_type
 
 contains
@@ -188,10 +180,9 @@ contains
       end do
    end subroutine arrange
 
-   !> Coordinate at which the first contact breaks.
+   !> Coordinate at which the first contact breaks [m]; huge without contacts.
    pure function first(self) result(coordinate)
       class(break_tree_type), intent(in) :: self
-      !> Coordinate [m]; huge without contacts
       real(wp) :: coordinate
 
       coordinate = self%minimum(size(self%minimum))

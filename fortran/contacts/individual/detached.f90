@@ -34,12 +34,8 @@ module mesoslip_contacts_individual_detached
       integer, private :: sorted_contact(max_sorted) = 0
       real(wp), private :: sorted_value(length, max_sorted) = 0.0_wp
    contains
-      !> Add a contact
-      procedure, non_overridable :: push
-      !> The contact that attaches next
-      procedure, non_overridable :: find_next
-      !> Remove the contact that attaches next
-      procedure, non_overridable :: pop
+      !> Add a contact, find or remove the one that attaches next
+      procedure, non_overridable :: push, find_next, pop
       !> The next contacts to attach, and their times
       procedure, non_overridable :: preview
       !> Write the state to an archive, or read it

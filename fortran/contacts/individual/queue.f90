@@ -53,15 +53,10 @@ module mesoslip_contacts_individual_queue
       integer, allocatable :: chunk_contact(:, :), chunk_next(:)
       integer :: free_chunk = 0
    contains
-      !> Remove all contacts
-      procedure, non_overridable :: clear
-      !> Insert a contact
-      procedure, non_overridable :: insert
-      !> Remove the first contact
-      procedure, non_overridable :: pop
+      !> Insert a contact, remove the first one, remove all
+      procedure, non_overridable :: insert, pop, clear
       !> The first contacts, and removal of some of them
-      procedure, non_overridable :: preview
-      procedure, non_overridable :: remove_previewed
+      procedure, non_overridable :: preview, remove_previewed
       procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
          & find_first, absorb_late
    end type contact_queue_type

@@ -22,25 +22,22 @@ module mesoslip_contacts_individual_record
 
 contains
 
-   !> Coordinate along the direction of motion at which a pinned contact breaks.
+   !> Coordinate along the direction of motion at which a pinned contact breaks [m].
    pure function ahead_coordinate(record, direction) result(coordinate)
-      !> Record of the contact
       real(wp), intent(in) :: record(record_length)
       !> Direction of motion, +1 or -1
       real(wp), intent(in) :: direction
-      !> Coordinate, direction times displacement [m]
       real(wp) :: coordinate
 
       coordinate = direction * record(row_origin) + record(row_limit)
    end function ahead_coordinate
 
-   !> Coordinate along the direction of motion at which a pinned contact breaks in backward motion.
+   !> Coordinate along the direction of motion at which a pinned contact breaks after a
+   !> reversal [m].
    pure function behind_coordinate(record, direction) result(coordinate)
-      !> Record of the contact
       real(wp), intent(in) :: record(record_length)
       !> Direction of motion, +1 or -1
       real(wp), intent(in) :: direction
-      !> Coordinate, direction times displacement [m]
       real(wp) :: coordinate
 
       coordinate = direction * record(row_origin) - record(row_limit)

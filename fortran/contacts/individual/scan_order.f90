@@ -49,23 +49,16 @@ module mesoslip_contacts_individual_scan_order
       real(wp), allocatable :: late_key(:)
       integer, allocatable :: late_contact(:)
    contains
-      !> Remove all contacts
-      procedure, non_overridable :: clear
-      !> Insert a contact, or change its key
-      procedure, non_overridable :: put
-      !> Remove a contact
-      procedure, non_overridable :: remove
+      !> Insert or change a contact, remove one, remove all
+      procedure, non_overridable :: put, remove, clear
       !> Shift and rescale all keys
       procedure, non_overridable :: rescale
       !> The lowest key: by one pass over all keys, or by their order
-      procedure, non_overridable :: lowest
-      procedure, non_overridable :: first
+      procedure, non_overridable :: lowest, first
+      !> The first contact if its key has been reached, and the first contacts in their order
+      procedure, non_overridable :: due, preview
       !> Discard the order of the next contacts, so that insertion is cheaper
       procedure, non_overridable :: rest
-      !> A contact whose key has been reached
-      procedure, non_overridable :: due
-      !> The first contacts in their order
-      procedure, non_overridable :: preview
       procedure, non_overridable, private :: find_next, scan, estimate_reach, absorb
    end type scan_order_type
 
@@ -114,10 +107,9 @@ contains
       self%late_count = 0
    end subroutine rest
 
-   !> The lowest key, by one pass over all keys.
+   !> The lowest key, by one pass over all keys; huge without contacts.
    pure function lowest(self) result(key)
       class(scan_order_type), intent(in) :: self
-      !> The key; huge without contacts
       real(wp) :: key
 
       real(wp) :: least(4)
@@ -192,10 +184,9 @@ contains
       self%late_key(:self%late_count) = (self%late_key(:self%late_count) - origin) * factor
    end subroutine rescale
 
-   !> The lowest key, by the order of the next contacts.
+   !> The lowest key, by the order of the next contacts; huge without contacts.
    pure subroutine first(self, key)
       class(scan_order_type), intent(inout) :: self
-      !> The key; huge without contacts
       real(wp), intent(out) :: key
 
       logical :: is_late

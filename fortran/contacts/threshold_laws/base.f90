@@ -36,34 +36,22 @@ module mesoslip_contacts_threshold_laws_base
       !> proportional to squares
       real(wp) :: mean_square_stiffness = 1.0_wp
    contains
-      !> Take the parameters of the law
-      procedure :: take
-      !> Compute the constants of the law from its width
-      procedure :: set_constants
+      !> Take the parameters of the law, and compute its constants from its width
+      procedure :: take, set_constants
       !> Quantile, density and survival function before rejection
-      procedure(function_interface), deferred :: plain_quantile
-      procedure(function_interface), deferred :: plain_density
-      procedure(function_interface), deferred :: plain_survival
-      !> Quantiles of several probabilities, equal to those of quantile to the bit: some laws
-      !> compute them faster together
-      procedure :: quantiles
+      procedure(function_interface), deferred :: plain_quantile, plain_density, plain_survival
       !> Edges of the cells before rejection
       procedure :: cell_edges
       !> For a law with stiffnesses: cells after rejection, stiffness at a break stretch, and
       !> rejection of the contacts that a force breaks
-      procedure :: stretch_cells
-      procedure :: stiffness_at
-      procedure :: reject_stretches
-      !> Threshold that is exceeded with a given probability
-      procedure, non_overridable :: quantile
-      !> Probability density
-      procedure, non_overridable :: density
-      !> Probability to exceed a threshold
-      procedure, non_overridable :: survival
+      procedure :: stretch_cells, stiffness_at, reject_stretches
       !> Reject thresholds at or below a minimum
       procedure, non_overridable :: reject_below
-      !> Smallest threshold after rejection
-      procedure, non_overridable :: min_threshold
+      !> Quantile, density and survival function, and the smallest threshold
+      procedure, non_overridable :: quantile, density, survival, min_threshold
+      !> Quantiles of several probabilities, equal to those of quantile to the bit: some laws
+      !> compute them faster together
+      procedure :: quantiles
    end type threshold_law_type
 
    abstract interface
@@ -138,7 +126,7 @@ contains
       threshold = max(self%plain_quantile(self%acceptance * probability), self%min_threshold())
    end function quantile
 
-   !> Thresholds that are exceeded with given probabilities.
+   !> Thresholds that are exceeded with several probabilities.
    pure subroutine quantiles(self, probability, threshold)
       class(threshold_law_type), intent(in) :: self
       !> Probabilities to exceed the thresholds, 0 < probability < 1
@@ -203,7 +191,6 @@ contains
       class(threshold_law_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: threshold
-      !> Probability density
       real(wp) :: density
 
       density = 0.0_wp
@@ -215,7 +202,6 @@ contains
       class(threshold_law_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: threshold
-      !> Probability
       real(wp) :: survival
 
       survival = 1.0_wp

@@ -14,7 +14,7 @@ MIN_WIDTH = 1e-6
 
 
 class Keys(Protocol):
-    """The keys of [contacts.threshold] that laws are made of."""
+    """The keys of [contacts.threshold] that define a law."""
 
     @property
     def relative_width(self) -> float: ...
@@ -43,7 +43,7 @@ class ThresholdLawKind:
         """The error of a relative width; empty if it is possible."""
         if width < MIN_WIDTH:
             return f"must be at least {MIN_WIDTH:g} (is {width:g})"
-        # Four digits of an irrational bound stand for the bound.
+        # An irrational bound may be given with four digits.
         if width > self.max_width * (1 + 1e-4):
             return f"must be at most {self.max_width:.4g} for the {self.name} law{self.if_wider}"
         return ""

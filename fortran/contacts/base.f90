@@ -80,8 +80,7 @@ module mesoslip_contacts_base
       real(wp) :: error_estimate = 0.0_wp
       !> Cost of a response relative to that of one breaking contact
       real(wp) :: cost = 1.0_wp
-      !> Clocks of thermally activated breaking, which the slider advances, and whether there are
-      !> any
+      !> Clocks of thermally activated breaking, which the slider advances; whether there are any
       type(hazard_clock_type) :: clock(clocks)
       logical :: has_clocks = .false.
       !> Set if the contacts cannot continue
@@ -233,8 +232,7 @@ contains
       class(contacts_type), intent(in) :: self
       !> Time [s], displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
-      !> For each contact numbers in the order of snapshot_columns, shape (snapshot_length,
-      !> individual_count)
+      !> Numbers in the order of snapshot_columns, shape (snapshot_length, individual_count)
       real(wp), intent(out) :: values(:, :)
 
       values = 0.0_wp

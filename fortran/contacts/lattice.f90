@@ -340,7 +340,7 @@ contains
       end if
    end subroutine update_neighbours
 
-   !> Update where the pinned neighbours of a contact that broke or attached break.
+   !> Update where the pinned neighbours of a contact break after it broke or attached.
    pure subroutine update_all(contact, change, sides, neighbour, count, record, surroundings, &
       & bond, direction, tree, behind)
       !> The contact, the number of its neighbours and of all contacts, and the neighbours

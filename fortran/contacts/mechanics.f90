@@ -23,7 +23,7 @@ module mesoslip_contacts_mechanics
    character(len=*), parameter :: coupling_names(3) = [character(len=6) :: "scaled", "equal", &
       & "table"]
 
-   !> All contacts wait for the same delay
+   !> All contacts have the same delay
    integer, parameter :: delay_fixed = 1
    !> Each delay is drawn from the exponential law
    integer, parameter :: delay_exponential = 2

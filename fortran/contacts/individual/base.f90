@@ -26,7 +26,7 @@ module mesoslip_contacts_individual_base
 
    public :: individual_contacts_type, exchange_individual, total_law, snapshot_individual
 
-   !> Contacts whose records are evaluated together for a snapshot
+   !> Number of contacts whose records are evaluated together for a snapshot
    integer, parameter :: snapshot_block = 256
 
    !> N individual contacts.
@@ -126,6 +126,7 @@ contains
       call self%sum_totals()
    end subroutine draw
 
+   !> Contact force as a law, from the sums over contacts.
    pure function total_law(self) result(law)
       class(individual_contacts_type), intent(in) :: self
       type(interface_law_type) :: law
@@ -484,6 +485,7 @@ contains
       call self%track%clear()
    end subroutine take_extent
 
+   !> State of each contact, without the forces of neighbours.
    pure subroutine snapshot_individual(self, time, displacement, values)
       class(individual_contacts_type), intent(in) :: self
       real(wp), intent(in) :: time, displacement

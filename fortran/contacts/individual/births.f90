@@ -28,8 +28,8 @@ module mesoslip_contacts_individual_births
 
    !> Births to come.
    type :: births_type
-      !> Contacts whose next thresholds have not been drawn: their number, their keys, which are
-      !> numbers from 0, and their next renewals
+      !> Requested births: their number; the keys of their contacts, which are numbers from 0, and
+      !> their renewals
       integer, private :: count = 0
       integer(i8), private :: key(draws_together) = 0_i8, renewal(draws_together) = 0_i8
       !> Delay of each contact before its next birth [s], if delays differ, and its force then over
@@ -326,7 +326,7 @@ contains
       end if
    end function drag_of
 
-   !> Write what has been drawn to an archive, or read it.
+   !> Write the draws to an archive, or read them; no requested draw may be pending.
    subroutine exchange(self, archive)
       class(births_type), intent(inout) :: self
       type(archive_type), intent(inout) :: archive

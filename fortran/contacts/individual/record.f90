@@ -1,4 +1,4 @@
-!> The record of a contact: a column of numbers, in one line of the cache or two.
+!> The record of a contact: a column of numbers, in one cache line or two.
 module mesoslip_contacts_individual_record
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -32,8 +32,7 @@ contains
       coordinate = direction * record(row_origin) + record(row_limit)
    end function ahead_coordinate
 
-   !> Coordinate along the direction of motion at which a pinned contact breaks after a
-   !> reversal [m].
+   !> Coordinate along the direction of motion at which it breaks after a reversal [m].
    pure function behind_coordinate(record, direction) result(coordinate)
       real(wp), intent(in) :: record(record_length)
       !> Direction of motion, +1 or -1

@@ -28,7 +28,7 @@ module mesoslip_contacts_threshold_laws_base
       !> Whether the density is smooth in the logarithm of the threshold: thresholds span orders of
       !> magnitude
       logical :: is_logarithmic = .false.
-      !> Number of cells in which the density is constant; 0 for a law with a formula
+      !> Number of cells in which the density is constant; 0 if it has no such cells
       integer :: cells = 0
       !> Whether the law is that of break stretches, each with a stiffness
       logical :: has_stiffnesses = .false.

@@ -1,4 +1,4 @@
-!> The kinds of contacts by name: the only place that knows them all.
+!> The kinds of contacts by name.
 module mesoslip_contacts
    use mesoslip_contacts_activated_ageing, only: make_activated_ageing
    use mesoslip_contacts_activated_contacts, only: make_contact_activated
@@ -24,11 +24,11 @@ contains
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Their kind
       character(len=*), intent(in) :: kind
-      !> Parameters of the contacts, each number by its name
+      !> Named parameters of the contacts
       type(parameters_type), intent(inout) :: parameters
       !> Key of the random numbers
       integer(i8), intent(in) :: seed, realization
-      !> Set if there is no such kind, or a number is missing, superfluous or wrong
+      !> Set if there is no such kind, or a parameter is missing, superfluous or wrong
       type(error_type), allocatable, intent(out) :: error
 
       type(contact_parameters_type) :: common

@@ -1,9 +1,9 @@
-!> The drive of a slider: what it prescribes over time, and the work that it does.
+!> The drive of a slider: the value that it prescribes over time, and its work.
 !>
 !> A drive prescribes a value: the displacement of the end of a spring, or of the slider itself [m],
-!> or a force [N]. Its rate is then in m/s or N/s, its acceleration in m/s2 or N/s2. A run has parts
-!> of constant acceleration; a stage is one part or several. A slider has its drive, and adds the
-!> work that it does; the loop asks it when it changes.
+!> or a force [N]. Its rate is in m/s or N/s, its acceleration in m/s2 or N/s2. A run has parts of
+!> constant acceleration; a stage is one part or several. A slider has a drive, and adds its
+!> impulse; the loop asks when the drive changes.
 module mesoslip_drive
    use mesoslip_extremes, only: extremes_type
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -17,60 +17,45 @@ module mesoslip_drive
 
    !> A drive in parts of constant acceleration.
    type :: drive_type
-      !> A time [s], the value then, a displacement being from the moving origin, and the rate then
+      !> A time [s], the value then (a displacement from the moving origin), and the rate then
       real(wp) :: time = 0.0_wp, value = 0.0_wp, rate = 0.0_wp
       !> Acceleration since then
       real(wp) :: acceleration = 0.0_wp
-      !> Time at which the rate changes sign [s]; no step goes beyond
+      !> Time at which the rate changes sign [s]; steps end there
       real(wp) :: turn = huge(1.0_wp)
-      !> Sign of the rate until then, or of the last one that was not zero
+      !> Sign of the rate until then, or of the last rate that was not 0
       real(wp) :: direction = 1.0_wp
-      !> Impulse on the slider since the drive took a constant velocity [N s]; times the velocity it
-      !> is the work since then. A drive that accelerates, or is a force, adds nothing here.
+      !> Impulse on the slider since the drive has its constant velocity [N s]; times the velocity
+      !> it is the work since then. It is not used while the drive accelerates, or is a force.
       type(accumulator_type) :: impulse
-      !> Work but for that [J]; impulse in the present stage but for that [N s]
+      !> Other work [J]; other impulse in the current stage [N s]
       type(accumulator_type) :: earlier_work, earlier_impulse
-      !> Maximum and minimum of the force on the slider in the present stage
+      !> Maximum and minimum of the force on the slider in the current stage
       type(extremes_type) :: extremes
 
-      !> Present part, and of each part: its end [s], the rates at its start and at its end, the
-      !> number of its stage; shape (parts)
+      !> Current part; for each part its end [s], the rates at its start and at its end, the number
+      !> of its stage; shape (parts)
       integer, private :: part = 1
       real(wp), allocatable, private :: part_end(:), start_rate(:), end_rate(:)
       integer, allocatable, private :: stage_of_part(:)
       !> Value at the start of each part, if it may jump there
       real(wp), allocatable, private :: start_value(:)
    contains
-      !> Set the parts, and the values at which they start
-      procedure, non_overridable :: open
-      procedure, non_overridable :: set_values
-      procedure, non_overridable :: is_open
-      !> Take the rate of the first part, of the next, go back to the first, or turn round
-      procedure, non_overridable :: begin
-      procedure, non_overridable :: take_next_part
-      procedure, non_overridable :: rewind
-      procedure, non_overridable :: turn_round
-      !> When the part ends, or the drive turns round before
-      procedure, non_overridable :: end_of_part
-      procedure, non_overridable :: next_change
-      !> Whether no part comes after the present one, and whether the next is of another stage
-      procedure, non_overridable :: is_last_part
-      procedure, non_overridable :: is_stage_over
-      !> Number of the stage, and its start
-      procedure, non_overridable :: stage
-      procedure, non_overridable :: begin_stage
-      !> Impulse on the slider in the present stage
-      procedure, non_overridable :: stage_impulse
-      !> Take a rate and an acceleration
-      procedure, non_overridable :: change
-      !> Value and rate at a time
-      procedure, non_overridable :: at
-      procedure, non_overridable :: rate_at
-      !> Work done so far
-      procedure, non_overridable :: work
-      !> Count the value from now on, a displacement from another origin
+      !> Set the parts, and their start values
+      procedure, non_overridable :: open, set_values, is_open
+      !> Start the first part or the next, return to the first, reverse within a part
+      procedure, non_overridable :: begin, take_next_part, rewind, turn_round
+      !> Time at which the part ends, or the drive changes
+      procedure, non_overridable :: end_of_part, next_change
+      !> Whether the current part is the last one, and whether the next is of another stage
+      procedure, non_overridable :: is_last_part, is_stage_over
+      !> Number of the current stage, start of a stage, and impulse on the slider in it
+      procedure, non_overridable :: stage, begin_stage, stage_impulse
+      !> Set rate and acceleration; value and rate at a time; work done so far
+      procedure, non_overridable :: change, at, rate_at, work
+      !> Move the time and the origin of the value
       procedure, non_overridable :: rebase
-      !> Put the state into an archive or take it out
+      !> Write the state to an archive, or read it
       procedure, non_overridable :: exchange
    end type drive_type
 
@@ -78,13 +63,12 @@ contains
 
    !> Set the parts of a drive.
    subroutine open(self, part_end, start_rate, end_rate, stage_of_part, error)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> End of each part [s]; rates at its start and at its end
       real(wp), intent(in) :: part_end(:), start_rate(:), end_rate(:)
       !> Number of the stage that each part is of
       integer, intent(in) :: stage_of_part(:)
-      !> Set if there is no part
+      !> Set without a part
       type(error_type), allocatable, intent(out) :: error
 
       if (size(part_end) == 0) then
@@ -97,13 +81,12 @@ contains
       self%stage_of_part = stage_of_part
    end subroutine open
 
-   !> Set the values at which the parts start; otherwise the value is continuous.
+   !> Set the values at which the parts start; without them the value is continuous.
    subroutine set_values(self, start_value, error)
-      !> The drive, open
       class(drive_type), intent(inout) :: self
       !> Value at the start of each part
       real(wp), intent(in) :: start_value(:)
-      !> Set if there are not as many as parts
+      !> Set if their number is not that of the parts, or there are no parts yet
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. self%is_open()) then
@@ -117,17 +100,14 @@ contains
 
    !> Whether the parts are set.
    pure function is_open(self)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Whether they are
       logical :: is_open
 
       is_open = allocated(self%part_end)
    end function is_open
 
-   !> Take the rate of the first part.
+   !> Start the first part.
    subroutine begin(self, time)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -136,9 +116,8 @@ contains
       call take_part(self, time)
    end subroutine begin
 
-   !> Take the rate of the next part.
+   !> Start the next part; there is one.
    subroutine take_next_part(self, time)
-      !> The drive, not in its last part
       class(drive_type), intent(inout) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -147,22 +126,21 @@ contains
       call take_part(self, time)
    end subroutine take_next_part
 
-   !> Count the first part as the present one; its rate is not taken.
+   !> Return to the first part, but keep the rate.
    pure subroutine rewind(self)
-      !> The drive
       class(drive_type), intent(inout) :: self
 
       self%part = 1
    end subroutine rewind
 
-   !> Take the rate of the present part.
+   !> Set rate and acceleration to those of the current part.
    subroutine take_part(self, time)
       type(drive_type), intent(inout) :: self
       real(wp), intent(in) :: time
 
       associate (start => self%start_rate(self%part), end => self%end_rate(self%part))
          call self%change(time, start, part_acceleration(self))
-         ! A ramp to rest does not turn: its time of rest may be rounded to before its end.
+         ! A ramp to rest does not turn: its time of rest may be rounded below its end.
          if (.not. start * end < 0.0_wp) self%turn = huge(1.0_wp)
       end associate
       if (.not. allocated(self%start_value)) return
@@ -172,9 +150,8 @@ contains
       end if
    end subroutine take_part
 
-   !> Turn round within a part.
+   !> Reverse within a part.
    subroutine turn_round(self, time)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
@@ -182,7 +159,7 @@ contains
       call self%change(time, 0.0_wp, part_acceleration(self))
    end subroutine turn_round
 
-   !> Acceleration in the present part.
+   !> Acceleration in the current part.
    pure function part_acceleration(self) result(acceleration)
       type(drive_type), intent(in) :: self
       real(wp) :: acceleration
@@ -196,78 +173,64 @@ contains
          & / (self%part_end(self%part) - start)
    end function part_acceleration
 
-   !> End of the present part.
+   !> End of the current part [s]; huge for a part without end.
    pure function end_of_part(self) result(time)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Time [s]; huge if it has none
       real(wp) :: time
 
       time = self%part_end(self%part)
    end function end_of_part
 
-   !> Time at which the drive changes next: its part ends, or it turns round.
+   !> Time at which the drive changes next [s]: its part ends, or it reverses.
    pure function next_change(self) result(time)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Time [s]
       real(wp) :: time
 
       time = min(self%part_end(self%part), self%turn)
    end function next_change
 
-   !> Whether no part comes after the present one.
+   !> Whether the current part is the last one.
    pure function is_last_part(self) result(is_last)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Whether it is the last one
       logical :: is_last
 
       is_last = self%part == size(self%part_end)
    end function is_last_part
 
-   !> Whether the stage ends with the present part.
+   !> Whether the stage ends with the current part, which is not the last.
    pure function is_stage_over(self) result(is_over)
-      !> The drive, not in its last part
       class(drive_type), intent(in) :: self
-      !> Whether it does
       logical :: is_over
 
       is_over = self%stage_of_part(self%part + 1) /= self%stage_of_part(self%part)
    end function is_stage_over
 
-   !> Number of the present stage.
+   !> Number of the current stage.
    pure function stage(self) result(number)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Its number
       integer :: number
 
       number = self%stage_of_part(self%part)
    end function stage
 
-   !> A stage begins: its impulse and its extremes count from here.
+   !> Begin a stage: its impulse and its extremes start here.
    subroutine begin_stage(self)
-      !> The drive
       class(drive_type), intent(inout) :: self
 
       self%extremes = extremes_type()
       self%earlier_impulse = accumulator_type()
    end subroutine begin_stage
 
-   !> Impulse on the slider in the present stage.
+   !> Impulse on the slider in the current stage [N s].
    pure function stage_impulse(self) result(impulse)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Impulse [N s]
       real(wp) :: impulse
 
       impulse = self%earlier_impulse%total() + self%impulse%total()
    end function stage_impulse
 
-   !> Take a rate and an acceleration.
+   !> Set rate and acceleration.
    subroutine change(self, time, rate, acceleration)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s], rate now, and acceleration from now on
       real(wp), intent(in) :: time, rate, acceleration
@@ -288,48 +251,41 @@ contains
       end if
    end subroutine change
 
-   !> Value at a time.
+   !> Value at a time: displacement from the moving origin [m], or force [N].
    pure function at(self, time) result(value)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Time, until the drive changes [s]
       real(wp), intent(in) :: time
-      !> Displacement from the moving origin [m], or force [N]
       real(wp) :: value
 
       value = self%value &
          & + (self%rate + 0.5_wp * self%acceleration * (time - self%time)) * (time - self%time)
    end function at
 
-   !> Rate at a time.
+   !> Rate at a time [m/s or N/s].
    pure function rate_at(self, time) result(rate)
-      !> The drive
       class(drive_type), intent(in) :: self
       !> Time, until the drive changes [s]
       real(wp), intent(in) :: time
-      !> Rate [m/s or N/s]
       real(wp) :: rate
 
       rate = self%rate
       if (.not. abs(self%acceleration) > 0.0_wp) return
       rate = rate + self%acceleration * (time - self%time)
-      ! Rounding must not turn it round early.
+      ! Rounding must not reverse it early.
       rate = self%direction * max(0.0_wp, self%direction * rate)
    end function rate_at
 
-   !> Work done so far.
+   !> Work done so far [J].
    pure function work(self)
-      !> The drive
       class(drive_type), intent(in) :: self
-      !> Work [J]
       real(wp) :: work
 
       work = self%earlier_work%total() + self%rate * self%impulse%total()
    end function work
 
-   !> Count time and value from now on, a displacement from another origin.
+   !> Move the time and the origin of the value, so that both count from now on.
    subroutine rebase(self, time, shift)
-      !> The drive
       class(drive_type), intent(inout) :: self
       !> Time now [s], and displacement of the new origin [m]; 0 for a force
       real(wp), intent(in) :: time, shift
@@ -339,11 +295,9 @@ contains
       self%time = time
    end subroutine rebase
 
-   !> Put the state into an archive or take it out.
+   !> Write the state to an archive, or read it.
    subroutine exchange(self, archive)
-      !> The drive
       class(drive_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%exchange("drive part", self%part)

@@ -1,4 +1,4 @@
-!> Maximum and minimum of a force, with their times and displacements.
+!> Maximum and minimum of a force.
 module mesoslip_extremes
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
@@ -7,26 +7,25 @@ module mesoslip_extremes
 
    public :: extremes_type
 
-   !> Maximum and minimum of a force.
+   !> Maximum and minimum of a force, with their times and displacements.
    type :: extremes_type
       !> The forces [N]
       real(wp) :: max_force = -huge(1.0_wp), min_force = huge(1.0_wp)
       !> Their times [s]
       real(wp) :: max_time = 0.0_wp, min_time = 0.0_wp
-      !> Displacement of the slider then, in all [m]
+      !> Total displacements of the slider then [m]
       real(wp) :: max_displacement = 0.0_wp, min_displacement = 0.0_wp
    contains
       !> Take a force into account
       procedure, non_overridable :: note
-      !> Put the state into an archive or take it out
+      !> Write the state to an archive, or read it
       procedure, non_overridable :: exchange
    end type extremes_type
 
 contains
 
-   !> Take a force into account; of equal ones the first stays.
+   !> Take a force into account; of equal ones the first is kept.
    pure subroutine note(self, force, time, displacement)
-      !> The extremes
       class(extremes_type), intent(inout) :: self
       !> Force [N], its time [s], displacement of the slider then [m]
       real(wp), intent(in) :: force, time, displacement
@@ -43,11 +42,9 @@ contains
       end if
    end subroutine note
 
-   !> Put the state into an archive or take it out.
+   !> Write the state to an archive, or read it.
    subroutine exchange(self, archive)
-      !> The extremes
       class(extremes_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%exchange("max_force", self%max_force)

@@ -1,10 +1,9 @@
 !> Readings of the clocks of thermally activated breaking, and the keys at which contacts break.
 !>
-!> A clock is the integral of omega_0 exp(s k (X - R)/f_T) over the time, s being the sign of the
-!> forces of its contacts and R a reference displacement near the slider's, so that no exponent is
-!> beyond all numbers. A contact of origin Y and threshold f_s, of which the part E of an
-!> exponential deviate is left, breaks where its clock has gone on by
-!> E exp((f_s + s k (Y - R))/f_T).
+!> A clock is the time integral of omega_0 exp(s k (X - R)/f_T), s being the sign of the forces of
+!> its contacts and R a reference displacement near the slider's, so that exponents do not overflow.
+!> A contact of origin Y and threshold f_s, with the remainder E of an exponential deviate, breaks
+!> when its clock has advanced by E exp((f_s + s k (Y - R))/f_T).
 module mesoslip_hazard
    use mesoslip_interface_law, only: clocks, hazard_clock_type, window_type
    use mesoslip_numerics_kinds, only: wp
@@ -13,21 +12,21 @@ module mesoslip_hazard
 
    public :: hazard_type, force_sign, never, max_clock_exponent
 
-   !> Sign of the force of the contacts that go by each clock
+   !> Sign of the force of the contacts of each clock
    real(wp), parameter :: force_sign(clocks) = [1.0_wp, -1.0_wp]
-   !> Key of a contact that does not break; no other contact has it
+   !> Key of a contact that does not break
    real(wp), parameter :: never = huge(1.0_wp)
    !> Maximum exponents: of a key, and of a clock before its reference moves
    real(wp), parameter :: max_key_exponent = 690.0_wp, max_clock_exponent = 300.0_wp
-   !> By how much an exponent of a clock may fall before its reference moves: what is added to a
-   !> reading loses as many digits
+   !> Maximum decrease of an exponent of a clock before its reference moves: increments of the
+   !> reading lose digits accordingly
    real(wp), parameter :: max_fall = 8.0_wp
 
    !> The clocks.
    type :: hazard_type
       !> Rate at the threshold, omega_0 [1/s], and k/f_T [1/m]
       real(wp) :: rate = 0.0_wp, slope = 0.0_wp
-      !> Whether contacts go by each clock
+      !> Whether each clock has contacts
       logical :: is_used(clocks) = .false.
       !> Reading of each clock since its reference was set [s], the reference [m], and the maximum
       !> exponent of its rate since then
@@ -36,30 +35,25 @@ module mesoslip_hazard
       !> Reading at which the next contact breaks [s]
       real(wp) :: next(clocks) = never
    contains
-      !> Clocks for a slider, and what they are after its advance
-      procedure, non_overridable :: offer
-      procedure, non_overridable :: go_on
-      !> End a window before an exponent is beyond all numbers
+      !> Clocks for a slider, and their readings after it has advanced them
+      procedure, non_overridable :: offer, advance
+      !> End a window before an exponent overflows
       procedure, non_overridable :: limit_window
-      !> Exponent of the rate of a clock, and whether its reference has to move
-      procedure, non_overridable :: rate_exponent
-      procedure, non_overridable :: is_far
-      !> Exponent of the factor between a deviate and what the clock goes on by, and the key
-      procedure, non_overridable :: life_exponent
-      procedure, non_overridable :: key
-      !> Remaining deviate of a contact
-      procedure, non_overridable :: left
+      !> Exponent of the rate of a clock, and whether its reference must move
+      procedure, non_overridable :: rate_exponent, is_far
+      !> Exponent of the factor between a deviate and the increase of the clock, the key of a
+      !> contact, and its remaining deviate
+      procedure, non_overridable :: life_exponent, key, left
    end type hazard_type
 
 contains
 
    !> Clocks for a slider.
    pure subroutine offer(self, displacement, clock)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> The part that goes on
+      !> The part that the slider advances
       type(hazard_clock_type), intent(inout) :: clock(clocks)
 
       integer :: number
@@ -78,18 +72,17 @@ contains
       end do
    end subroutine offer
 
-   !> Let readings go on by what was added in an advance.
-   pure subroutine go_on(self, clock)
-      !> The clocks
+   !> Add the increase in an advance of the slider to the readings, and clear it.
+   pure subroutine advance(self, clock)
       class(hazard_type), intent(inout) :: self
-      !> The same after the advance; what was added is taken away
+      !> The clocks after the advance
       type(hazard_clock_type), intent(inout) :: clock(clocks)
 
       integer :: number
 
       do number = 1, clocks
          if (clock(number)%is_due) then
-            ! To the last digit, so that the contact does break.
+            ! Exactly, so that the contact breaks.
             self%reading(number) = self%next(number)
          else
             self%reading(number) = self%reading(number) + clock(number)%elapsed
@@ -97,13 +90,11 @@ contains
          clock(number)%elapsed = 0.0_wp
          clock(number)%is_due = .false.
       end do
-   end subroutine go_on
+   end subroutine advance
 
-   !> End a window before an exponent is beyond all numbers.
+   !> End a window before an exponent overflows.
    pure subroutine limit_window(self, window)
-      !> The clocks
       class(hazard_type), intent(in) :: self
-      !> The window
       type(window_type), intent(inout) :: window
 
       if (self%is_used(1)) window%upper = min(window%upper, &
@@ -114,9 +105,7 @@ contains
 
    !> Exponent of the rate of a clock.
    pure function rate_exponent(self, number, displacement) result(exponent)
-      !> The clocks
       class(hazard_type), intent(in) :: self
-      !> Number of the clock
       integer, intent(in) :: number
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
@@ -125,49 +114,44 @@ contains
       exponent = force_sign(number) * self%slope * (displacement - self%reference(number))
    end function rate_exponent
 
-   !> Whether the reference of a clock has to move to the slider, which is noted.
+   !> Whether the reference of a clock must move to the slider; keeps the maximum exponent.
    subroutine is_far(self, number, displacement, far)
-      !> The clocks
       class(hazard_type), intent(inout) :: self
-      !> Number of the clock
       integer, intent(in) :: number
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Whether it has to
       logical, intent(out) :: far
 
       real(wp) :: exponent
 
       exponent = self%rate_exponent(number, displacement)
       self%max_exponent(number) = max(self%max_exponent(number), exponent)
-      ! Rounding may leave the slider a little before the bound of its window.
+      ! Rounding may leave the slider slightly before the bound of its window.
       far = exponent >= 0.999_wp * max_clock_exponent &
          & .or. exponent <= self%max_exponent(number) - max_fall
    end subroutine is_far
 
-   !> Exponent of the factor between a contact's deviate and what its clock goes on by.
+   !> Exponent of the factor between a contact's deviate and the increase of its clock.
    pure function life_exponent(self, number, limit, origin) result(exponent)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number
-      !> Stretch at the threshold, and displacement at which the stretch is zero [m]
+      !> Stretch at the threshold, and origin [m]
       real(wp), intent(in) :: limit, origin
       real(wp) :: exponent
 
       exponent = self%slope * (limit + force_sign(number) * (origin - self%reference(number)))
    end function life_exponent
 
-   !> Reading at which a contact breaks; never if it is beyond all numbers: it is found again when
-   !> the reference has moved.
+   !> Reading at which a contact breaks; never if it overflows: it is computed again after the
+   !> reference has moved.
    pure function key(self, number, left, limit, origin)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number
       !> Remaining deviate of the contact
       real(wp), intent(in) :: left
-      !> Stretch at the threshold, and displacement at which the stretch is zero [m]
+      !> Stretch at the threshold, and origin [m]
       real(wp), intent(in) :: limit, origin
       real(wp) :: key
 
@@ -180,13 +164,12 @@ contains
 
    !> Remaining deviate of a contact now.
    pure function left(self, number, key, deviate, limit, origin)
-      !> The clocks
       class(hazard_type), intent(in) :: self
       !> Number of the contact's clock
       integer, intent(in) :: number
-      !> Reading at which it breaks [s], and what was left when that was found
+      !> Reading at which it breaks [s], and the remaining deviate when that was computed
       real(wp), intent(in) :: key, deviate
-      !> Stretch at the threshold, and displacement at which the stretch is zero [m]
+      !> Stretch at the threshold, and origin [m]
       real(wp), intent(in) :: limit, origin
       real(wp) :: left
 

@@ -1,14 +1,13 @@
-!> The events of a motion that goes on forward: the next breaks and attachments in their order.
+!> The next breaks and attachments of a motion in one direction, in their order.
 !>
-!> Contacts write a schedule; a slider runs through it and it notes when and where each event came;
-!> contacts read that afterwards and keep their books for many events at once. It knows nothing
-!> but what each event does to the law of the contact force, so that sliders need not know contacts.
+!> Contacts write a schedule. It records the time and displacement of each event while a slider runs
+!> through it; afterwards contacts update their records for many events at once. A schedule has the
+!> change of the contact force in each event, so that sliders do not depend on contacts.
 !>
-!> A schedule is never wrong, only short: it ends before anything unforeseen, and the
-!> numbers of a run do not depend on its length.
+!> It ends before any event that it does not foresee: results do not depend on its length.
 !>
-!> With clocks of thermally activated breaking a contact may be in two lists, that of coordinates
-!> and that of readings of a clock; where it breaks by one it is gone from the other.
+!> With clocks of thermally activated breaking a contact may be in two lists, by coordinate and by
+!> the reading of a clock; after it broke as an entry of one list, that of the other is gone.
 module mesoslip_schedule
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -22,95 +21,94 @@ module mesoslip_schedule
    !> Maximum number of breaks, and of attachments, in a schedule
    integer, parameter :: max_events = 64
 
-   !> Events to come, and those that came.
+   !> Coming and past events.
    type :: schedule_type
-      !> Breaks and attachments to come
+      !> Listed breaks and attachments
       integer :: breaks = 0, attachments = 0
-      !> Those that came, and moments in which contacts broke
+      !> Those that are past, and moments in which contacts broke
       integer :: broken = 0, attached = 0, moments = 0
-      !> Whether it ends here
+      !> Whether it is at its end
       logical :: is_over = .true.
-      !> Whether the only break listed is a bound, where contacts are to say which of them break;
-      !> whether the slider has come there
+      !> Whether the only listed break is a bound, at which the contacts decide which of them break;
+      !> whether the slider has reached it
       logical :: is_bounded = .false., at_bound = .false.
 
       !> Direction of motion, +1 or -1
       real(wp) :: direction = 1.0_wp
-      !> Totals of stiffness and stiffness times origin of the pinned, of drag of the detached
+      !> Sums over pinned contacts (stiffness; stiffness times origin) and detached ones (drag)
       type(accumulator_type) :: stiffness, offset, drag
-      !> Contacts that are pinned and detached
+      !> Number of pinned and of detached contacts
       integer :: pinned = 0, detached = 0
-      !> Maximum coordinate at which a contact breaks in a motion back [m]
+      !> Maximum coordinate at which a contact breaks after a reversal [m]
       real(wp) :: behind = -huge(1.0_wp)
       !> Time after which a contact that breaks attaches; huge if it does not [s]
       real(wp) :: delay = 0.0_wp
       !> Time at which it ends, and maximum duration of a step [s]
       real(wp) :: end_time = 0.0_wp, max_step = 0.0_wp
-      !> Mean stiffness of a contact [N/m]; it ends where that times the displacement is a force [N]
+      !> Mean stiffness of a contact [N/m]; the schedule ends where that times the displacement is
+      !> max_force [N]
       real(wp) :: mean_stiffness = 0.0_wp, max_force = 0.0_wp
 
-      !> Of each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
-      !> of the contact when it is detached [N s/m]
+      !> For each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
+      !> of the detached contact [N s/m]
       real(wp) :: break_coordinate(max_events) = 0.0_wp, break_stiffness(max_events) = 0.0_wp, &
          & break_origin(max_events) = 0.0_wp, break_drag(max_events) = 0.0_wp
-      !> When and where those came, in their order [s, m]
+      !> Times [s] and displacements [m] of past breaks, in their order
       real(wp) :: break_time(2 * max_events) = 0.0_wp, &
          & break_displacement(2 * max_events) = 0.0_wp
-      !> Of each attachment: its time [s], with that of the first one that is not in the schedule;
-      !> stiffness [N/m], stretch at first and at breaking [m] and drag until then [N s/m]
+      !> For each attachment: its time [s], followed by that of the first one beyond the schedule;
+      !> stiffness [N/m], first stretch and stretch at breaking [m], and drag until then [N s/m]
       real(wp) :: attach_time(max_events + 1) = 0.0_wp, attach_stiffness(max_events) = 0.0_wp, &
          & attach_stretch(max_events) = 0.0_wp, attach_limit(max_events) = 0.0_wp, &
          & attach_drag(max_events) = 0.0_wp
-      !> Where it came [m]
+      !> Displacements of past attachments [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
-      !> Whether contacts that break may attach here, and of each break the delay until then [s],
-      !> the stiffness [N/m], and the stretches at first and at breaking [m] of the next life, and
-      !> the deviate of that; those of breaks by a clock come after the others
+      !> Whether contacts that break may attach within the schedule; for each break the delay until
+      !> then [s], the stiffness [N/m], the first stretch and that at breaking [m], and the deviate
+      !> of the next life. Breaks by a clock are listed after the others.
       logical :: has_births = .false.
       real(wp) :: birth_delay(2 * max_events) = 0.0_wp, birth_stiffness(2 * max_events) = 0.0_wp, &
          & birth_stretch(2 * max_events) = 0.0_wp, birth_limit(2 * max_events) = 0.0_wp, &
          & birth_left(2 * max_events) = 0.0_wp
 
-      !> Whether there are clocks, which they are, and the one by which contacts break here
+      !> Whether there are clocks; the clocks, and the number of that of the list
       logical :: has_clocks = .false.
       type(hazard_type) :: hazard
       integer :: number = 1
-      !> Breaks by the clock to come, and those that came or are gone
+      !> Listed breaks by the clock, and those that are past or gone
       integer :: clock_breaks = 0, clock_broken = 0
-      !> Of each its reading [s], and origin [m]
+      !> For each its reading [s], and origin [m]
       real(wp) :: clock_key(max_events) = 0.0_wp, clock_origin(max_events) = 0.0_wp
-      !> Entry of the clock's list that ends the schedule without a break, 0 for none
+      !> Entry of the clock's list that ends the schedule without a break, or 0
       integer :: clock_stop = 0
-      !> Of each entry the same contact in the other list, or 0, and whether it is gone
+      !> For each entry that of the same contact in the other list, or 0, and whether it is gone
       integer :: break_twin(max_events) = 0, clock_twin(max_events) = 0
       logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
-      !> Of each entry by coordinates whether the contact does not break there, but its force gets
-      !> the sign of the motion; its stretch at breaking [m], what is left of its deviate, and its
-      !> reading: by the other clock until then, and by this one after that [s]
+      !> For each entry by coordinate whether the contact does not break there, but its force gets
+      !> the sign of the motion; its stretch at breaking [m], its remaining deviate, and its reading
+      !> [s], by the other clock before that and by this one after it
       logical :: break_turns(max_events) = .false.
       real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
          & turn_key(max_events) = 0.0_wp
-      !> Those that came; contacts that go by the other clock, and the entry of the first of them to
+      !> Past changes of sign; contacts of the other clock, and the entry of the first of them to
       !> break, 0 if it is not listed
       integer :: turned = 0, others = 0, other_first = 0
-      !> Breaks in all, and the entry of each, negative if it is one of the clock
+      !> All past breaks, and the entry of each, negative in the list of the clock
       integer :: came_count = 0, came(2 * max_events) = 0
-      !> Whether contacts broke in the last moment
+      !> Whether contacts broke in the last step
       logical :: breaks_now = .false.
-      !> Of each attachment the deviate, and the reading at which the contact breaks [s]; distance
-      !> from its origin at which its force changes its sign on the way back [m]
+      !> For each attachment the deviate, and the reading at which the contact breaks [s]; distance
+      !> from the origin at which the force of a contact changes its sign in backward motion [m]
       real(wp) :: attach_left(max_events) = 0.0_wp, attach_key(max_events) = 0.0_wp, &
          & tiny_stretch = 0.0_wp
    contains
-      !> Contact force until the next event, and where and when that is
-      procedure, non_overridable :: law
-      procedure, non_overridable :: window
+      !> Contact force until the next event, and the window until then
+      procedure, non_overridable :: law, window
       !> Number of contacts that broke
       procedure, non_overridable :: break_count
-      !> Let what is due at a time and a displacement happen
+      !> Make the events that are due at a time and a displacement
       procedure, non_overridable :: pass
-      procedure, non_overridable, private :: break_due, attach_due, &
-         & insert_attachments, insert_attachment
+      procedure, non_overridable, private :: break_due, attach_due, insert_attachment
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
          & change_sign, cut_lists, skip_gone
    end type schedule_type
@@ -119,9 +117,7 @@ contains
 
    !> Contact force until the next event.
    pure function law(self)
-      !> The schedule
       class(schedule_type), intent(in) :: self
-      !> The law
       type(interface_law_type) :: law
 
       law%stiffness = self%stiffness%total()
@@ -129,13 +125,11 @@ contains
       law%drag = self%drag%total()
    end function law
 
-   !> Where the next event is.
+   !> Window until the next event, before the end of the schedule.
    pure function window(self, time)
-      !> The schedule, not at its end
       class(schedule_type), intent(in) :: self
       !> Time now [s]
       real(wp), intent(in) :: time
-      !> Displacements and time at which the law ends
       type(window_type) :: window
 
       if (self%direction > 0.0_wp) then
@@ -152,17 +146,14 @@ contains
 
    !> Number of contacts that broke.
    pure function break_count(self) result(number)
-      !> The schedule
       class(schedule_type), intent(in) :: self
-      !> Their number
       integer :: number
 
       number = merge(self%came_count, self%broken, self%has_clocks)
    end function break_count
 
-   !> Let what is due happen: first contacts break, then contacts attach.
+   !> Make the events that are due: first contacts break, then contacts attach.
    subroutine pass(self, time, displacement)
-      !> The schedule
       class(schedule_type), intent(inout) :: self
       !> Time [s] and displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
@@ -185,12 +176,12 @@ contains
          & .or. abs(displacement) * self%mean_stiffness >= self%max_force
    end subroutine pass
 
-   !> Contacts break.
+   !> Break all contacts that are due.
    subroutine break_due(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
 
-      integer :: event
+      integer :: event, broken
 
       do event = self%broken + 1, self%breaks
          if (self%break_coordinate(event) > self%direction * displacement) exit
@@ -200,10 +191,12 @@ contains
          call self%offset%add(-self%break_stiffness(event) * self%break_origin(event))
          if (self%break_drag(event) > 0.0_wp) call self%drag%add(self%break_drag(event))
       end do
-      ! Those that break now come after all that wait to attach.
       if (self%has_births) then
-         call self%insert_attachments(event - 1, time)
+         do broken = self%broken + 1, event - 1
+            call self%insert_attachment(broken, time, self%break_drag(broken))
+         end do
       else if (self%broken == 0) then
+         ! With one delay for all, those that break now attach after all listed ones.
          self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
             & time + self%delay)
       end if
@@ -218,22 +211,7 @@ contains
       end if
    end subroutine break_due
 
-   !> Insert the attachments of the contacts that break now.
-   subroutine insert_attachments(self, last, time)
-      class(schedule_type), intent(inout) :: self
-      !> Number of the last break
-      integer, intent(in) :: last
-      !> Time [s]
-      real(wp), intent(in) :: time
-
-      integer :: event
-
-      do event = self%broken + 1, last
-         call self%insert_attachment(event, time, self%break_drag(event))
-      end do
-   end subroutine insert_attachments
-
-   !> Insert the attachment of a contact that breaks now, unless it comes after those listed.
+   !> Insert the attachment of a contact that breaks now, unless it is after the end of the list.
    subroutine insert_attachment(self, event, time, drag)
       class(schedule_type), intent(inout) :: self
       !> Number of its break, or of its birth
@@ -246,13 +224,13 @@ contains
 
       due = time + self%birth_delay(event)
       if (due < self%attach_time(self%attachments + 1) .and. self%attachments == max_events) then
-         ! The last one leaves a full list, whose next time is its own then.
+         ! The last one leaves a full list, and its time is the first beyond the list.
          if (self%attached == max_events) self%attach_time(max_events + 1) = due
          self%attachments = max(self%attached, max_events - 1)
       end if
       if (due >= self%attach_time(self%attachments + 1)) return
       if (self%has_clocks .and. self%direction * self%birth_stretch(event) < 0.0_wp) then
-         ! It goes by the other clock, which ends the schedule.
+         ! The contact is one of the other clock, which ends the schedule.
          do while (self%attachments > self%attached)
             if (self%attach_time(self%attachments) <= due) exit
             self%attachments = self%attachments - 1
@@ -281,7 +259,7 @@ contains
       self%attachments = self%attachments + 1
    end subroutine insert_attachment
 
-   !> Contacts attach. One that would break before another of the schedule cuts it short.
+   !> Attach all contacts that are due. One that would break before listed ones ends the list there.
    subroutine attach_due(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
@@ -309,8 +287,8 @@ contains
       self%attached = event - 1
    end subroutine attach_due
 
-   !> The same with clocks: contacts break by their clock, then at coordinates, then others attach.
-   !> Other events that are due where the schedule ends are left to the contacts.
+   !> The same as pass with clocks: contacts break by their clock, then by coordinate, then others
+   !> attach. At the end of the schedule further events that are due are left to the contacts.
    subroutine pass_clocks(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
@@ -334,7 +312,7 @@ contains
          associate (event => self%broken + 1)
             if (self%break_coordinate(event) > self%direction * displacement) exit
             if (self%break_turns(event)) then
-               ! Contacts of the other clock break before that.
+               ! Contacts of the other clock break first.
                if (self%hazard%reading(other) >= self%hazard%next(other)) then
                   self%is_over = .true.
                   exit
@@ -371,11 +349,11 @@ contains
       self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
    end subroutine pass_clocks
 
-   !> A contact breaks.
+   !> Break a contact.
    subroutine break_with_clocks(self, time, displacement, entry, origin)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
-      !> Entry of its list, negative if it is that of the clock
+      !> Entry of its list, negative in that of the clock
       integer, intent(in) :: entry
       !> Its origin [m]
       real(wp), intent(in) :: origin
@@ -391,7 +369,7 @@ contains
          call self%insert_attachment(merge(entry, max_events - entry, entry > 0), time, &
             & self%break_drag(1))
       else if (self%came_count == 1) then
-         ! Those that break now come after all that wait to attach.
+         ! With one delay for all, those that break now attach after all listed ones.
          self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
             & time + self%delay)
       end if
@@ -417,7 +395,7 @@ contains
       end do
    end subroutine skip_gone
 
-   !> Contacts attach. One that would break before another of a list cuts it short.
+   !> The same as attach_due with clocks.
    subroutine attach_with_clocks(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
@@ -442,10 +420,10 @@ contains
       self%attached = event - 1
    end subroutine attach_with_clocks
 
-   !> The force of a contact gets the sign of the motion: it goes by the other clock from now on.
+   !> Move a contact to the other clock, as its force gets the sign of the motion.
    subroutine change_sign(self, event)
       class(schedule_type), intent(inout) :: self
-      !> Entry of the list by coordinates
+      !> Entry of the list by coordinate
       integer, intent(in) :: event
 
       associate (origin => self%break_origin(event), limit => self%turn_limit(event), &
@@ -454,16 +432,16 @@ contains
          key = self%hazard%key(self%number, left, limit, origin)
          self%turned = self%turned + 1
          self%others = self%others - 1
-         ! Which contact is the next one of the other clock is not known then.
+         ! Then the next contact of the other clock is not known.
          if (event == self%other_first .or. self%others == 0) self%is_over = .true.
-         ! Its own entry stays, as it is passed after that.
+         ! Its own entry must stay.
          self%broken = event
          call self%cut_lists(origin, limit, key)
          self%broken = event - 1
       end associate
    end subroutine change_sign
 
-   !> Cut lists short before the entries of a contact that is new in them.
+   !> End the lists before a contact that is not in them.
    subroutine cut_lists(self, origin, limit, key)
       class(schedule_type), intent(inout) :: self
       !> Origin of the contact, its stretch at breaking [m], and the reading at which it breaks [s]

@@ -1,4 +1,4 @@
-!> Which steps of a slider are of interest to the recorders, while it runs through a schedule.
+!> Selects the steps of a slider that recorders need while it runs through a schedule.
 module mesoslip_step_filter
    use mesoslip_numerics_kinds, only: i8, wp
    implicit none
@@ -6,25 +6,25 @@ module mesoslip_step_filter
 
    public :: step_filter_type
 
-   !> A step is of no interest if it ends before a time, and while the excess of the velocity over a
-   !> reference stays in an interval.
+   !> A step is skipped if it ends before a time, with the excess of the velocity over a reference
+   !> in an interval.
    type :: step_filter_type
-      !> Time from which a step is of interest [s]
+      !> Time from which steps are selected [s]
       real(wp) :: time = huge(1.0_wp)
-      !> Velocity from which the excess is counted [m/s], in a direction, +1 or -1
+      !> Reference velocity of the excess [m/s], and direction in which it counts, +1 or -1
       real(wp) :: reference = 0.0_wp, direction = 1.0_wp
       !> Interval of the excess, min_excess < excess <= max_excess [m/s]
       real(wp) :: min_excess = -huge(1.0_wp), max_excess = huge(1.0_wp)
-      !> Whether a maximum of the velocity within a step is of interest
+      !> Whether steps with a maximum of the velocity are selected
       logical :: selects_peaks = .false.
-      !> Number of steps after which to stop in any case
+      !> Maximum number of steps
       integer(i8) :: max_steps = huge(1_i8)
 
-      !> Number of steps made, and whether the last one is of interest
+      !> Number of steps made, and whether the last one is selected
       integer(i8) :: steps = 0
       logical :: is_selected = .false.
       !> Whether steps were skipped; time and excess at the end of the last of them, maximum of the
-      !> velocity in the direction at the ends of all
+      !> velocity along the direction at the ends of all
       logical :: has_skipped = .false.
       real(wp) :: skipped_time = 0.0_wp, skipped_excess = 0.0_wp, max_velocity = -huge(1.0_wp)
    contains
@@ -34,9 +34,8 @@ module mesoslip_step_filter
 
 contains
 
-   !> Select a step, or skip it if it is of no interest.
+   !> Select a step, or skip it.
    pure subroutine examine(self, time, velocity, start_acceleration, acceleration)
-      !> The filter
       class(step_filter_type), intent(inout) :: self
       !> Time [s] and velocity [m/s] at the end of the step, accelerations at its start and at its
       !> end [m/s2]

@@ -1,7 +1,7 @@
-!> Interface of every model of the contacts: offer a slider a law, and respond to its motion.
+!> Interface of all kinds of contacts: offer the slider a law, and respond to its motion.
 !>
-!> Contacts are independent of sliders, and are given only their positions. Displacements are
-!> relative to an origin that the caller moves along (see shift_origin).
+!> Contacts do not depend on sliders; they are given only their poses. Displacements are relative to
+!> an origin that the caller shifts (shift_origin).
 module mesoslip_contacts_base
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -23,17 +23,17 @@ module mesoslip_contacts_base
    public :: extent_length, snapshot_length, contact_record_length
    public :: extent_columns, snapshot_columns, contact_columns
 
-   !> Numbers of an avalanche's extent: contacts that broke, columns and rows around them,
-   !> generations
+   !> Extent of an avalanche: contacts that broke, columns and rows around them, generations
    character(len=*), parameter :: extent_columns(*) = [character(len=name_length) :: &
       & "area", "width", "height", "generations"]
    integer, parameter :: extent_length = size(extent_columns)
-   !> Numbers of a contact in a snapshot: stretch, force over threshold, generation
+   !> A contact in a snapshot: stretch [m], huge if it is detached; force over threshold; generation
+   !> in the current avalanche
    character(len=*), parameter :: snapshot_columns(*) = [character(len=name_length) :: &
       & "stretch", "load", "generation"]
    integer, parameter :: snapshot_length = size(snapshot_columns)
-   !> Columns of a contact record: origin [m], stiffness [N/m], 0 while it is detached,
-   !> breaking stretch [m], number of renewals
+   !> Record of a contact: origin [m], stiffness [N/m] (0 while detached), breaking stretch [m],
+   !> number of renewals
    character(len=*), parameter :: contact_columns(*) = [character(len=name_length) :: &
       & "origin", "stiffness", "break_stretch", "renewals"]
    integer, parameter :: contact_record_length = size(contact_columns)
@@ -48,7 +48,7 @@ module mesoslip_contacts_base
       real(wp) :: stiffness = 0.0_wp
       !> Drag of a contact of mean mass, m eta [N s/m]
       real(wp) :: drag = 0.0_wp
-      !> Delay between detaching and attaching, or its mean [s], and one of the delay_ codes
+      !> Mean delay between detaching and attaching [s], and one of the delay_ codes
       real(wp) :: delay = 0.0_wp
       integer :: delay_law = delay_fixed
       !> Backward force over mean static threshold, f_b/f_s
@@ -65,25 +65,25 @@ module mesoslip_contacts_base
       integer(i8) :: seed = 0, realization = 0
    end type contact_parameters_type
 
-   !> The contacts of an interface: what is common to all models of them.
+   !> The contacts of an interface.
    type, abstract :: contacts_type
       !> Parameters of the contacts
       type(contact_parameters_type) :: parameters
-      !> Number of contacts that are detached, and breaks so far
+      !> Number of detached contacts, and of breaks so far
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
-      !> Work done on the contact force that was offered, beyond that on the contacts: the error of
-      !> steps [J]; none where contacts are kept one by one
+      !> Error of steps: work done by the offered force minus that done on the contacts [J]; 0 for
+      !> individual contacts
       type(accumulator_type) :: step_work
-      !> Estimated error of the contact force [N]; none where contacts are kept one by one
+      !> Estimated error of the contact force [N]; 0 for individual contacts
       real(wp) :: error_estimate = 0.0_wp
-      !> Cost of a response over that of one contact that breaks
+      !> Cost of a response relative to that of one breaking contact
       real(wp) :: cost = 1.0_wp
-      !> Clocks of thermally activated breaking, which the slider lets go on; whether there are any
+      !> Clocks of thermally activated breaking, which the slider advances; whether there are any
       type(hazard_clock_type) :: clock(clocks)
       logical :: has_clocks = .false.
-      !> Set when the contacts cannot go on
+      !> Set if the contacts cannot continue
       type(error_type), allocatable :: failure
    contains
       !> Prepare the contacts for the start of a run
@@ -94,77 +94,64 @@ module mesoslip_contacts_base
       procedure(offer_interface), deferred :: offer
       !> Break and attach contacts after a motion of the slider
       procedure(respond_interface), deferred :: respond
-      !> Write a schedule of what comes next, and keep the books of what came
+      !> Write a schedule of the next events; update the contacts after it
       procedure :: plan
       procedure :: settle
       !> Move the origin of displacements
       procedure(shift_origin_interface), deferred :: shift_origin
       !> Elastic energy of the pinned contacts
       procedure(elastic_energy_interface), deferred :: elastic_energy
-      !> Put the state into an archive or take it out
+      !> Write the state to an archive, or read it
       procedure(exchange_interface), deferred :: exchange
-      !> Recompute derived quantities from the state, after it was taken from an archive
+      !> Recompute derived quantities from the state, after it was read from an archive
       procedure(rebuild_interface), deferred :: rebuild
-      !> Extent of the avalanche that is over; it is forgotten
+      !> Extent of the finished avalanche, which is cleared
       procedure :: take_extent
-      !> Number of contacts that are kept one by one
+      !> Number of individual contacts
       procedure :: individual_count
-      !> How the contacts are
+      !> State of all individual contacts, and records of some
       procedure :: snapshot
-      !> State of some contacts
       procedure :: records
    end type contacts_type
 
    abstract interface
-      !> Prepare the contacts for the start of a run.
       subroutine initialize_interface(self, state)
          import :: contacts_type
          implicit none
-         !> The contacts
          class(contacts_type), intent(inout) :: self
          !> One of the initial_ codes
          integer, intent(in) :: state
       end subroutine initialize_interface
 
-      !> Contact force as a law, for a slider that does not move.
       pure function law_interface(self) result(law)
          import :: contacts_type, interface_law_type
          implicit none
-         !> The contacts
          class(contacts_type), intent(in) :: self
-         !> The law
          type(interface_law_type) :: law
       end function law_interface
 
-      !> Contact force as a law, and where it holds.
       subroutine offer_interface(self, pose, law, window)
          import :: contacts_type, interface_law_type, pose_type, window_type
          implicit none
-         !> The contacts
          class(contacts_type), intent(inout) :: self
          !> Pose of the slider
          type(pose_type), intent(in) :: pose
-         !> The law
          type(interface_law_type), intent(out) :: law
          !> Range in which it holds
          type(window_type), intent(out) :: window
       end subroutine offer_interface
 
-      !> Break and attach contacts after a motion of the slider.
       subroutine respond_interface(self, before, after)
          import :: contacts_type, pose_type
          implicit none
-         !> The contacts
          class(contacts_type), intent(inout) :: self
-         !> Where the slider was when it was offered a law, and where it is
+         !> Poses of the slider when it was offered a law, and now
          type(pose_type), intent(in) :: before, after
       end subroutine respond_interface
 
-      !> Move the origin of displacements.
       subroutine shift_origin_interface(self, shift, displacement)
          import :: contacts_type, wp
          implicit none
-         !> The contacts
          class(contacts_type), intent(inout) :: self
          !> Displacement of the new origin [m]
          real(wp), intent(in) :: shift
@@ -172,11 +159,9 @@ module mesoslip_contacts_base
          real(wp), intent(in) :: displacement
       end subroutine shift_origin_interface
 
-      !> Elastic energy of the pinned contacts.
       pure function elastic_energy_interface(self, displacement) result(energy)
          import :: contacts_type, wp
          implicit none
-         !> The contacts
          class(contacts_type), intent(in) :: self
          !> Displacement of the slider [m]
          real(wp), intent(in) :: displacement
@@ -184,21 +169,16 @@ module mesoslip_contacts_base
          real(wp) :: energy
       end function elastic_energy_interface
 
-      !> Put the state into an archive or take it out.
       subroutine exchange_interface(self, archive)
          import :: archive_type, contacts_type
          implicit none
-         !> The contacts
          class(contacts_type), intent(inout) :: self
-         !> The archive
          type(archive_type), intent(inout) :: archive
       end subroutine exchange_interface
 
-      !> Recompute derived quantities from the state.
       subroutine rebuild_interface(self, displacement)
          import :: contacts_type, wp
          implicit none
-         !> The contacts
          class(contacts_type), intent(inout) :: self
          !> Displacement of the slider [m]
          real(wp), intent(in) :: displacement
@@ -207,82 +187,73 @@ module mesoslip_contacts_base
 
 contains
 
-   !> Write a schedule of what comes next: nothing unless a kind of contacts can.
+   !> Write a schedule of the next events; by default there is none.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
       class(contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
+      !> The schedule; over if there is none
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
    end subroutine plan
 
-   !> Keep the books of a schedule; for contacts that write none.
+   !> Update the contacts after a schedule; nothing for contacts that write none.
    subroutine settle(self, schedule, pose)
-      !> The contacts
       class(contacts_type), intent(inout) :: self
-      !> The schedule, as far as the slider came; moments in which contacts broke may be added
+      !> The schedule, up to where the slider is; moments in which contacts broke may be added
       type(schedule_type), intent(inout) :: schedule
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
    end subroutine settle
 
-   !> Extent of the avalanche that is over; nothing for contacts that are not on a lattice.
+   !> Return the extent of the finished avalanche, and clear it; 0 without a lattice.
    subroutine take_extent(self, extent)
-      !> The contacts
       class(contacts_type), intent(inout) :: self
-      !> Numbers in the order of extent_length
+      !> Numbers in the order of extent_columns
       integer, intent(out) :: extent(extent_length)
 
       extent = 0
    end subroutine take_extent
 
-   !> Number of contacts that are kept one by one: none unless a kind of contacts says so.
+   !> Number of individual contacts; 0 by default.
    pure function individual_count(self) result(number)
-      !> The contacts
       class(contacts_type), intent(in) :: self
-      !> Their number, which is that of the columns of snapshot and records
       integer :: number
 
       number = 0
    end function individual_count
 
-   !> How the contacts are; nothing for contacts that are not kept one by one.
+   !> State of each individual contact.
    pure subroutine snapshot(self, time, displacement, values)
-      !> The contacts
       class(contacts_type), intent(in) :: self
       !> Time [s], displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
-      !> Of each contact the numbers in the order of snapshot_length, shape (snapshot_length, count)
+      !> Numbers in the order of snapshot_columns, shape (snapshot_length, individual_count)
       real(wp), intent(out) :: values(:, :)
 
       values = 0.0_wp
    end subroutine snapshot
 
-   !> State of some contacts; nothing for contacts that are not kept one by one.
+   !> Records of some individual contacts.
    pure subroutine records(self, time, first, values)
-      !> The contacts
       class(contacts_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
       !> The first of the contacts
       integer, intent(in) :: first
-      !> Numbers in the order of contact_record_length, shape (contact_record_length, contacts)
+      !> Numbers in the order of contact_columns, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       values = 0.0_wp
    end subroutine records
 
-   !> Put what all kinds of contacts keep into an archive, or take it out.
+   !> Write the state that all kinds of contacts have to an archive, or read it.
    subroutine exchange_contacts(self, archive)
-      !> The contacts
       class(contacts_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%exchange("detached_count", self%detached_count)
@@ -296,13 +267,12 @@ contains
 
    !> Take the parameters that all kinds of contacts have.
    subroutine take_contact_parameters(self, parameters, seed, realization, error)
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(out) :: self
-      !> Named numbers
+      !> Named parameters
       type(parameters_type), intent(inout) :: parameters
       !> Key of the random numbers
       integer(i8), intent(in) :: seed, realization
-      !> Set if a number is missing, or the law of thresholds is none
+      !> Set if a parameter is missing or wrong
       type(error_type), allocatable, intent(inout) :: error
 
       character(len=name_length) :: law

@@ -1,27 +1,26 @@
-!> Thresholds of the contacts of a sliding interface: a threshold law weighted by how far the slider
-!> carries a contact of this threshold from attaching to breaking.
+!> Thresholds of the contacts of a sliding interface: a threshold law weighted by the displacement
+!> of a contact from attaching to breaking.
 !>
 !> Dimensionless as in mesoslip_contacts_mechanics. Thresholds are drawn by inversion of the
 !> weighted law, E[d(u); u > U]/E[d] with d(u) = u - beta for equal contacts and
-!> u^(1/2) - beta u^(-1/2) for scaled ones: one draw consumes one deviate, however wide the law.
-!> Break stretches of a table with stiffnesses are drawn in the same way: d = x_s - beta/k.
+!> u^(1/2) - beta u^(-1/2) for scaled ones: one draw consumes one deviate, whatever the width of the
+!> law. Break stretches of a table with stiffnesses are drawn in the same way: d = x_s - beta/k.
 module mesoslip_contacts_carried_law
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_contacts_mechanics, only: breaking_distance, coupling_equal, coupling_table
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
-   use mesoslip_contacts_stretch_cells, only: stretch_cells_type
+   use mesoslip_contacts_stretch_cells, only: cell_of, stretch_cells_type
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
    public :: carried_law_type, new_carried_law
 
-   !> Iterations of Newton's method and bisection, more than enough for one of them alone
+   !> Iterations of Newton's method and bisection, sufficient for bisection alone
    integer, parameter :: max_iterations = 200
-   !> Relative change of a threshold below which a solution by interpolation is good enough
+   !> Relative change of a threshold at which the solution by interpolation has converged
    real(wp), parameter :: enough = 1.0e-8_wp
-   !> Newton's steps from there, by moments that are exact to rounding, and the maximum relative
-   !> change in one
+   !> Newton's steps after that, with moments exact to rounding, and their maximum relative change
    integer, parameter :: exact_steps = 2
    real(wp), parameter :: max_change = 1.0e-3_wp
 
@@ -35,8 +34,7 @@ module mesoslip_contacts_carried_law
       real(wp), private :: back_force = 0.0_wp
       !> Mean of the distance
       real(wp), private :: mean = 1.0_wp
-      !> Cells of a law with stiffnesses, and the mean distance of those above each, times their
-      !> probability
+      !> Cells of a law with stiffnesses, and the mean distance above each, times the probability
       type(stretch_cells_type), private :: cells
       real(wp), allocatable, private :: above(:)
    contains
@@ -49,7 +47,6 @@ contains
 
    !> Set up the weighted law.
    subroutine new_carried_law(self, law, coupling, back_force)
-      !> The weighted law
       type(carried_law_type), intent(out) :: self
       !> Law of the thresholds of contacts that attach, all above the force at attaching
       class(threshold_law_type), intent(in) :: law
@@ -73,7 +70,7 @@ contains
       self%mean = distance_of(self, self%moments%above(0.0_wp))
    end subroutine new_carried_law
 
-   !> Sum up the distances of contacts of a law with stiffnesses.
+   !> Sum the distances of contacts of a law with stiffnesses.
    subroutine sum_cells(self)
       class(carried_law_type), intent(inout) :: self
 
@@ -90,7 +87,7 @@ contains
       self%mean = self%above(1)
    end subroutine sum_cells
 
-   !> Break stretch that is exceeded with a given probability, of a law with stiffnesses.
+   !> Break stretch that is exceeded with a given probability, for a law with stiffnesses.
    pure function quantile_in_cells(self, probability) result(stretch)
       class(carried_law_type), intent(in) :: self
       !> Probability to exceed the stretch, 0 < probability < 1
@@ -98,19 +95,10 @@ contains
       real(wp) :: stretch
 
       real(wp) :: wanted, life
-      integer :: cell, last, middle
+      integer :: cell
 
       wanted = probability * self%mean
-      cell = 1
-      last = size(self%above)
-      do while (last - cell > 1)
-         middle = (cell + last) / 2
-         if (self%above(middle) >= wanted) then
-            cell = middle
-         else
-            last = middle
-         end if
-      end do
+      cell = cell_of(self%above, wanted, -1.0_wp)
       ! Within a cell the probability grows with the square of the distance.
       associate (cells => self%cells)
          associate (low => cells%low(cell), high => cells%high(cell), &
@@ -124,11 +112,10 @@ contains
 
    !> Threshold that is exceeded with a given probability.
    pure function quantile(self, probability) result(threshold)
-      !> The weighted law
       class(carried_law_type), intent(in) :: self
       !> Probability to exceed the threshold, 0 < probability < 1
       real(wp), intent(in) :: probability
-      !> Relative threshold, or break stretch of a law with stiffnesses
+      !> Relative threshold; break stretch of a law with stiffnesses
       real(wp) :: threshold
 
       real(wp) :: lower, upper, least, next, wanted, excess, slope, step, moment(2)
@@ -139,7 +126,7 @@ contains
          return
       end if
       wanted = probability * self%mean
-      ! Contacts of a low threshold break soon: there are fewer of them than among newborns.
+      ! Contacts of low threshold break soon: they are fewer than among newborns.
       least = self%law%quantile(probability)
       upper = self%moments%max_threshold
       lower = min(least, upper)
@@ -153,7 +140,7 @@ contains
             upper = threshold
          end if
          if (upper - lower <= enough * upper) exit
-         ! In the logarithm, of which no law has too many scales.
+         ! In the logarithm, as thresholds may span many orders of magnitude.
          next = sqrt(lower * upper)
          slope = self%slope(threshold)
          if (slope > 0.0_wp) then

@@ -1,7 +1,7 @@
-!> N independent contacts, in the order in which they break.
+!> N independent contacts: the earthquake-like model without interaction.
 !>
-!> The earthquake-like model without interaction. Contacts are queued for one direction of motion;
-!> what breaks on the way back is bounded, and the queue is rebuilt when the slider turns.
+!> Contacts are queued for one direction of motion. Breaking in the other direction has a bound; the
+!> queue is rebuilt when the slider reverses.
 module mesoslip_contacts_ensemble
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
@@ -19,127 +19,90 @@ module mesoslip_contacts_ensemble
    implicit none
    private
 
-   public :: contact_ensemble_type, new_contact_ensemble, make_contact_ensemble
+   public :: make_contact_ensemble
 
-   !> A probability too small to meet among the keys of a ring of buckets.
+   !> Probability of a threshold beyond the ring of buckets
    real(wp), parameter :: rare = 1.0e-4_wp
-   !> Attachments in a schedule of the way back
+   !> Attachments in a schedule of backward motion
    integer, parameter :: events_back = 8
-   !> A normal deviate too large to meet.
+   !> Normal deviate beyond which few newborn forces lie
    real(wp), parameter :: far_newborn = 4.0_wp
 
-   !> An ensemble of contacts.
+   !> An ensemble of independent contacts.
    type, extends(individual_contacts_type) :: contact_ensemble_type
       type(contact_queue_type), private :: queue
       !> Contacts of the breaks in the schedule
       integer, private :: listed(max_events) = 0
    contains
-      procedure :: initialize
-      procedure :: offer
-      procedure :: respond
-      procedure :: plan
-      procedure :: settle
-      procedure :: join
-      procedure :: exchange
-      procedure :: rebuild
+      procedure :: initialize, offer, respond, plan, settle, join, exchange, rebuild
       procedure, non_overridable, private :: break_due, plan_back
    end type contact_ensemble_type
 
 contains
 
-   !> Set up an ensemble.
-   subroutine new_contact_ensemble(self, parameters, columns, rows, error)
-      !> The ensemble
-      type(contact_ensemble_type), intent(out) :: self
-      !> Parameters of the contacts
-      type(contact_parameters_type), intent(in) :: parameters
-      !> Columns and rows of a lattice of which contacts have sites; no columns for none
-      integer, intent(in) :: columns, rows
-      !> Set if there is not enough memory
-      type(error_type), allocatable, intent(out) :: error
-
-      real(wp) :: max_distance
-
-      self%parameters = parameters
-      call self%allocate_records(columns, rows, error)
-      if (allocated(error)) return
-      ! A contact attached while the slider moves back has the back force to lose as well.
-      max_distance = parameters%static_force / parameters%stiffness &
-         & * max(parameters%law%quantile(rare), 1.0_wp) * (1.0_wp + parameters%back_force_ratio &
-         & + far_newborn * parameters%newborn_width)
-      call new_contact_queue(self%queue, parameters%count, 1.1_wp * max_distance, error)
-   end subroutine new_contact_ensemble
-
-   !> Set up an ensemble from named numbers.
+   !> Set up an ensemble from named parameters.
    subroutine make_contact_ensemble(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
-      !> The other numbers: columns and rows
+      !> The others: columns and rows of the lattice on whose sites contacts are, 0 without one
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing, or there is not enough memory
+      !> Set if a parameter is missing, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       type(contact_ensemble_type), allocatable :: ensemble
       integer :: columns, rows
+      real(wp) :: max_distance
 
       call parameters%take("columns", columns, error)
       call parameters%take("rows", rows, error)
       call parameters%finish(error)
       if (allocated(error)) return
       allocate (ensemble)
-      call new_contact_ensemble(ensemble, common, columns, rows, error)
+      ensemble%parameters = common
+      call ensemble%allocate_records(columns, rows, error)
+      if (allocated(error)) return
+      ! A contact that attaches in backward motion starts with the back force against the direction.
+      max_distance = common%static_force / common%stiffness &
+         & * max(common%law%quantile(rare), 1.0_wp) * (1.0_wp + common%back_force_ratio &
+         & + far_newborn * common%newborn_width)
+      call new_contact_queue(ensemble%queue, common%count, 1.1_wp * max_distance, error)
       call move_alloc(ensemble, contacts)
    end subroutine make_contact_ensemble
 
-   !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       call self%draw(state)
       call self%rebuild_queue(0.0_wp)
    end subroutine initialize
 
-   !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
       law = total_law(self)
       window = self%window_between(self%behind, self%queue%first_key, self%detached%next_due)
    end subroutine offer
 
-   !> Break all contacts that are due, then attach those that are, in the order in which they broke.
+   !> Break all contacts that are due, then attach those that are due, in the order of breaking.
    subroutine respond(self, before, after)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       call self%break_due(after%displacement, after%time)
       call self%attach_due(after)
    end subroutine respond
 
-   !> Write a schedule of what comes next: the breaks at the front of the queue, as far as they are
-   !> sorted, and about as many attachments.
+   !> The schedule has the sorted breaks at the front of the queue, and about as many attachments.
    subroutine plan(self, pose, limit, schedule)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       integer :: number, event, contact(max_events)
@@ -171,8 +134,7 @@ contains
       schedule%is_over = .false.
    end subroutine plan
 
-   !> Write a schedule of what comes next on the way back: attachments, up to where a contact may
-   !> break.
+   !> Write a schedule of backward motion: attachments, up to where a contact may break.
    subroutine plan_back(self, limit, schedule)
       class(contact_ensemble_type), intent(inout) :: self
       !> Maximum number of attachments
@@ -193,13 +155,9 @@ contains
       schedule%is_over = .false.
    end subroutine plan_back
 
-   !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
       type(schedule_type), intent(inout) :: schedule
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       integer :: event, contact(max_events)
@@ -218,18 +176,14 @@ contains
          end do
          self%behind = schedule%behind
       end if
-      ! A contact that broke a moment ago and attaches at once was not in the schedule.
+      ! A contact that broke just now and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
 
-   !> Queue a contact that has attached.
    subroutine join(self, contact, pose)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: origin, limit
@@ -248,7 +202,7 @@ contains
       integer :: contact
 
       if (self%direction * displacement <= self%behind) then
-         ! The bound may be that of a contact which has broken since.
+         ! The bound may be that of a contact that has since broken.
          self%behind = self%max_behind()
          if (self%direction * displacement <= self%behind) then
             self%direction = -self%direction
@@ -263,11 +217,8 @@ contains
       end do
    end subroutine break_due
 
-   !> Rebuild the queue from the records.
    subroutine rebuild(self, displacement)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact
@@ -281,11 +232,8 @@ contains
       end do
    end subroutine rebuild
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The ensemble
       class(contact_ensemble_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contact ensemble")

@@ -1,12 +1,12 @@
-!> Contacts on a lattice that push their neighbours over: when they break, and in what avalanches.
+!> Contacts on a lattice that interact with their neighbours and break in avalanches.
 !>
 !> The force that breaks a contact is f_i = k_i x_i + G sum_j (x_i - x_j) over its neighbours, with
-!> x_j = 0 for a detached one. While neighbours stay as they are it grows with the displacement at
-!> the rate k_i + G n_i, n_i of them being detached: breaks are events in the displacement, which
-!> move when a neighbour breaks or attaches. Each contact keeps what its neighbours are to it, a sum
-!> that changes by one of them at a time, recomputed when it attaches. The order of breaking is kept
-!> for one direction of motion; what breaks on the way back is bounded, and the order rebuilt when
-!> the slider comes to the bound.
+!> x_j = 0 for a detached one. While no neighbour breaks or attaches it grows with the displacement
+!> at the rate k_i + G n_i, n_i neighbours being detached: breaks are events in the displacement,
+!> which move when a neighbour breaks or attaches. Each contact keeps sums over its neighbours,
+!> which change by one neighbour at a time and are recomputed when the contact attaches. The order
+!> of breaking is that of one direction of motion. Breaking in the other direction has a bound; the
+!> order is rebuilt when the slider reaches it.
 module mesoslip_contacts_lattice
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -29,21 +29,21 @@ module mesoslip_contacts_lattice
 
    public :: contact_lattice_type, interaction_type, new_contact_lattice, make_contact_lattice
 
-   !> Breaks in one cascade beyond which it is taken to have no end: of each contact on average, and
-   !> of all, unless these are fewer for each than the last. A cascade is not cut into segments.
+   !> A cascade of more breaks is considered endless: max_breaks a contact or max_all_breaks in all,
+   !> whichever is fewer, but at least min_breaks a contact. A cascade is not cut into segments.
    real(wp), parameter :: max_breaks = 1000.0_wp, max_all_breaks = 1.0e7_wp, min_breaks = 20.0_wp
 
-   !> Influence of the neighbours on a pinned contact: the sum, over the pinned ones, of the lead of
-   !> their origins over its own [m], and the number of detached ones
+   !> Sums over the neighbours of a pinned contact: of the pinned ones, their origin minus its own
+   !> [m]; the number of detached ones
    integer, parameter :: surroundings_length = 2, row_ahead = 1, row_free = 2
 
-   !> How contacts act on each other.
+   !> Interaction of contacts.
    type :: interaction_type
-      !> Stiffness of the bond between neighbours, G [N/m]; 0 for none
+      !> Stiffness of the bond between neighbours, G [N/m]
       real(wp) :: bond = 0.0_wp
       !> One of the lattice_ codes
       integer :: lattice = 0
-      !> Columns and rows of the lattice; no columns when contacts are not on one
+      !> Columns and rows of the lattice
       integer :: columns = 0, rows = 0
    end type interaction_type
 
@@ -53,22 +53,14 @@ module mesoslip_contacts_lattice
       real(wp), private :: bond = 0.0_wp
       !> One of the lattice_ codes, and the number of neighbours of each contact
       integer, private :: lattice = 0, sides = 0
-      !> Their influence on it while it is pinned, shape (surroundings_length, count)
+      !> Sums over the neighbours of each contact, shape (surroundings_length, count)
       real(wp), allocatable, private :: surroundings(:, :)
-      !> Contacts that let go together
+      !> Contacts of one generation, which break together
       integer, allocatable, private :: generation(:)
       type(break_tree_type), private :: tree
    contains
-      procedure :: initialize
-      procedure :: offer
-      procedure :: respond
-      procedure :: join
-      procedure :: behind_of
-      procedure :: neighbour_force
-      procedure :: shift_order
-      procedure :: rebuild
-      procedure :: snapshot
-      procedure :: exchange
+      procedure :: initialize, offer, respond, join, behind_of, neighbour_force, shift_order
+      procedure :: rebuild, snapshot, exchange
       procedure, private, non_overridable :: cascade, list_due, list_behind, sum_neighbours, &
          & update_neighbours, neighbours_of
    end type contact_lattice_type
@@ -77,11 +69,10 @@ contains
 
    !> Set up contacts on a lattice.
    subroutine new_contact_lattice(self, parameters, interaction, error)
-      !> The contacts
       type(contact_lattice_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
-      !> How they act on each other
+      !> Their interaction
       type(interaction_type), intent(in) :: interaction
       !> Set if the lattice does not hold as many contacts, or there is not enough memory
       type(error_type), allocatable, intent(out) :: error
@@ -110,15 +101,15 @@ contains
       call new_break_tree(self%tree, parameters%count, error)
    end subroutine new_contact_lattice
 
-   !> Set up contacts on a lattice from named numbers.
+   !> Set up contacts on a lattice from named parameters.
    subroutine make_contact_lattice(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
-      !> The other numbers: bond, lattice, columns and rows
+      !> The others: bond, lattice, columns and rows
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
+      !> Set if a parameter is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       type(contact_lattice_type), allocatable :: lattice
@@ -135,11 +126,9 @@ contains
       call move_alloc(lattice, contacts)
    end subroutine make_contact_lattice
 
-   !> Draw all contacts for the start of a run, and let go those that cannot bear their neighbours.
+   !> Contacts that cannot bear the forces of their neighbours break first.
    subroutine initialize(self, state)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       call self%draw(state)
@@ -152,26 +141,19 @@ contains
       self%birth_gain = accumulator_type()
    end subroutine initialize
 
-   !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds; a contact may break at the end that is behind
       type(window_type), intent(out) :: window
 
       law = total_law(self)
       window = self%window_between(self%behind, self%tree%first(), self%detached%next_due)
    end subroutine offer
 
-   !> Break all contacts that are due and those that they push over, then attach what is to attach.
+   !> Break all contacts that are due and those that these push over, then attach contacts.
    subroutine respond(self, before, after)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       real(wp) :: breaks, limit
@@ -193,7 +175,7 @@ contains
       self%detached_count = real(self%detached%count, wp)
    end subroutine respond
 
-   !> Break all contacts that are due, then those that they push over, until none is left.
+   !> Break all contacts that are due, then those that these push over, until no more break.
    subroutine cascade(self, pose)
       class(contact_lattice_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -213,11 +195,11 @@ contains
       end do
    end subroutine cascade
 
-   !> Take all contacts that are due out of the order of breaking.
+   !> Remove all contacts that are due from the order of breaking, and list them.
    subroutine list_due(self, pose, number)
       class(contact_lattice_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> How many they are
+      !> Their number
       integer, intent(out) :: number
 
       integer :: contact
@@ -240,17 +222,17 @@ contains
       end if
    end subroutine list_due
 
-   !> The same of contacts that their neighbours push over against the direction of motion.
+   !> The same for contacts that their neighbours push over against the direction of motion.
    subroutine list_behind(self, displacement, number)
       class(contact_lattice_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
-      !> How many are listed
+      !> Number of listed contacts
       integer, intent(inout) :: number
 
       integer :: contact
       real(wp) :: centre, limit
 
-      ! The bound may be that of a contact which has broken since, or breaks elsewhere now.
+      ! The bound may be that of a contact that has since broken, or now breaks elsewhere.
       self%behind = -huge(1.0_wp)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
@@ -266,13 +248,9 @@ contains
       end do
    end subroutine list_behind
 
-   !> Greatest coordinate at which a pinned contact breaks on the way back.
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
       class(contact_lattice_type), intent(in) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       real(wp) :: centre, limit
@@ -281,15 +259,10 @@ contains
       coordinate = self%direction * centre - limit
    end function behind_of
 
-   !> Force of its neighbours on a contact that attaches.
    pure function neighbour_force(self, contact, displacement) result(force)
-      !> The contacts
       class(contact_lattice_type), intent(in) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Force of the neighbours where the stretch of the contact is zero [N]
       real(wp) :: force
 
       integer :: side, neighbour(max_neighbours)
@@ -305,14 +278,10 @@ contains
       force = self%bond * pull
    end function neighbour_force
 
-   !> Put a contact that has attached into the order of breaking; its neighbours break elsewhere
-   !> now.
+   !> Neighbours now break elsewhere.
    subroutine join(self, contact, pose)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: centre, limit
@@ -328,13 +297,13 @@ contains
    pure function neighbours_of(self, contact) result(neighbour)
       class(contact_lattice_type), intent(in) :: self
       integer, intent(in) :: contact
-      !> Their numbers, as many as there are sides
+      !> Their numbers, of which the first ones are used
       integer :: neighbour(max_neighbours)
 
       call find_neighbours(self%lattice, self%track%columns, self%track%rows, contact, neighbour)
    end function neighbours_of
 
-   !> Sum what a contact keeps of its neighbours.
+   !> Compute the sums of a contact over its neighbours.
    pure subroutine sum_neighbours(self, contact)
       class(contact_lattice_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -355,13 +324,13 @@ contains
       self%surroundings(:, contact) = [ahead, free]
    end subroutine sum_neighbours
 
-   !> Neighbours of a contact that broke (change -1) or attached (+1) break elsewhere now.
+   !> Update the neighbours of a contact that broke (change -1) or attached (+1).
    subroutine update_neighbours(self, contact, change)
       class(contact_lattice_type), intent(inout) :: self
       integer, intent(in) :: contact
       real(wp), intent(in) :: change
 
-      ! The number of neighbours is a constant in each call: the compiler makes a copy for each.
+      ! The number of neighbours is a constant in each call, for which the compiler makes a copy.
       if (self%sides == 6) then
          call update_all(contact, change, 6, self%neighbours_of(contact), self%parameters%count, &
             & self%record, self%surroundings, self%bond, self%direction, self%tree, self%behind)
@@ -371,17 +340,18 @@ contains
       end if
    end subroutine update_neighbours
 
-   !> Update where the pinned neighbours of a contact break that broke or attached.
+   !> Update where the pinned neighbours of a contact break after it broke or attached.
    pure subroutine update_all(contact, change, sides, neighbour, count, record, surroundings, &
       & bond, direction, tree, behind)
-      !> The contact, -1 if it broke and +1 if it attached, and its neighbours, of so many in all
+      !> The contact, the number of its neighbours and of all contacts, and the neighbours
       integer, intent(in) :: contact, sides, count, neighbour(max_neighbours)
+      !> -1 if the contact broke, +1 if it attached
       real(wp), intent(in) :: change
       real(wp), intent(in) :: record(record_length, count)
       real(wp), intent(inout) :: surroundings(surroundings_length, count)
       real(wp), intent(in) :: bond, direction
       type(break_tree_type), intent(inout) :: tree
-      !> Bound on the coordinates at which contacts break on the way back [m]
+      !> Upper bound of the coordinates at which contacts break in backward motion [m]
       real(wp), intent(inout) :: behind
 
       integer :: side
@@ -401,7 +371,7 @@ contains
       end do
    end subroutine update_all
 
-   !> Displacement at which a pinned contact bears no force, and how far from there it breaks.
+   !> Displacement at which a pinned contact bears no force, and distance from there to breaking.
    pure subroutine bearing(record, surroundings, bond, centre, limit)
       real(wp), intent(in) :: record(record_length), surroundings(surroundings_length), bond
       real(wp), intent(out) :: centre, limit
@@ -415,11 +385,9 @@ contains
       limit = record(row_limit) * softness
    end subroutine bearing
 
-   !> Sum what contacts keep of their neighbours, which differences of origins are.
+   !> Recompute the sums of differences of origins, which change by rounding alone.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
       class(contact_lattice_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       integer :: contact
@@ -429,11 +397,8 @@ contains
       end do
    end subroutine shift_order
 
-   !> Recompute the order of breaking from the records.
    subroutine rebuild(self, displacement)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact
@@ -449,14 +414,9 @@ contains
       call self%tree%arrange()
    end subroutine rebuild
 
-   !> How the contacts are.
    pure subroutine snapshot(self, time, displacement, values)
-      !> The contacts
       class(contact_lattice_type), intent(in) :: self
-      !> Time [s], displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
-      !> Of each contact its stretch, huge if it is detached [m], force over threshold, and
-      !> generation in the present avalanche, shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact
@@ -471,11 +431,8 @@ contains
       end do
    end subroutine snapshot
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
       class(contact_lattice_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contact lattice")

@@ -1,12 +1,12 @@
-!> Moments of the contacts of a table with stiffnesses that outlive a displacement.
+!> Moments of the contacts of a table with stiffnesses that survive a displacement.
 !>
-!> Contacts that attached with a force phi live for x_s - phi/k, in another order than that of their
-!> break stretches if stiffnesses differ: the cells of stretches overlap as cells of lives. Between
+!> Contacts that attached with a force phi live for x_s - phi/k. If stiffnesses differ, the order of
+!> lives is not that of break stretches: the cells of stretches overlap as cells of lives. Between
 !> the ends of cells the density of each power of the stiffness is constant, so that all integrals
 !> are sums. Dimensionless as in mesoslip_contacts_mechanics.
 module mesoslip_contacts_life_moments
    use mesoslip_contacts_individual_sorting, only: sort
-   use mesoslip_contacts_stretch_cells, only: stretch_cells_type
+   use mesoslip_contacts_stretch_cells, only: cell_of, stretch_cells_type
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -15,9 +15,9 @@ module mesoslip_contacts_life_moments
    public :: life_moments_type, new_life_moments
    public :: min_power, max_power
 
-   !> Powers of the stiffness of which densities are kept
+   !> Powers of the stiffness whose densities are kept
    integer, parameter :: min_power = -1, max_power = 2
-   !> Rounding of the sum of all probabilities
+   !> Rounding error of the sum of all probabilities
    real(wp), parameter :: rounding = 1.0e-12_wp
 
    !> Moments E[k^a l^b; l > L] of stiffness and life.
@@ -36,14 +36,13 @@ module mesoslip_contacts_life_moments
       procedure, non_overridable :: above
       !> Densities of the powers of the stiffness over the life
       procedure, non_overridable :: density_at
-      procedure, non_overridable, private :: find_pieces, piece_of
+      procedure, non_overridable, private :: find_pieces
    end type life_moments_type
 
 contains
 
    !> Set up the moments of contacts that attach with a force.
    subroutine new_life_moments(self, cells, force, stiffness_power, life_power)
-      !> The moments
       type(life_moments_type), intent(out) :: self
       !> Contacts that the force does not break
       type(stretch_cells_type), intent(in) :: cells
@@ -70,7 +69,7 @@ contains
                & * power_integral(life_power, self%edge(piece), self%edge(piece + 1))
          end do
       end associate
-      ! All of a law is 1, to the last digit: what attaches over and over must not fade away.
+      ! The total is exactly 1: the number of contacts must not decay as they attach over and over.
       total = sum(cells%share)
       if (abs(total - 1.0_wp) < rounding) total = 1.0_wp
       scale = total / self%above_edge(1, 1)
@@ -137,29 +136,8 @@ contains
       end select
    end function power_integral
 
-   !> Piece of a life that is neither below the first nor above the last edge, by bisection.
-   pure function piece_of(self, life) result(piece)
-      class(life_moments_type), intent(in) :: self
-      real(wp), intent(in) :: life
-      integer :: piece
-
-      integer :: last, middle
-
-      piece = 1
-      last = size(self%edge)
-      do while (last - piece > 1)
-         middle = (piece + last) / 2
-         if (self%edge(middle) <= life) then
-            piece = middle
-         else
-            last = middle
-         end if
-      end do
-   end function piece_of
-
    !> Moments above a life.
    pure subroutine above(self, life, moment)
-      !> The moments
       class(life_moments_type), intent(in) :: self
       !> Relative displacement L since attaching
       real(wp), intent(in) :: life
@@ -173,7 +151,7 @@ contains
       else if (life >= self%longest) then
          moment = 0.0_wp
       else
-         piece = self%piece_of(life)
+         piece = cell_of(self%edge, life, 1.0_wp)
          moment = self%above_edge(:, piece + 1) + self%density(self%stiffness_power, piece) &
             & * power_integral(self%life_power, life, self%edge(piece + 1))
       end if
@@ -181,7 +159,6 @@ contains
 
    !> Densities of the powers of the stiffness at a life.
    pure function density_at(self, life) result(density)
-      !> The moments
       class(life_moments_type), intent(in) :: self
       !> Relative displacement since attaching
       real(wp), intent(in) :: life
@@ -190,7 +167,7 @@ contains
 
       density = 0.0_wp
       if (life < self%shortest .or. life > self%longest) return
-      density = self%density(:, self%piece_of(life))
+      density = self%density(:, cell_of(self%edge, life, 1.0_wp))
    end function density_at
 
 end module mesoslip_contacts_life_moments

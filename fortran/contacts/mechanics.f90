@@ -17,13 +17,13 @@ module mesoslip_contacts_mechanics
    integer, parameter :: coupling_scaled = 1
    !> k_i = k, m_i = m
    integer, parameter :: coupling_equal = 2
-   !> k_i from the table of thresholds, m_i = m k_i^2/<k^2>; the functions below are not for it
+   !> k_i from the table of thresholds, m_i = m k_i^2/<k^2>; not supported by the functions below
    integer, parameter :: coupling_table = 3
    !> Names of the coupling_ codes
    character(len=*), parameter :: coupling_names(3) = [character(len=6) :: "scaled", "equal", &
       & "table"]
 
-   !> All contacts wait for the same delay
+   !> All contacts have the same delay
    integer, parameter :: delay_fixed = 1
    !> Each delay is drawn from the exponential law
    integer, parameter :: delay_exponential = 2
@@ -63,19 +63,17 @@ contains
       real(wp), intent(in) :: start_force
       !> Relative threshold
       real(wp), intent(in) :: threshold
-      !> Displacement
       real(wp) :: distance
 
       distance = (threshold - start_force) / stiffness_of(coupling, threshold)
    end function breaking_distance
 
-   !> Threshold below which contacts have broken after a displacement; 0 if none has.
+   !> Threshold below which contacts have broken after a displacement; 0 if no contact has.
    elemental function broken_threshold(coupling, start_force, distance) result(threshold)
       !> One of the coupling_ codes
       integer, intent(in) :: coupling
       !> Force at attaching, in the direction of the displacement
       real(wp), intent(in) :: start_force
-      !> Displacement
       real(wp), intent(in) :: distance
       !> Relative threshold
       real(wp) :: threshold
@@ -86,7 +84,7 @@ contains
          threshold = max(0.0_wp, distance + start_force)
          return
       end if
-      ! u = u^(1/2) d + beta; with a negative beta contacts break only beyond 2 |beta|^(1/2).
+      ! u = u^(1/2) d + beta; with negative beta contacts break only beyond 2 |beta|^(1/2).
       discriminant = distance**2 + 4.0_wp * start_force
       threshold = 0.0_wp
       if (start_force < 0.0_wp .and. (distance < 0.0_wp .or. discriminant < 0.0_wp)) return
@@ -99,7 +97,6 @@ contains
       integer, intent(in) :: coupling
       !> Force at attaching, in the direction of the displacement; not negative
       real(wp), intent(in) :: start_force
-      !> Displacement
       real(wp), intent(in) :: distance
       !> Relative threshold over displacement
       real(wp) :: slope

@@ -1,7 +1,8 @@
-!> Partial moments of a threshold law, E[u^a; u > U]: what is left when all contacts below U broke.
+!> Partial moments of a threshold law, E[u^a; u > U]: those of contacts that have not broken at U.
 module mesoslip_contacts_partial_moments
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_quadrature, only: gauss_legendre
+   use mesoslip_contacts_stretch_cells, only: cell_of
    use mesoslip_contacts_threshold_coordinate, only: new_threshold_coordinate, &
       & threshold_coordinate_type
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
@@ -12,33 +13,31 @@ module mesoslip_contacts_partial_moments
 
    !> Cells of the table, and points of the rule in a cell
    integer, parameter :: cells = 4096, points = 8
-   !> Probability that a threshold is outside of the table, on either side
+   !> Probability that a threshold is above the table
    real(wp), parameter :: outside = 1.0e-17_wp
 
    !> Partial moments of some orders.
    type :: partial_moments_type
-      !> Thresholds at or below do not occur, nor do those above
+      !> Range of the thresholds
       real(wp) :: min_threshold = 0.0_wp, max_threshold = 0.0_wp
       class(threshold_law_type), allocatable, private :: law
-      !> In which coordinate the table is uniform
+      !> Coordinate in which the table is uniform, its start and its step
       type(threshold_coordinate_type) :: coordinate
       real(wp), private :: first = 0.0_wp, step = 1.0_wp
-      !> Correction of the density for what the table leaves out
+      !> Correction of the density for thresholds outside the table
       real(wp), private :: scale = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
       !> Exponents, shape (orders)
       real(wp), allocatable, private :: exponent(:)
       !> Moments above each knot and their slopes, shape (orders, 2, cells + 1)
       real(wp), allocatable, private :: table(:, :, :)
-      !> Of a law with a constant density in cells, for which there is no table: edges of the cells,
-      !> density in each, and moments above each edge, shape (orders, edges)
+      !> For a law with a constant density in cells, instead of a table: edges of the cells, density
+      !> in each, and moments above each edge, shape (orders, edges)
       real(wp), allocatable :: edge(:), cell_density(:)
       real(wp), allocatable, private :: above_edge(:, :)
    contains
-      !> Moments above a threshold, to rounding
-      procedure, non_overridable :: above
-      !> Moments above a threshold by interpolation, to about 1e-12
-      procedure, non_overridable :: interpolate
+      !> Moments above a threshold: to rounding, and by interpolation to about 1e-12
+      procedure, non_overridable :: above, interpolate
       procedure, non_overridable, private :: density, sum_cells, above_in_cells
    end type partial_moments_type
 
@@ -46,7 +45,6 @@ contains
 
    !> Tabulate the partial moments of a law.
    subroutine new_partial_moments(self, law, exponent)
-      !> The moments
       type(partial_moments_type), intent(out) :: self
       !> The law
       class(threshold_law_type), intent(in) :: law
@@ -79,7 +77,7 @@ contains
                & * self%density(knot + self%step * self%point(node))
          end do
       end do
-      ! All of a law is 1, to the last digit: what attaches over and over must not fade away.
+      ! The total is exactly 1: the number of contacts must not decay as they attach over and over.
       do node = 1, size(exponent)
          if (abs(exponent(node)) > 0.0_wp) cycle
          self%scale = 1.0_wp / self%table(node, 1, 1)
@@ -93,7 +91,7 @@ contains
       end do
    end subroutine new_partial_moments
 
-   !> Sum up the moments of a law with a constant density in cells.
+   !> Sum the moments of a law with a constant density in cells.
    subroutine sum_cells(self)
       class(partial_moments_type), intent(inout) :: self
 
@@ -112,7 +110,7 @@ contains
                & * power_integral(self%exponent, self%edge(cell), self%edge(cell + 1))
          end do
       end associate
-      ! All of the law is 1, to the last digit, as for other laws.
+      ! The total is exactly 1, as for other laws.
       do order = 1, size(self%exponent)
          if (abs(self%exponent(order)) > 0.0_wp) cycle
          self%scale = 1.0_wp / self%above_edge(order, 1)
@@ -126,28 +124,19 @@ contains
    !> Moments above a threshold of a law with a constant density in cells.
    pure subroutine above_in_cells(self, threshold, moment)
       class(partial_moments_type), intent(in) :: self
-      !> Less than the maximum one
+      !> Less than the maximum
       real(wp), intent(in) :: threshold
       real(wp), intent(out) :: moment(:)
 
-      integer :: cell, last, middle
+      integer :: cell
 
       if (threshold <= self%min_threshold) then
          moment = self%above_edge(:, 1)
          return
       end if
-      cell = 1
-      last = size(self%edge)
-      do while (last - cell > 1)
-         middle = (cell + last) / 2
-         if (self%edge(middle) <= threshold) then
-            cell = middle
-         else
-            last = middle
-         end if
-      end do
-      moment = self%above_edge(:, last) + self%cell_density(cell) &
-         & * power_integral(self%exponent, threshold, self%edge(last))
+      cell = cell_of(self%edge, threshold, 1.0_wp)
+      moment = self%above_edge(:, cell + 1) + self%cell_density(cell) &
+         & * power_integral(self%exponent, threshold, self%edge(cell + 1))
    end subroutine above_in_cells
 
    !> Integral of a power between two positive limits.
@@ -180,7 +169,7 @@ contains
          & * self%coordinate%slope(coordinate)
    end function density
 
-   !> A power of a threshold: by roots and products for small multiples of a half, as all are.
+   !> A power of a threshold, by roots and products for multiples of 1/2 from -1 to 2.
    elemental function power(threshold, exponent)
       real(wp), intent(in) :: threshold, exponent
       real(wp) :: power
@@ -211,7 +200,6 @@ contains
 
    !> Moments above a threshold.
    pure function above(self, threshold) result(moment)
-      !> The moments
       class(partial_moments_type), intent(in) :: self
       !> Relative threshold U
       real(wp), intent(in) :: threshold
@@ -243,9 +231,8 @@ contains
       end do
    end function above
 
-   !> Moments above a threshold by Hermite's interpolation.
+   !> Moments above a threshold by Hermite interpolation.
    pure subroutine interpolate(self, threshold, moment)
-      !> The moments
       class(partial_moments_type), intent(in) :: self
       !> Relative threshold U
       real(wp), intent(in) :: threshold
@@ -268,11 +255,11 @@ contains
       end if
    end subroutine interpolate
 
-   !> Moments within a cell of the table by Hermite's interpolation.
+   !> Moments within a cell of the table by Hermite interpolation.
    pure subroutine hermite(orders, knots, table, cell, t, moment)
       integer, intent(in) :: orders, knots
       real(wp), intent(in) :: table(orders, 2, knots)
-      !> The cell, from 0, and the place in it, 0 to 1
+      !> The cell, from 0, and the position in it, 0 to 1
       integer, intent(in) :: cell
       real(wp), intent(in) :: t
       real(wp), intent(out) :: moment(orders)

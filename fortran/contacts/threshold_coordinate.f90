@@ -1,5 +1,5 @@
-!> Coordinates in which the density of a threshold law is smooth: u, its root for laws that come
-!> close to 0, where the density may be singular, and its logarithm for laws that do so themselves.
+!> Coordinates in which the density of a threshold law is smooth: u; its root for laws that reach
+!> close to 0, where the density may be singular; its logarithm for logarithmic laws.
 module mesoslip_contacts_threshold_coordinate
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -9,18 +9,15 @@ module mesoslip_contacts_threshold_coordinate
 
    !> The coordinates
    integer, parameter :: linear = 1, root = 2, logarithmic = 3
-   !> Least threshold of laws that do not come close to 0
+   !> Thresholds below this are close to 0
    real(wp), parameter :: close = 0.1_wp
 
    !> A coordinate of thresholds.
    type :: threshold_coordinate_type
       integer, private :: kind = linear
    contains
-      !> Coordinate of a threshold
-      procedure, non_overridable :: at
-      !> Threshold of a coordinate, and its derivative
-      procedure, non_overridable :: threshold
-      procedure, non_overridable :: slope
+      !> Coordinate of a threshold; threshold at a coordinate, and its derivative
+      procedure, non_overridable :: at, threshold, slope
    end type threshold_coordinate_type
 
 contains
@@ -29,9 +26,8 @@ contains
    pure function new_threshold_coordinate(is_logarithmic, min_threshold) result(self)
       !> Whether the density varies with the logarithm of the threshold
       logical, intent(in) :: is_logarithmic
-      !> Lowest threshold
+      !> Minimum threshold
       real(wp), intent(in) :: min_threshold
-      !> The coordinate
       type(threshold_coordinate_type) :: self
 
       if (is_logarithmic) then
@@ -43,7 +39,6 @@ contains
 
    !> Coordinate of a threshold.
    elemental function at(self, threshold) result(coordinate)
-      !> The coordinate
       class(threshold_coordinate_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: threshold
@@ -54,11 +49,9 @@ contains
       if (self%kind == logarithmic) coordinate = log(threshold)
    end function at
 
-   !> Threshold of a coordinate.
+   !> Threshold at a coordinate.
    elemental function threshold(self, coordinate)
-      !> The coordinate
       class(threshold_coordinate_type), intent(in) :: self
-      !> Its value
       real(wp), intent(in) :: coordinate
       real(wp) :: threshold
 
@@ -69,9 +62,7 @@ contains
 
    !> Derivative of the threshold with respect to the coordinate.
    elemental function slope(self, coordinate)
-      !> The coordinate
       class(threshold_coordinate_type), intent(in) :: self
-      !> Its value
       real(wp), intent(in) :: coordinate
       real(wp) :: slope
 

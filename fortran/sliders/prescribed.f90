@@ -123,7 +123,7 @@ contains
             call schedule%hazard%offer(self%displacement, self%clock)
          end if
          call step_on(self, schedule%law(), schedule%window(self%time))
-         if (schedule%has_clocks) call schedule%hazard%go_on(self%clock)
+         if (schedule%has_clocks) call schedule%hazard%advance(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)

@@ -112,7 +112,7 @@ contains
          self%law = schedule%law()
          call schedule%hazard%offer(self%displacement, self%clock)
          call step_on(self, system, schedule%window(self%time))
-         call schedule%hazard%go_on(self%clock)
+         call schedule%hazard%advance(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)

@@ -23,8 +23,13 @@ import pytest
 import typer
 from conftest import ROOT, long
 from mesoslip import Config
+from mesoslip.analysis.regime.result import NAMES as REGIMES
 from mesoslip.campaign.plan import Plan
 from mesoslip.command_line.main import app
+from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
+from mesoslip.configuration.sliders import DEFAULT as DEFAULT_SLIDER
+from mesoslip.configuration.sliders import SLIDERS
+from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.inference.plan import Plan as FitPlan
 from mesoslip.plots.views import VIEWS
 
@@ -63,6 +68,19 @@ SHORTER = {
     # Klein's case, for pages on the master equation.
     '[run]\nengine = "eq"': '[run]\nresolution = 0.5\nengine = "eq"',
 }
+FORMULAS = [name for name, law in LAWS.items() if not law.is_sampled]
+# Lists of names that pages have: the passage, the form of a name in it, and all names.
+LISTS = [
+    ("README.md", r'law = "weibull" +# ([^\n]*)', r"\b{}\b", FORMULAS),
+    ("README.md", r"\n\| to \| set \|.*?\n\n", 'slider.kind = "{}"', {*SLIDERS} - {DEFAULT_SLIDER}),
+    ("README.md", r"\n\| start with (.*?) \|", r"\b{}", INITIAL_STATES),
+    ("README.md", r"`mesoslip regime` classifies (.*?)\(", r"\b{}\b", REGIMES),
+    ("docs/model.md", r"A law is a formula \((.*?)\)", "`{}`", FORMULAS),
+    ("docs/model.md", r"A law is a formula .*?\n\n", "`{}`", LAWS),
+    ("docs/model.md", r"\*\*Coupling\.\*\*.*?\n\n", "`{}`", COUPLINGS),
+    ("docs/model.md", r"\*\*Starts\.\*\*.*?\n\n", "`{}`", INITIAL_STATES),
+    ("docs/regimes.md", r"\| regime \| number \|.*?\n\n", r"\| {} \|", REGIMES),
+]
 HISTORY = "time [s],displacement [um]\n0,0\n1,0.1\n2,0.3\n"
 STATUS = re.compile(r"exit status (\d+)")
 
@@ -252,6 +270,16 @@ def type_page(page, workshop, command, *, is_run=True):
         except Exception as error:
             error.add_note(f"in {place}")
             raise
+
+
+@pytest.mark.parametrize(("page", "passage", "form", "names"), LISTS)
+def test_lists_of_names_are_complete(page, passage, form, names):
+    """A page that lists kinds lists all that the program has."""
+    listed = re.search(passage, (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+    assert listed, f"{page} has no {passage}"
+    shown = {name: form.format(name.replace("_", "-")) for name in names}
+    missing = [name for name in names if not re.search(shown[name], listed[0])]
+    assert not missing, f"{page} does not list {missing}"
 
 
 @pytest.mark.usefixtures("workshop")

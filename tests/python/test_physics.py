@@ -5,6 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
+from mesoslip.configuration.threshold_laws import LAWS as LAWS_BY_NAME
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.tables import ENERGY_COLUMNS
 from oracles import stationary_force
@@ -213,6 +214,7 @@ def test_the_seed_matters(klein):
 def test_threshold_laws_are_those_of_scipy():
     from oracles import frozen_law
 
+    assert {name for name, law in LAWS_BY_NAME.items() if not law.is_sampled} == LAWS.keys()
     for law, width in LAWS.items():
         ours, theirs = mesoslip.ThresholdLaw(law, width, 0.1), frozen_law(law, width)
         above = theirs.sf(0.1)

@@ -163,7 +163,7 @@ contains
          call self%respond_steadily(after)
          return
       end if
-      call self%hazard%go_on(self%clock)
+      call self%hazard%advance(self%clock)
       call self%respond_here(after)
    end subroutine respond_activated
 

@@ -1,5 +1,4 @@
-!> The contacts of an avalanche on a lattice: which they are, in what order they let go, how far
-!> they reach.
+!> The contacts of an avalanche on a lattice: their order of breaking, and their extent.
 module mesoslip_contacts_individual_avalanche_track
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -11,32 +10,30 @@ module mesoslip_contacts_individual_avalanche_track
 
    !> Numbers kept for a contact
    integer, parameter :: track_length = 2
-   !> The generation in which the contact broke in the present avalanche, from 1; 0 if it did not
+   !> Generation in which the contact broke in the current avalanche, from 1; 0 if it did not
    integer, parameter :: row_generation = 1
-   !> The contacts of the avalanche in the order of breaking: a list, unlike the row before
+   !> List of the contacts of the avalanche in the order of breaking; not by contact
    integer, parameter :: row_member = 2
 
-   !> Up to this number of contacts their columns and rows are sorted, beyond it they are marked.
+   !> Up to this number of contacts their columns and rows are sorted, beyond it marked
    integer, parameter :: few = 12
 
-   !> The contacts of the present avalanche.
+   !> The contacts of the current avalanche.
    type :: avalanche_track_type
-      !> Columns and rows of the lattice; no columns when contacts are not on one
+      !> Columns and rows of the lattice; 0 columns without a lattice
       integer :: columns = 0, rows = 0
-      !> Contacts that broke in it, each counted once
+      !> Number of contacts that broke, each counted once
       integer :: area = 0
-      !> Number of the present generation
+      !> Number of the current generation
       integer :: generation = 0
-      !> State of the track, shape (track_length, count); without a lattice there is none
+      !> State of the track, shape (track_length, columns rows)
       integer, allocatable :: contact(:, :)
    contains
-      !> A contact breaks
-      procedure, non_overridable :: add
-      !> Columns and rows that the avalanche reaches over
+      !> Add a contact that breaks, clear the avalanche
+      procedure, non_overridable :: add, clear
+      !> Columns and rows of the smallest rectangle around the avalanche
       procedure, non_overridable :: extent
-      !> Forget the avalanche
-      procedure, non_overridable :: clear
-      !> Put the state into an archive or take it out
+      !> Write the state to an archive, or read it
       procedure, non_overridable :: exchange
    end type avalanche_track_type
 
@@ -44,9 +41,8 @@ contains
 
    !> Set up a track without an avalanche.
    subroutine new_avalanche_track(self, columns, rows, error)
-      !> The track
       type(avalanche_track_type), intent(out) :: self
-      !> Columns and rows of the lattice; no columns when contacts are not on one
+      !> Columns and rows of the lattice; 0 columns without a lattice
       integer, intent(in) :: columns, rows
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(out) :: error
@@ -63,11 +59,9 @@ contains
       self%contact = 0
    end subroutine new_avalanche_track
 
-   !> A contact breaks; if it breaks again in the same avalanche it keeps its generation.
+   !> Add a contact that breaks; one that breaks again in an avalanche keeps its generation.
    pure subroutine add(self, contact)
-      !> The track
       class(avalanche_track_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
 
       if (self%columns == 0) return
@@ -77,11 +71,10 @@ contains
       self%contact(row_member, self%area) = contact
    end subroutine add
 
-   !> Columns and rows that the avalanche reaches over, on a lattice without edges.
+   !> Columns and rows of the smallest rectangle around the avalanche, on a lattice without edges.
    pure subroutine extent(self, width, height)
-      !> The track
       class(avalanche_track_type), intent(in) :: self
-      !> Columns of the smallest rectangle around the avalanche, and its rows
+      !> Numbers of columns and rows
       integer, intent(out) :: width, height
 
       width = min(self%area, 1)
@@ -93,12 +86,10 @@ contains
       end associate
    end subroutine extent
 
-   !> Length of the shortest arc of a circle of sites that holds a set of them.
+   !> Length of the shortest arc of a circle of sites that contains some of them.
    pure function arc(site, length)
-      !> Places, from 0
-      integer, intent(in) :: site(:)
-      !> Places on the circle
-      integer, intent(in) :: length
+      !> The sites, numbered from 0, and the length of the circle
+      integer, intent(in) :: site(:), length
       integer :: arc
 
       logical, allocatable :: marked(:)
@@ -135,9 +126,8 @@ contains
       arc = length - gap
    end function arc
 
-   !> Forget the avalanche.
+   !> Clear the avalanche.
    pure subroutine clear(self)
-      !> The track
       class(avalanche_track_type), intent(inout) :: self
 
       integer :: site
@@ -149,11 +139,9 @@ contains
       self%generation = 0
    end subroutine clear
 
-   !> Put the state into an archive or take it out.
+   !> Write the state to an archive, or read it.
    subroutine exchange(self, archive)
-      !> The track
       class(avalanche_track_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%exchange("area", self%area)

@@ -1,10 +1,9 @@
-!> Contacts one by one: their records, how one detaches and attaches, what all kinds of them do.
+!> Individual contacts: their records, detaching and attaching, and what all kinds have in common.
 !>
 !> The earthquake-like model, except for the time of breaking. Each kind sorts its contacts by a key
-!> and implements: when the first contact breaks (offer), which contacts break (respond), insertion
-!> of an attached contact (join), and the displacement at which a contact breaks when the direction
-!> reverses (behind_of). Coordinates are along a direction of motion; displacements are relative to
-!> an origin that the caller shifts.
+!> and implements when the first contact breaks (offer), which contacts break (respond), insertion
+!> of an attached contact (join), and the coordinate at which a contact breaks after a reversal
+!> (behind_of). Coordinates are along a direction of motion.
 module mesoslip_contacts_individual_base
    use mesoslip_contacts_base, only: contact_record_length, contacts_type, exchange_contacts, &
       & extent_length
@@ -27,7 +26,7 @@ module mesoslip_contacts_individual_base
 
    public :: individual_contacts_type, exchange_individual, total_law, snapshot_individual
 
-   !> Contacts of a snapshot that are evaluated together
+   !> Number of contacts whose records are evaluated together for a snapshot
    integer, parameter :: snapshot_block = 256
 
    !> N individual contacts.
@@ -36,13 +35,13 @@ module mesoslip_contacts_individual_base
       real(wp), allocatable :: record(:, :)
       !> Contacts that are detached
       type(detached_contacts_type) :: detached
-      !> Contacts whose next thresholds are still to be drawn
+      !> Contacts whose next thresholds have not been drawn
       type(births_type) :: births
       !> Sums over pinned contacts (stiffness; stiffness times origin) and detached ones (drag)
       type(accumulator_type) :: stiffness, offset, drag
       !> Contacts of the current avalanche
       type(avalanche_track_type) :: track
-      !> Stiffness of all bonds of a contact to its neighbours; 0 without neighbours [N/m]
+      !> Stiffness of all bonds of a contact to its neighbours [N/m]
       real(wp) :: bonds = 0.0_wp
       !> Direction of motion by which contacts are sorted, +1 or -1
       real(wp) :: direction = 1.0_wp
@@ -50,63 +49,47 @@ module mesoslip_contacts_individual_base
       real(wp) :: behind = -huge(1.0_wp)
    contains
       procedure :: law => total_law
-      procedure :: shift_origin
-      procedure :: elastic_energy
       procedure :: snapshot => snapshot_individual
-      procedure :: individual_count
-      procedure :: records
-      procedure :: take_extent
+      procedure :: shift_origin, elastic_energy, individual_count, records, take_extent
       !> Insert an attached contact into the order of breaking
       procedure(join_interface), deferred :: join
       !> Maximum coordinate at which a pinned contact breaks after a reversal
       procedure :: behind_of
       !> Force of the neighbours on an attaching contact
       procedure :: neighbour_force
-      !> Shift the origin in the data of a kind
+      !> Shift the origin in further data of a kind
       procedure :: shift_order
-      !> Allocate the records
-      procedure, non_overridable :: allocate_records
-      !> Draw all contacts at the start of a run
-      procedure, non_overridable :: draw
-      !> Detach a contact that breaks
-      procedure, non_overridable :: detach
-      !> Attach all contacts that are due
-      procedure, non_overridable :: attach_due
-      !> Sort all contacts again, from the records
-      procedure, non_overridable :: rebuild_queue
-      !> Maximum coordinate at which any contact breaks after a reversal
-      procedure, non_overridable :: max_behind
+      !> Allocate the records, and draw all contacts at the start of a run
+      procedure, non_overridable :: allocate_records, draw
+      !> Detach a contact that breaks, and attach all contacts that are due
+      procedure, non_overridable :: detach, attach_due
+      !> Sort all contacts again from the records, and recompute the bound behind
+      procedure, non_overridable :: rebuild_queue, max_behind
       !> Window between two coordinates
       procedure, non_overridable :: window_between
-      !> The next attachments, for a schedule
-      procedure, non_overridable :: list_attachments
-      procedure, non_overridable :: list_births
-      !> Update records and sums after a schedule, without the order of breaking
-      procedure, non_overridable :: detach_listed
-      procedure, non_overridable :: attach_listed
+      !> List the next attachments and births in a schedule
+      procedure, non_overridable :: list_attachments, list_births
+      !> Update records and sums after a schedule, but not the order of breaking
+      procedure, non_overridable :: detach_listed, attach_listed
       procedure, non_overridable, private :: attach_next, draw_births, give_birth, list_lives, &
          & sum_totals
    end type individual_contacts_type
 
    abstract interface
-      !> Insert an attached contact into the order of breaking.
       subroutine join_interface(self, contact, pose)
          import :: individual_contacts_type, pose_type
          implicit none
-         !> The contacts
          class(individual_contacts_type), intent(inout) :: self
          !> Number of the contact
          integer, intent(in) :: contact
-         !> Pose of the slider
          type(pose_type), intent(in) :: pose
       end subroutine join_interface
    end interface
 
 contains
 
-   !> Allocate records of contacts, and of their avalanches if they are on a lattice.
+   !> Allocate the records of contacts, whose parameters are set, and of avalanches on a lattice.
    subroutine allocate_records(self, columns, rows, error)
-      !> The contacts, with parameters
       class(individual_contacts_type), intent(inout) :: self
       !> Columns and rows of the lattice; 0 columns without a lattice
       integer, intent(in) :: columns, rows
@@ -135,7 +118,6 @@ contains
 
    !> Draw all contacts at the start of a run.
    subroutine draw(self, state)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
@@ -144,11 +126,9 @@ contains
       call self%sum_totals()
    end subroutine draw
 
-   !> Contact force as a linear law.
+   !> Contact force as a law, from the sums over contacts.
    pure function total_law(self) result(law)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> The law, valid until a contact breaks or attaches
       type(interface_law_type) :: law
 
       law%stiffness = self%stiffness%total()
@@ -158,11 +138,9 @@ contains
 
    !> Window between two coordinates along the direction of motion.
    pure function window_between(self, behind, ahead, end_time) result(window)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
       !> Coordinates between which no contact breaks [m], and time at which the law ends [s]
       real(wp), intent(in) :: behind, ahead, end_time
-      !> The window
       type(window_type) :: window
 
       window%end_time = end_time
@@ -177,11 +155,10 @@ contains
 
    !> Detach a contact that breaks: subtract its force, and schedule its next attachment.
    subroutine detach(self, contact, displacement, time)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Displacement [m] and time [s]
+      !> Displacement of the slider [m] and time [s]
       real(wp), intent(in) :: displacement, time
 
       real(wp) :: stiffness, origin, drag, delay
@@ -214,9 +191,7 @@ contains
 
    !> Attach all contacts that are due, in the order of their attachment times.
    subroutine attach_due(self, pose)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -235,15 +210,14 @@ contains
       self%detached_count = real(self%detached%count, wp)
    end subroutine attach_due
 
-   !> Force of the neighbours on an attaching contact; zero for kinds without neighbours.
+   !> Force of the neighbours on an attaching contact; 0 for kinds without neighbours.
    pure function neighbour_force(self, contact, displacement) result(force)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Force of the neighbours where the stretch of the contact is zero [N]
+      !> Force of the neighbours where the stretch of the contact is 0 [N]
       real(wp) :: force
 
       force = 0.0_wp
@@ -252,11 +226,9 @@ contains
    !> Attach the next contact that is due.
    subroutine attach_next(self, pose, mean_force, contact)
       class(individual_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Mean force of a contact when it attaches, including that of its neighbours [N]
       real(wp), intent(in) :: mean_force
-      !> Number of the contact
       integer, intent(out) :: contact
 
       real(wp) :: stiffness, limit, origin, drag, force
@@ -278,15 +250,13 @@ contains
 
    !> List the next contacts to attach in a schedule, up to a maximum number.
    subroutine list_attachments(self, limit, direction, schedule, contact)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
       !> Maximum number
       integer, intent(in) :: limit
       !> Sign of the velocity at which they attach
       real(wp), intent(in) :: direction
-      !> The schedule
       type(schedule_type), intent(inout) :: schedule
-      !> Their numbers
+      !> The contacts
       integer, intent(out) :: contact(max_events)
 
       integer :: number
@@ -306,15 +276,13 @@ contains
       schedule%pinned = self%parameters%count - self%detached%count
    end subroutine list_attachments
 
-   !> List the next births of the contacts that break in a schedule, if they may attach in it.
+   !> List the next births of the contacts that break in a schedule, if they can attach within it.
    subroutine list_births(self, contact, before, direction, schedule)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Numbers of those that are listed to break, and of births listed before
+      !> The contacts that are listed to break, and the number of births listed before
       integer, intent(in) :: contact(:), before
       !> Sign of the velocity at which they attach
       real(wp), intent(in) :: direction
-      !> The schedule
       type(schedule_type), intent(inout) :: schedule
 
       integer :: event
@@ -331,10 +299,9 @@ contains
       end do
    end subroutine list_births
 
-   !> List the next lives of some contacts.
+   !> Stiffness, limit and first stretch of the next lives of some contacts.
    subroutine list_lives(self, contact, direction, stiffness, limit, stretch)
       class(individual_contacts_type), intent(inout) :: self
-      !> Numbers of the contacts
       integer, intent(in) :: contact(:)
       !> Sign of the velocity at which they attach
       real(wp), intent(in) :: direction
@@ -346,7 +313,7 @@ contains
 
       call self%draw_births(contact)
       back_force = direction * self%parameters%back_force_ratio * self%parameters%static_force
-      ! Apart from what follows, where several are done at once.
+      ! Apart from the next loop, which is vectorized.
       do event = 1, size(contact)
          threshold(event) = self%record(row_next, contact(event))
       end do
@@ -369,10 +336,9 @@ contains
       end do
    end subroutine list_lives
 
-   !> Have the next births of some contacts drawn.
+   !> Draw all requested births if the next birth of one of some contacts has not been drawn.
    subroutine draw_births(self, contact)
       class(individual_contacts_type), intent(inout) :: self
-      !> Numbers of the contacts
       integer, intent(in) :: contact(:)
 
       integer :: event
@@ -384,7 +350,7 @@ contains
       end do
    end subroutine draw_births
 
-   !> Stiffness, limit and force of the next birth of a contact, which has been drawn.
+   !> Stiffness, limit and force at the next birth of a contact, which has been drawn.
    pure subroutine give_birth(self, contact, mean_force, direction, stiffness, limit, force)
       class(individual_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
@@ -403,11 +369,9 @@ contains
 
    !> Update records and sums for the contacts that broke in a schedule.
    subroutine detach_listed(self, contact, schedule)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Numbers of the contacts that broke, in their order
+      !> The contacts that broke, in their order
       integer, intent(in) :: contact(:)
-      !> The schedule
       type(schedule_type), intent(in) :: schedule
 
       integer :: event
@@ -430,13 +394,11 @@ contains
       self%drag = schedule%drag
    end subroutine detach_listed
 
-   !> Update records and sums for the contacts that attached in a schedule.
+   !> Update records for the contacts that attached in a schedule, after those that broke.
    subroutine attach_listed(self, schedule, contact)
-      !> The contacts; those that broke are detached
       class(individual_contacts_type), intent(inout) :: self
-      !> The schedule
       type(schedule_type), intent(in) :: schedule
-      !> Numbers of the contacts that attached, in their order
+      !> The contacts that attached, in their order
       integer, intent(out) :: contact(:)
 
       integer :: event
@@ -456,9 +418,8 @@ contains
       end do
    end subroutine attach_listed
 
-   !> Sort all contacts again, from the records.
+   !> Sort all contacts again from the records, and recompute the bound behind.
    subroutine rebuild_queue(self, displacement)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
@@ -467,11 +428,9 @@ contains
       self%behind = self%max_behind()
    end subroutine rebuild_queue
 
-   !> Maximum coordinate at which any contact breaks after a reversal.
+   !> Maximum coordinate at which any contact breaks after a reversal [m].
    pure function max_behind(self) result(coordinate)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       integer :: contact
@@ -483,25 +442,19 @@ contains
       end do
    end function max_behind
 
-   !> Maximum coordinate at which a pinned contact breaks after a reversal.
+   !> Maximum coordinate at which a pinned contact breaks after a reversal [m].
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       coordinate = behind_coordinate(self%record(:, contact), self%direction)
    end function behind_of
 
-   !> Shift the origin of displacements.
    subroutine shift_origin(self, shift, displacement)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
-      !> Displacement of the slider from the new origin [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact
@@ -514,20 +467,16 @@ contains
       call self%rebuild_queue(displacement)
    end subroutine shift_origin
 
-   !> Shift the origin in the data of a kind other than the records; by default there are none.
+   !> Shift the origin in further data of a kind, after the records; by default there are none.
    subroutine shift_order(self, shift)
-      !> The contacts, with shifted records
       class(individual_contacts_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
    end subroutine shift_order
 
-   !> Return size and extent of the finished avalanche, and clear it.
    subroutine take_extent(self, extent)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> Contacts that broke, columns and rows around them, generations; 0 without a lattice
       integer, intent(out) :: extent(extent_length)
 
       extent(1) = self%track%area
@@ -536,14 +485,10 @@ contains
       call self%track%clear()
    end subroutine take_extent
 
-   !> State of each contact.
+   !> State of each contact, without the forces of neighbours.
    pure subroutine snapshot_individual(self, time, displacement, values)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> Time [s], displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
-      !> For each contact: stretch [m] (huge if it is detached), force over threshold, generation
-      !> in the current avalanche; shape (snapshot_length, count)
       real(wp), intent(out) :: values(:, :)
 
       real(wp) :: now(contact_record_length, snapshot_block)
@@ -551,7 +496,7 @@ contains
 
       do first = 1, self%parameters%count, snapshot_block
          last = min(first + snapshot_block - 1, self%parameters%count)
-         ! Thresholds of now, which ageing contacts do not keep.
+         ! Present thresholds, which are not in the records of ageing contacts.
          call self%records(time, first, now(:, :last - first + 1))
          do contact = first, last
             values(:, contact) = [huge(1.0_wp), 0.0_wp, 0.0_wp]
@@ -582,13 +527,9 @@ contains
       end do
    end subroutine sum_totals
 
-   !> Elastic energy of the pinned contacts.
    pure function elastic_energy(self, displacement) result(energy)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Energy [J]
       real(wp) :: energy
 
       integer :: contact
@@ -601,26 +542,17 @@ contains
       energy = total%total()
    end function elastic_energy
 
-   !> Number of individual contacts.
    pure function individual_count(self) result(number)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> Number of contacts
       integer :: number
 
       number = self%parameters%count
    end function individual_count
 
-   !> Records of some contacts.
    pure subroutine records(self, time, first, values)
-      !> The contacts
       class(individual_contacts_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The first of them
       integer, intent(in) :: first
-      !> For each contact: origin [m], stiffness [N/m] (0 while detached), breaking stretch [m],
-      !> number of renewals; shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       values = self%record([row_origin, row_stiffness, row_limit, row_renewal], &
@@ -629,9 +561,7 @@ contains
 
    !> Write the state to an archive, or read it.
    subroutine exchange_individual(self, archive)
-      !> The contacts
       class(individual_contacts_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call self%births%draw(self%parameters, self%record)

@@ -1,9 +1,9 @@
-!> Births of contacts: thresholds are drawn, stiffness, breaking stretch and drag follow from them.
+!> Births of contacts: draws of thresholds, and stiffness, breaking stretch and drag from them.
 !>
-!> Thresholds of the next births are drawn some at a time, which takes less time and gives the same
-!> numbers: each draw has a key of its own. So are delays and forces at attaching, if they differ
-!> between contacts. Where contacts have the stiffnesses of a table their break stretches are drawn
-!> in the place of thresholds.
+!> Thresholds of the next births are drawn several at a time, which is faster and gives the same
+!> numbers, as each draw has its own key. So are delays and forces at attaching, if they differ
+!> between contacts. With the stiffnesses of a table, break stretches are drawn instead of
+!> thresholds.
 module mesoslip_contacts_individual_births
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_carried_law, only: carried_law_type, new_carried_law
@@ -21,40 +21,36 @@ module mesoslip_contacts_individual_births
 
    public :: births_type, bear, bear_by_rule, drag_of
 
-   !> Draws that are made together
+   !> Number of draws made together
    integer, parameter :: draws_together = 32
    !> Attempt of the first draw of a force at attaching; the next attempts count down
    integer(i8), parameter :: force_attempt = 65535_i8
 
    !> Births to come.
    type :: births_type
-      !> Contacts whose next thresholds are still to be drawn: their keys in draws, which count
-      !> contacts from 0, and their renewals then
+      !> Requested births: their number; the keys of their contacts, which are numbers from 0, and
+      !> their renewals
       integer, private :: count = 0
       integer(i8), private :: key(draws_together) = 0_i8, renewal(draws_together) = 0_i8
-      !> Delay of each contact before its next birth [s], if they differ, and its force then, over
-      !> the mean threshold, positive in the direction of motion, if that has a width; shape (count)
+      !> Delay of each contact before its next birth [s], if delays differ, and its force then over
+      !> the mean threshold, positive in the direction of motion, if forces differ; shape (count)
       real(wp), allocatable :: delay(:), force(:)
    contains
-      !> Allocate what is drawn for each contact
+      !> Allocate delays and forces
       procedure, non_overridable :: allocate_draws
       !> Draw all contacts for the start of a run
       procedure, non_overridable :: draw_all
-      !> Have the threshold of a contact at its next birth drawn, with those of others
-      procedure, non_overridable :: request
-      !> Draw the thresholds that are still to be drawn
-      procedure, non_overridable :: draw
-      !> Write what has been drawn to an archive, or read it
+      !> Request the draws of the next birth of a contact, and make all requested draws
+      procedure, non_overridable :: request, draw
+      !> Write the draws to an archive, or read them
       procedure, non_overridable :: exchange
    end type births_type
 
 contains
 
-   !> Allocate what is drawn for each contact apart from thresholds.
+   !> Allocate delays and forces, if they differ between contacts.
    subroutine allocate_draws(self, parameters, error)
-      !> The births
       class(births_type), intent(inout) :: self
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -73,9 +69,7 @@ contains
 
    !> Draw all contacts for the start of a run.
    subroutine draw_all(self, parameters, state, record)
-      !> The births
       class(births_type), intent(inout) :: self
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> One of the initial_ codes
       integer, intent(in) :: state
@@ -134,7 +128,7 @@ contains
       type(contact_parameters_type), intent(in) :: parameters
       !> One of the initial_ codes
       integer, intent(in) :: state
-      !> A deviate, uniform between 0 and 1; stiffness [N/m] and breaking stretch [m]
+      !> A uniform deviate; stiffness [N/m] and breaking stretch [m]
       real(wp), intent(in) :: deviate, stiffness, limit
       real(wp) :: stretch
 
@@ -151,18 +145,15 @@ contains
       end select
    end function initial_stretch
 
-   !> Have the threshold of a contact at its next birth drawn, with those of others.
+   !> Request the draws of the next birth of a contact, which are made with those of others.
    subroutine request(self, contact, parameters, record)
-      !> The births
       class(births_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Records of the contacts, shape (record_length, count)
       real(wp), intent(inout), contiguous :: record(:, :)
 
-      ! No threshold is zero: this one is still to be drawn.
       record(row_next, contact) = 0.0_wp
       self%count = self%count + 1
       self%key(self%count) = int(contact - 1, i8)
@@ -170,13 +161,11 @@ contains
       if (self%count == draws_together) call self%draw(parameters, record)
    end subroutine request
 
-   !> Draw what is still to be drawn.
+   !> Draw all requested births.
    !>
-   !> The second deviate of a birth is that of the delay before it: the first is its threshold's.
+   !> The first deviate of a birth is that of its threshold, the second that of the delay before it.
    subroutine draw(self, parameters, record)
-      !> The births
       class(births_type), intent(inout) :: self
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Records of the contacts, shape (record_length, count)
       real(wp), intent(inout), contiguous :: record(:, :)
@@ -210,9 +199,8 @@ contains
 
    !> Stiffness and breaking stretch of a contact that is born with a relative threshold.
    pure subroutine bear(parameters, threshold, stiffness, limit)
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
-      !> Relative threshold, or break stretch where stiffnesses are those of a table
+      !> Relative threshold; break stretch with the stiffnesses of a table
       real(wp), intent(in) :: threshold
       !> Stiffness [N/m] and breaking stretch [m]
       real(wp), intent(out) :: stiffness, limit
@@ -225,9 +213,8 @@ contains
       end if
    end subroutine bear
 
-   !> The same where the stiffness follows from the threshold.
+   !> The same if the stiffness follows from the threshold.
    pure subroutine bear_by_rule(parameters, threshold, stiffness, limit)
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Relative threshold
       real(wp), intent(in) :: threshold
@@ -239,10 +226,10 @@ contains
       limit = threshold * parameters%static_force / stiffness
    end subroutine bear_by_rule
 
-   !> Relative threshold of a contact that was drawn.
+   !> Relative threshold of a drawn contact.
    pure function threshold_of(parameters, drawn) result(threshold)
       type(contact_parameters_type), intent(in) :: parameters
-      !> The threshold, or its break stretch where stiffnesses are those of a table
+      !> The threshold; its break stretch with the stiffnesses of a table
       real(wp), intent(in) :: drawn
       real(wp) :: threshold
 
@@ -256,11 +243,10 @@ contains
    !>
    !> A contact whose force is not below its threshold could not attach: both are drawn again.
    subroutine draw_forces(parameters, key, renewal, threshold, force)
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
-      !> Keys of the contacts, which count from 0, and numbers of their births; shape (contacts)
+      !> Keys of the contacts, which are numbers from 0, and their renewals; shape (contacts)
       integer(i8), intent(in), contiguous :: key(:), renewal(:)
-      !> Relative thresholds that were drawn, and those with which the contacts attach
+      !> Relative thresholds, first as drawn, then those with which the contacts attach
       real(wp), intent(inout), contiguous :: threshold(:)
       !> Relative forces, positive in the direction of motion
       real(wp), intent(out), contiguous :: force(:)
@@ -272,39 +258,36 @@ contains
       call uniform_pairs(parameters%seed, parameters%realization, key, renewal, force_attempt, &
          & first, second)
       do birth = 1, size(key)
-         force(birth) = force_of(second(birth))
+         force(birth) = newborn_force(parameters, second(birth))
          do attempt = force_attempt - 1_i8, 1_i8, -1_i8
             if (abs(force(birth)) < threshold_of(parameters, threshold(birth))) exit
             call uniform_pair(parameters%seed, parameters%realization, key(birth), &
                & renewal(birth), attempt, uniform)
             threshold(birth) = parameters%law%quantile(uniform(1))
-            force(birth) = force_of(uniform(2))
+            force(birth) = newborn_force(parameters, uniform(2))
          end do
       end do
-
-   contains
-
-      !> Relative force of a uniform deviate.
-      pure real(wp) function force_of(deviate)
-         real(wp), intent(in) :: deviate
-
-         force_of = parameters%back_force_ratio &
-            & + parameters%newborn_width * inverse_normal(deviate)
-      end function force_of
-
    end subroutine draw_forces
 
-   !> Draw a contact of slow sliding if forces at attaching have a width.
+   !> Relative force at attaching of a uniform deviate.
+   pure real(wp) function newborn_force(parameters, deviate)
+      type(contact_parameters_type), intent(in) :: parameters
+      real(wp), intent(in) :: deviate
+
+      newborn_force = parameters%back_force_ratio &
+         & + parameters%newborn_width * inverse_normal(deviate)
+   end function newborn_force
+
+   !> Draw a contact of slow sliding if forces at attaching differ.
    !>
    !> Contacts that attach with the threshold u and the force b, abs(b) < u, slide from b to u.
-   !> Their number is proportional to u - b, and their forces are uniform in between. A threshold is
-   !> drawn with the weight 2 u, and b; they are accepted with the probability (u - b)/(2 u).
+   !> Their number is proportional to u - b, and their forces are uniform between b and u. A
+   !> threshold is drawn with the weight 2 u, then b; they are accepted with the probability
+   !> (u - b)/(2 u).
    pure subroutine draw_sliding(parameters, carried, contact, threshold, force)
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
-      !> Law of thresholds with the weight of the distance from no force to breaking
+      !> Law of thresholds weighted by the distance from zero force to breaking
       type(carried_law_type), intent(in) :: carried
-      !> Number of the contact
       integer, intent(in) :: contact
       !> Relative threshold and force
       real(wp), intent(out) :: threshold, force
@@ -320,8 +303,7 @@ contains
          call uniform_pair(parameters%seed, parameters%realization, key, 0_i8, attempt - 1_i8, &
             & other)
          threshold = carried%quantile(uniform(1))
-         newborn = parameters%back_force_ratio &
-            & + parameters%newborn_width * inverse_normal(uniform(2))
+         newborn = newborn_force(parameters, uniform(2))
          max_force = threshold_of(parameters, threshold)
          force = newborn + other(2) * (max_force - newborn)
          if (abs(newborn) < max_force &
@@ -329,13 +311,11 @@ contains
       end do
    end subroutine draw_sliding
 
-   !> Drag of a contact while it is detached.
+   !> Drag of a contact while it is detached [N s/m].
    pure function drag_of(parameters, stiffness) result(drag)
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
       !> Stiffness of the contact [N/m]
       real(wp), intent(in) :: stiffness
-      !> Drag [N s/m]
       real(wp) :: drag
 
       drag = parameters%drag
@@ -346,11 +326,9 @@ contains
       end if
    end function drag_of
 
-   !> Write what has been drawn to an archive, or read it.
+   !> Write the draws to an archive, or read them; no requested draw may be pending.
    subroutine exchange(self, archive)
-      !> The births, none of which is still to be drawn
       class(births_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       if (allocated(self%delay)) call archive%exchange("next_delay", self%delay)

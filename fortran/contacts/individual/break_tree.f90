@@ -1,8 +1,8 @@
-!> Which of many contacts breaks first, when that may change at any time.
+!> The order of breaking of contacts whose coordinates change at any time.
 !>
 !> A tree with many branches at each node, which holds the minimum of its branches. A contact that
-!> changes is hardly ever the minimum of its node, before or after, so a change costs one comparison
-!> whatever the number of contacts. Contacts that are neighbours in number share lines of the cache.
+!> changes is rarely the minimum of its node, before or after, so a change costs one comparison
+!> whatever the number of contacts. Contacts of successive numbers share cache lines.
 module mesoslip_contacts_individual_break_tree
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -14,7 +14,7 @@ module mesoslip_contacts_individual_break_tree
 
    !> Branches of a node
    integer, parameter :: branches = 16
-   !> Levels above that of 2**31 contacts
+   !> Levels above the contacts, if they are 2**31
    integer, parameter :: max_levels = 8
    !> Coordinate at which nothing breaks
    real(wp), parameter :: never = huge(1.0_wp)
@@ -22,35 +22,26 @@ module mesoslip_contacts_individual_break_tree
    !> Coordinates along a direction of motion at which contacts break.
    type :: break_tree_type
       private
-      !> Number of levels of nodes, and the position before the first of each; level 0 is the
+      !> Number of levels of nodes, and the position before the first of each; level 0 has the
       !> contacts
       integer :: levels = 0, before(0:max_levels) = 0
       !> Coordinate at which a contact, or the first one below a node, breaks, shape (positions)
       real(wp), allocatable :: minimum(:)
    contains
-      !> Put a contact in, or change it
-      procedure, non_overridable :: set
-      !> Take a contact out
-      procedure, non_overridable :: remove
-      !> Forget all contacts
-      procedure, non_overridable :: clear
-      !> Put a contact in, to be followed by arrange
-      procedure, non_overridable :: put
-      !> Rebuild the tree from its contacts
-      procedure, non_overridable :: arrange
-      !> Coordinate at which the first contact breaks
-      procedure, non_overridable :: first
-      !> A contact that breaks at a coordinate
-      procedure, non_overridable :: due
+      !> Insert or change a contact, remove one, remove all
+      procedure, non_overridable :: set, remove, clear
+      !> Insert contacts, then rebuild the tree
+      procedure, non_overridable :: put, arrange
+      !> Coordinate at which the first contact breaks, and a contact that breaks up to a coordinate
+      procedure, non_overridable :: first, due
    end type break_tree_type
 
 contains
 
    !> Set up an empty tree.
    subroutine new_break_tree(self, capacity, error)
-      !> The tree
       type(break_tree_type), intent(out) :: self
-      !> Largest number of a contact
+      !> Maximum number of a contact
       integer, intent(in) :: capacity
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(out) :: error
@@ -63,7 +54,7 @@ contains
          nodes = (nodes + branches - 1) / branches
          self%levels = self%levels + 1
          self%before(self%levels) = positions
-         ! The nodes of each level but the last one fill those above.
+         ! The nodes of each level but the last fill whole nodes of the level above.
          positions = positions + merge(1, branches * ((nodes + branches - 1) / branches), &
             & nodes == 1)
          if (nodes == 1) exit
@@ -77,11 +68,9 @@ contains
       call self%clear()
    end subroutine new_break_tree
 
-   !> Put a contact in, or change it.
+   !> Insert a contact, or change it.
    pure subroutine set(self, contact, coordinate)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
       !> Coordinate at which it breaks [m]
       real(wp), intent(in) :: coordinate
@@ -89,17 +78,15 @@ contains
       call change(size(self%minimum), self%minimum, self%before, self%levels, contact, coordinate)
    end subroutine set
 
-   !> Take a contact out.
+   !> Remove a contact.
    pure subroutine remove(self, contact)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
 
       call self%set(contact, never)
    end subroutine remove
 
-   !> Change a contact, and the nodes above for which that matters.
+   !> Change a contact, and the nodes above whose minimum changes.
    pure subroutine change(positions, minimum, before, levels, contact, coordinate)
       integer, intent(in) :: positions
       real(wp), intent(inout) :: minimum(positions)
@@ -146,8 +133,8 @@ contains
       minimum = min(min(part(1), part(2)), min(part(3), part(4)))
    end function min_of
 
-   !> The first branch of a node that is not above the minimum, without a branch of the program:
-   !> which one it is could not be guessed.
+   !> The first branch of a node that is not above the minimum, without a conditional branch, which
+   !> could not be predicted.
    pure function first_of(branch, minimum) result(position)
       real(wp), intent(in) :: branch(branches), minimum
       integer :: position
@@ -160,19 +147,16 @@ contains
       end do
    end function first_of
 
-   !> Forget all contacts.
+   !> Remove all contacts.
    pure subroutine clear(self)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
 
       self%minimum = never
    end subroutine clear
 
-   !> Put a contact in, to be followed by arrange.
+   !> Insert a contact, followed by arrange.
    pure subroutine put(self, contact, coordinate)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
       !> Coordinate at which it breaks [m]
       real(wp), intent(in) :: coordinate
@@ -182,7 +166,6 @@ contains
 
    !> Rebuild the tree from its contacts.
    pure subroutine arrange(self)
-      !> The tree
       class(break_tree_type), intent(inout) :: self
 
       integer :: level, node, nodes
@@ -197,23 +180,20 @@ contains
       end do
    end subroutine arrange
 
-   !> Coordinate at which the first contact breaks.
+   !> Coordinate at which the first contact breaks [m]; huge without contacts.
    pure function first(self) result(coordinate)
-      !> The tree
       class(break_tree_type), intent(in) :: self
-      !> The coordinate, huge without contacts [m]
       real(wp) :: coordinate
 
       coordinate = self%minimum(size(self%minimum))
    end function first
 
-   !> A contact that breaks at a coordinate: the first one, or of many the lowest in number.
+   !> The first contact that breaks up to a coordinate; of equal ones that of the lowest number.
    pure function due(self, coordinate) result(contact)
-      !> The tree
       class(break_tree_type), intent(in) :: self
       !> Coordinate of the slider [m]
       real(wp), intent(in) :: coordinate
-      !> Number of the contact; 0 if none breaks
+      !> Number of the contact; 0 if no contact breaks
       integer :: contact
 
       integer :: level, position

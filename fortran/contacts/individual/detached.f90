@@ -1,8 +1,7 @@
 !> Detached contacts in the order in which they attach again.
 !>
-!> Where all wait for the same delay the order is that of breaking: a ring. Where each has a delay
-!> of its own, the next ones are a sorted list, and those after them a binary heap, which uses the
-!> arrays of the ring from their start.
+!> If all have the same delay, the order is that of breaking: a ring. If delays differ, the next
+!> ones are a sorted list and the others a binary heap, which uses the arrays of the ring.
 module mesoslip_contacts_individual_detached
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -12,39 +11,34 @@ module mesoslip_contacts_individual_detached
 
    public :: detached_contacts_type, new_detached_contacts
 
-   !> Numbers kept for a contact: when it attaches again [s], its drag until then [N s/m]
+   !> Values of a contact: time at which it attaches [s], drag until then [N s/m]
    integer, parameter :: length = 2, row_due = 1, row_drag = 2
-   !> Contacts that are moved from the heap to the sorted list at once, and maximum length of that
+   !> Contacts that move from the heap to the sorted list at once, and maximum length of the list
    integer, parameter :: moved_together = 96, max_sorted = 256
 
    !> The detached contacts.
    type :: detached_contacts_type
       !> Their number
       integer :: count = 0
-      !> Time at which the next one attaches; huge when none does [s]
+      !> Time at which the next one attaches [s]; huge without one
       real(wp) :: next_due = huge(1.0_wp)
-      !> Whether they attach again, and whether they do so in the order in which they broke
+      !> Whether they attach again, and whether in the order of breaking
       logical, private :: attach = .true., in_order = .true.
-      !> Number of contacts in all, and the position of the first one in the ring, from 0
+      !> Number of all contacts, and position of the first in the ring, from 0
       integer, private :: capacity = 0, first = 0
-      !> The ring: numbers of the contacts, shape (capacity), and what is kept for them, shape
-      !> (length, capacity)
+      !> The ring: numbers of the contacts, shape (capacity), and values, shape (length, capacity)
       integer, allocatable, private :: contact(:)
       real(wp), allocatable, private :: value(:, :)
-      !> The sorted list from its first position to its last one: the same of each
+      !> The sorted list, from its first position to its last
       integer, private :: sorted_first = 1, sorted_last = 0
       integer, private :: sorted_contact(max_sorted) = 0
       real(wp), private :: sorted_value(length, max_sorted) = 0.0_wp
    contains
-      !> Put a contact in
-      procedure, non_overridable :: push
-      !> The contact that attaches next
-      procedure, non_overridable :: find_next
-      !> Take the contact out that attaches next
-      procedure, non_overridable :: pop
-      !> The next contacts and their times
+      !> Add a contact, find or remove the one that attaches next
+      procedure, non_overridable :: push, find_next, pop
+      !> The next contacts to attach, and their times
       procedure, non_overridable :: preview
-      !> Put the state into an archive or take it out
+      !> Write the state to an archive, or read it
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: sift_up, sift_down, heap_count, push_heap, &
          & push_sorted, sort_next, heap_all
@@ -54,11 +48,10 @@ contains
 
    !> Set up without contacts.
    subroutine new_detached_contacts(self, capacity, attach, in_order, error)
-      !> The detached contacts
       type(detached_contacts_type), intent(out) :: self
-      !> Number of contacts in all
+      !> Number of all contacts
       integer, intent(in) :: capacity
-      !> Whether detached contacts attach again, and whether all wait for the same delay
+      !> Whether detached contacts attach again, and whether all have the same delay
       logical, intent(in) :: attach, in_order
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -73,13 +66,12 @@ contains
       if (stat /= 0) call raise(error, status_memory, "not enough memory for detached contacts")
    end subroutine new_detached_contacts
 
-   !> Put a contact in, behind all others if all wait for the same delay.
+   !> Add a contact, after all others if all have the same delay.
    pure subroutine push(self, contact, due, drag)
-      !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
-      !> When it attaches again [s], and its drag until then [N s/m]
+      !> Time at which it attaches [s], and its drag until then [N s/m]
       real(wp), intent(in) :: due, drag
 
       integer :: position
@@ -113,11 +105,10 @@ contains
       number = self%count - (self%sorted_last - self%sorted_first + 1)
    end function heap_count
 
-   !> Put a contact into the heap, before it is counted.
+   !> Add a contact to the heap, before it is counted.
    pure subroutine push_heap(self, contact, value)
       class(detached_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Its record
       real(wp), intent(in) :: value(length)
 
       integer :: place
@@ -128,11 +119,10 @@ contains
       call self%sift_up(place)
    end subroutine push_heap
 
-   !> Put a contact into the sorted list, before it is counted, if it is not after all of that.
+   !> Insert a contact into the sorted list, before its last one, before it is counted.
    pure subroutine push_sorted(self, contact, value)
       class(detached_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Its record
       real(wp), intent(in) :: value(length)
 
       integer :: place, number, moved
@@ -149,7 +139,7 @@ contains
          self%sorted_first = self%sorted_first - 1
       else
          if (self%sorted_last == max_sorted) then
-            ! The last one goes to the heap.
+            ! The last one moves to the heap.
             moved = self%sorted_contact(max_sorted)
             last = self%sorted_value(:, max_sorted)
             self%sorted_last = max_sorted - 1
@@ -196,7 +186,7 @@ contains
       end do
    end subroutine sort_next
 
-   !> Put all contacts into the heap.
+   !> Move all contacts to the heap.
    pure subroutine heap_all(self)
       class(detached_contacts_type), intent(inout) :: self
 
@@ -214,11 +204,9 @@ contains
       self%sorted_last = 0
    end subroutine heap_all
 
-   !> The contact that attaches next.
+   !> The contact that attaches next; there is at least one.
    pure subroutine find_next(self, contact)
-      !> The detached contacts, at least one
       class(detached_contacts_type), intent(inout) :: self
-      !> Its number
       integer, intent(out) :: contact
 
       if (self%in_order) then
@@ -229,9 +217,8 @@ contains
       end if
    end subroutine find_next
 
-   !> Take the contact out that attaches next.
+   !> Remove the contact that attaches next; there is at least one.
    pure subroutine pop(self, contact, drag)
-      !> The detached contacts, at least one
       class(detached_contacts_type), intent(inout) :: self
       !> Its number, and its drag while it was detached [N s/m]
       integer, intent(out) :: contact
@@ -256,10 +243,10 @@ contains
       end if
    end subroutine pop
 
-   !> Move the last contact of the heap up to its place.
+   !> Move the last contact of the heap up.
    pure subroutine sift_up(self, last)
       class(detached_contacts_type), intent(inout) :: self
-      !> Its place now
+      !> Its position
       integer, intent(in) :: last
 
       integer :: place, above, contact
@@ -279,10 +266,10 @@ contains
       self%value(:, place) = kept
    end subroutine sift_up
 
-   !> Move the first contact of the heap down to its place.
+   !> Move the first contact of the heap down.
    pure subroutine sift_down(self, number)
       class(detached_contacts_type), intent(inout) :: self
-      !> Contacts in the heap
+      !> Number of contacts in the heap
       integer, intent(in) :: number
 
       integer :: place, below, contact
@@ -308,16 +295,13 @@ contains
 
    !> The next contacts to attach, and their times.
    pure subroutine preview(self, limit, number, contact, due, drag)
-      !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
       !> Maximum number
       integer, intent(in) :: limit
-      !> How many they are
-      integer, intent(out) :: number
-      !> Their numbers, shape (limit)
-      integer, intent(out) :: contact(:)
-      !> When they attach, and then when the next one does that is not listed, huge if none does
-      !> [s]; their drags until then [N s/m]
+      !> Their number, and the contacts, shape (limit)
+      integer, intent(out) :: number, contact(:)
+      !> Times at which they attach, followed by that of the next contact, huge without one [s];
+      !> their drags until then [N s/m]
       real(wp), intent(inout) :: due(:), drag(:)
 
       integer :: event, position
@@ -350,11 +334,9 @@ contains
       if (self%attach .and. self%count > number) due(number + 1) = self%value(row_due, position + 1)
    end subroutine preview
 
-   !> Put the state into an archive or take it out.
+   !> Write the state to an archive, or read it.
    subroutine exchange(self, archive)
-      !> The detached contacts
       class(detached_contacts_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call self%heap_all()

@@ -1,4 +1,4 @@
-!> Lattices without edges: who is next to whom.
+!> Lattices without edges: the neighbours of each site.
 module mesoslip_contacts_individual_neighbours
    implicit none
    private
@@ -21,7 +21,6 @@ contains
    elemental function coordination(lattice) result(number)
       !> One of the lattice_ codes
       integer, intent(in) :: lattice
-      !> Their number
       integer :: number
 
       number = 0
@@ -31,16 +30,16 @@ contains
 
    !> Neighbours of a site. Sites are numbered from 1, row by row.
    !>
-   !> They are computed each time: a table of them would come out of the memory, which takes longer.
-   !> With two rows or columns in all, a site is the neighbour of another twice.
+   !> They are computed each time, which is faster than loading a table from memory. On a lattice of
+   !> two rows or columns a site is the neighbour of another twice.
    pure subroutine find_neighbours(lattice, columns, rows, site, neighbour)
       !> One of the lattice_ codes
       integer, intent(in) :: lattice
-      !> Columns and rows; of a triangular lattice an even number of rows
+      !> Columns and rows; the rows of a triangular lattice are even in number
       integer, intent(in) :: columns, rows
       !> Number of the site
       integer, intent(in) :: site
-      !> Numbers of the neighbours, shape (max_neighbours), of which the first ones are set
+      !> Numbers of the neighbours; 0 beyond the last
       integer, intent(out) :: neighbour(max_neighbours)
 
       integer :: column, row, left, right, up, down

@@ -1,9 +1,9 @@
 !> The queue of pinned contacts, in the order in which they break.
 !>
 !> Keys are coordinates along the direction of motion. They lie in a narrow window ahead of the
-!> slider, whose width is known, so contacts are thrown into a ring of buckets by key and only the
-!> foremost bucket is sorted. The cost of a contact does not grow with the number of contacts, and
-!> records are fetched a bucket at a time, which hides the latency of memory.
+!> slider, whose width is known: contacts go into a ring of buckets by key, and only the front
+!> bucket is sorted. The cost of a contact does not grow with the number of contacts, and records
+!> are fetched a bucket at a time, which hides the latency of memory.
 module mesoslip_contacts_individual_queue
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -17,14 +17,14 @@ module mesoslip_contacts_individual_queue
    !> First key of an empty queue
    real(wp), parameter :: no_key = huge(1.0_wp)
 
-   !> Contacts in a chunk of a bucket: 16 numbers of 4 bytes fill a cache line.
+   !> Contacts in a chunk of a bucket: 16 numbers of 4 bytes fill a cache line
    integer, parameter :: chunk_length = 16
-   !> Mean number of contacts in a bucket when keys are spread evenly.
+   !> Mean number of contacts in a bucket if keys are uniform
    integer, parameter :: bucket_load = 16
    integer, parameter :: min_buckets = 64
-   !> Contacts that are sorted again for one that came later, at most
+   !> Maximum number of contacts that are sorted again for each late one
    integer, parameter :: max_left = 2 * bucket_load
-   !> Bound on bucket numbers, for keys far beyond any motion.
+   !> Upper bound of bucket numbers, for keys far beyond any motion
    real(wp), parameter :: max_bucket = 1.0e15_wp
 
    !> A priority queue of contacts by key, then by number.
@@ -38,14 +38,14 @@ module mesoslip_contacts_individual_queue
       !> Direction of motion, +1 or -1, and coordinate of the edge of bucket 0
       real(wp) :: direction = 1.0_wp, edge = 0.0_wp
       real(wp) :: inverse_width = 1.0_wp
-      !> The front: contacts with a bucket number up to this one; sorted when it was advanced, and
-      !> a heap of those that came later
+      !> The front: contacts with a bucket number up to this one. Those there when it advanced are
+      !> sorted, late ones are in a heap.
       integer(i8) :: front_bucket = -1
       integer :: front_next = 1, front_count = 0, late_count = 0
       real(wp), allocatable :: front_key(:), late_key(:)
       integer, allocatable :: front_contact(:), late_contact(:)
-      !> The ring of buckets, each a chain of chunks with the last one first, and behind it one
-      !> bucket for contacts beyond the ring
+      !> The ring of buckets, each a chain of chunks with the last one first, then one bucket for
+      !> contacts beyond the ring
       integer(i8) :: ring_length = 0
       integer :: ring_count = 0, overflow = 0
       integer(i8) :: overflow_first = huge(1_i8)
@@ -53,15 +53,10 @@ module mesoslip_contacts_individual_queue
       integer, allocatable :: chunk_contact(:, :), chunk_next(:)
       integer :: free_chunk = 0
    contains
-      !> Forget all contacts
-      procedure, non_overridable :: clear
-      !> Put a contact in
-      procedure, non_overridable :: insert
-      !> Take the first contact out
-      procedure, non_overridable :: pop
-      !> The first contacts, and taking some of them out
-      procedure, non_overridable :: preview
-      procedure, non_overridable :: remove_previewed
+      !> Insert a contact, remove the first one, remove all
+      procedure, non_overridable :: insert, pop, clear
+      !> The first contacts, and removal of some of them
+      procedure, non_overridable :: preview, remove_previewed
       procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
          & find_first, absorb_late
    end type contact_queue_type
@@ -70,7 +65,6 @@ contains
 
    !> Set up an empty queue.
    subroutine new_contact_queue(self, capacity, span, error)
-      !> The queue
       type(contact_queue_type), intent(out) :: self
       !> Maximum number of contacts
       integer, intent(in) :: capacity
@@ -101,9 +95,8 @@ contains
       call self%clear(1.0_wp, 0.0_wp)
    end subroutine new_contact_queue
 
-   !> Forget all contacts.
+   !> Remove all contacts.
    pure subroutine clear(self, direction, coordinate)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Direction of motion, +1 or -1
       real(wp), intent(in) :: direction
@@ -130,9 +123,8 @@ contains
       self%free_chunk = size(self%chunk_next)
    end subroutine clear
 
-   !> Put a contact in.
+   !> Insert a contact.
    subroutine insert(self, contact, key)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Number of the contact, not in the queue
       integer, intent(in) :: contact
@@ -159,9 +151,8 @@ contains
       self%first_key = min(self%first_key, key)
    end subroutine insert
 
-   !> Take the first contact out.
+   !> Remove the first contact of a queue that is not empty.
    subroutine pop(self, record, contact)
-      !> The queue, not empty
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
@@ -191,9 +182,8 @@ contains
       call self%find_first(record)
    end subroutine pop
 
-   !> The first contacts, in their order: no other contact has the key of one of them.
+   !> The first contacts in their order; no other contact has the key of one of them.
    subroutine preview(self, record, limit, contact, key, number)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
@@ -203,7 +193,7 @@ contains
       integer, intent(out) :: contact(:)
       !> Coordinates at which they break [m]
       real(wp), intent(out) :: key(:)
-      !> How many they are; none if that would take a look at all contacts
+      !> Their number; 0 if all contacts would have to be examined
       integer, intent(out) :: number
 
       number = 0
@@ -229,8 +219,8 @@ contains
       contact(:number) = self%front_contact(self%front_next:self%front_next + number - 1)
    end subroutine preview
 
-   !> Sort those that came later in among the front, if the first of all is one of them and that is
-   !> not much work for each.
+   !> Merge the late contacts into the front, if the first of all is one of them and few have to be
+   !> sorted again.
    subroutine absorb_late(self)
       class(contact_queue_type), intent(inout) :: self
 
@@ -252,13 +242,12 @@ contains
       call sort(self%front_key, self%front_contact, self%front_count)
    end subroutine absorb_late
 
-   !> Take the first contacts out, which a preview showed.
+   !> Remove the first contacts, which a preview returned.
    subroutine remove_previewed(self, record, number)
-      !> The queue
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
-      !> How many
+      !> Their number
       integer, intent(in) :: number
 
       self%front_next = self%front_next + number
@@ -289,12 +278,12 @@ contains
       real(wp) :: position
 
       position = (key - self%edge) * self%inverse_width
-      ! Keys behind the slider go to the front whatever their number.
+      ! Keys behind the slider go to the front.
       bucket = int(min(max(position, -1.0_wp), max_bucket), i8)
       if (position < 0.0_wp) bucket = -1
    end function bucket_of
 
-   !> Put a contact into a bucket.
+   !> Append a contact to a bucket.
    pure subroutine append(self, slot, contact)
       class(contact_queue_type), intent(inout) :: self
       integer, intent(in) :: slot, contact
@@ -314,7 +303,7 @@ contains
       self%bucket_count(slot) = self%bucket_count(slot) + 1
    end subroutine append
 
-   !> Take all contacts out of a bucket, into the front's arrays.
+   !> Move all contacts of a bucket into the front's arrays.
    pure subroutine empty_bucket(self, slot)
       type(contact_queue_type), intent(inout) :: self
       integer, intent(in) :: slot
@@ -341,7 +330,7 @@ contains
       self%bucket_count(slot) = 0
    end subroutine empty_bucket
 
-   !> Make the next bucket that is not empty the front, and sort it.
+   !> Make the next nonempty bucket the front, and sort it.
    subroutine advance_front(self, record)
       class(contact_queue_type), intent(inout) :: self
       real(wp), intent(in), contiguous :: record(:, :)
@@ -369,9 +358,7 @@ contains
       call sort(self%front_key, self%front_contact, self%front_count)
    end subroutine advance_front
 
-   !> Move contacts from beyond the ring into it, where the ring has come to reach them.
-   !>
-   !> Called while the front is empty.
+   !> Move contacts from beyond the ring into it, as far as it reaches now. The front is empty.
    subroutine take_overflow(self, record)
       class(contact_queue_type), intent(inout) :: self
       real(wp), intent(in), contiguous :: record(:, :)

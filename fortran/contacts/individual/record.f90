@@ -1,4 +1,4 @@
-!> The record of a contact: a column of numbers, in one line of the cache or two.
+!> The record of a contact: a column of numbers, in one cache line or two.
 module mesoslip_contacts_individual_record
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -15,32 +15,28 @@ module mesoslip_contacts_individual_record
    integer, parameter :: row_stiffness = 2
    !> Stretch at which the contact breaks, in either direction [m]
    integer, parameter :: row_limit = 3
-   !> How often the contact has been born again: a whole number
+   !> Number of renewals, a whole number
    integer, parameter :: row_renewal = 4
-   !> Relative threshold that the contact will have when it is born the next time
+   !> Relative threshold of the next birth; 0 if it has not been drawn
    integer, parameter :: row_next = 5
 
 contains
 
-   !> Coordinate along the direction of motion at which a pinned contact breaks.
+   !> Coordinate along the direction of motion at which a pinned contact breaks [m].
    pure function ahead_coordinate(record, direction) result(coordinate)
-      !> Record of the contact
       real(wp), intent(in) :: record(record_length)
       !> Direction of motion, +1 or -1
       real(wp), intent(in) :: direction
-      !> Coordinate, direction times displacement [m]
       real(wp) :: coordinate
 
       coordinate = direction * record(row_origin) + record(row_limit)
    end function ahead_coordinate
 
-   !> Coordinate along the direction of motion at which a pinned contact breaks on the way back.
+   !> Coordinate along the direction of motion at which it breaks after a reversal [m].
    pure function behind_coordinate(record, direction) result(coordinate)
-      !> Record of the contact
       real(wp), intent(in) :: record(record_length)
       !> Direction of motion, +1 or -1
       real(wp), intent(in) :: direction
-      !> Coordinate, direction times displacement [m]
       real(wp) :: coordinate
 
       coordinate = direction * record(row_origin) - record(row_limit)

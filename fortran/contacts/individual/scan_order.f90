@@ -1,9 +1,9 @@
-!> Contacts in the order of a key, any of which may leave at any time.
+!> Contacts in the order of a key, any of which may be removed at any time.
 !>
-!> The keys of all contacts are side by side. Those below a horizon are sorted; when they are used
-!> up, all keys are scanned for the next ones, of which there are so many that a contact costs the
-!> same whatever the number of contacts. One that has left is found to be gone at its turn, as its
-!> key is another one.
+!> The keys of all contacts are in one array. Those below a horizon are sorted; when they are used
+!> up, all keys are scanned for the next ones. The number of these grows with that of all contacts,
+!> so that the cost of a contact does not. A removed contact is noticed at its turn, when its key
+!> has changed.
 module mesoslip_contacts_individual_scan_order
    use mesoslip_contacts_individual_sorting, only: before, push, remove_first, sort
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -13,22 +13,22 @@ module mesoslip_contacts_individual_scan_order
 
    public :: scan_order_type, new_scan_order
 
-   !> Maximum of keys that are counted in another unit
+   !> Maximum of keys that are rescaled
    real(wp), parameter :: max_key = 1.0e290_wp
    !> Key of a contact that is not in the order
    real(wp), parameter :: none = huge(1.0_wp)
-   !> Contacts in a scan: so many at first, then twice as many each time, up to this part of all
-   integer, parameter :: part = 8, min_scan = 64
-   !> Room for contacts that come late, before the sorted ones, and the maximum number of those that
+   !> Contacts wanted of the first scan; doubled in each scan up to this part of all contacts, 1/8
+   integer, parameter :: min_scan = 64, part = 8
+   !> Room for late contacts before the sorted ones, and the maximum number of sorted ones that
    !> move to make room again
    integer, parameter :: slack = 64, max_moved = 4096
-   !> Part of all contacts above which those that came late are worth a scan
+   !> Late contacts beyond this part of all, 1/16, cause a new scan
    integer, parameter :: late_part = 16
-   !> Bins in which contacts are sorted: their number, contacts in one, and the maximum
+   !> Bins in which contacts are sorted: their maximum number, mean and maximum contacts in one
    integer, parameter :: max_bins = 4096, bin_load = 4, max_load = 64
-   !> Keys that are drawn to find a horizon
+   !> Keys that are sampled to estimate a horizon
    integer, parameter :: samples = 64
-   !> Factor by which the distance to the next horizon is another one, at most
+   !> Maximum factor by which the distance to the next horizon changes
    real(wp), parameter :: max_factor = 4.0_wp
 
    !> Contacts in the order of their keys, then of their numbers.
@@ -36,35 +36,29 @@ module mesoslip_contacts_individual_scan_order
       private
       !> Key of each contact, shape (capacity)
       real(wp), allocatable :: key(:)
-      !> Contacts with keys below the horizon are sorted, or are late; the distance to the next one
+      !> Horizon: contacts with keys below are sorted, or late; distance to the next horizon
       real(wp) :: horizon = -none, reach = 0.0_wp
+      !> Number of contacts wanted of a scan
       integer :: wanted = min_scan
-      !> Those sorted that are left
+      !> The remaining sorted contacts
       integer :: next = 1, last = 0
       real(wp), allocatable :: near_key(:)
       integer, allocatable :: near_contact(:)
-      !> A heap of those that came after the scan
+      !> A heap of late contacts, inserted after the scan
       integer :: late_count = 0
       real(wp), allocatable :: late_key(:)
       integer, allocatable :: late_contact(:)
    contains
-      !> Forget all contacts
-      procedure, non_overridable :: clear
-      !> Put a contact in, or change its key
-      procedure, non_overridable :: put
-      !> Take a contact out
-      procedure, non_overridable :: remove
-      !> Count all keys from another origin and in another unit
+      !> Insert or change a contact, remove one, remove all
+      procedure, non_overridable :: put, remove, clear
+      !> Shift and rescale all keys
       procedure, non_overridable :: rescale
-      !> The lowest key, once or again and again
-      procedure, non_overridable :: lowest
-      procedure, non_overridable :: first
-      !> Forget which contacts come next, so that putting one in takes less time
+      !> The lowest key: by one pass over all keys, or by their order
+      procedure, non_overridable :: lowest, first
+      !> The first contact if its key has been reached, and the first contacts in their order
+      procedure, non_overridable :: due, preview
+      !> Discard the order of the next contacts, so that insertion is cheaper
       procedure, non_overridable :: rest
-      !> A contact the key of which has come
-      procedure, non_overridable :: due
-      !> The first contacts in their order
-      procedure, non_overridable :: preview
       procedure, non_overridable, private :: find_next, scan, estimate_reach, absorb
    end type scan_order_type
 
@@ -72,7 +66,6 @@ contains
 
    !> Set up without contacts.
    subroutine new_scan_order(self, capacity, error)
-      !> The order
       type(scan_order_type), intent(out) :: self
       !> Number of contacts
       integer, intent(in) :: capacity
@@ -81,7 +74,7 @@ contains
 
       integer :: stat
 
-      ! A scan writes one more, which it then does not count.
+      ! A scan writes one entry beyond those that it counts.
       allocate (self%key(capacity), stat=stat)
       if (stat == 0) allocate (self%near_key(slack + capacity + 1), stat=stat)
       if (stat == 0) allocate (self%near_contact(slack + capacity + 1), stat=stat)
@@ -94,18 +87,16 @@ contains
       call self%clear()
    end subroutine new_scan_order
 
-   !> Forget all contacts.
+   !> Remove all contacts.
    pure subroutine clear(self)
-      !> The order
       class(scan_order_type), intent(inout) :: self
 
       self%key = none
       call self%rest()
    end subroutine clear
 
-   !> Forget which contacts come next, so that putting one in takes less time.
+   !> Discard the order of the next contacts, so that insertion is cheaper.
    pure subroutine rest(self)
-      !> The order
       class(scan_order_type), intent(inout) :: self
 
       self%horizon = -none
@@ -116,17 +107,15 @@ contains
       self%late_count = 0
    end subroutine rest
 
-   !> The lowest key, once.
+   !> The lowest key, by one pass over all keys; huge without contacts.
    pure function lowest(self) result(key)
-      !> The order
       class(scan_order_type), intent(in) :: self
-      !> The key, huge without contacts
       real(wp) :: key
 
       real(wp) :: least(4)
       integer :: position
 
-      ! Four at a time, which do not wait for each other.
+      ! Four independent minima at a time.
       least = none
       do position = 1, size(self%key) - 3, 4
          least = min(least, self%key(position:position + 3))
@@ -137,19 +126,16 @@ contains
       end do
    end function lowest
 
-   !> Put a contact in, or change its key.
+   !> Insert a contact, or change its key.
    pure subroutine put(self, contact, key)
-      !> The order
       class(scan_order_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Its key
       real(wp), intent(in) :: key
 
       self%key(contact) = key
       if (.not. key < self%horizon) return
       if (self%late_count == size(self%late_key)) then
-         ! Most of them have left since.
+         ! Most of them have been removed since.
          call self%rest()
          return
       end if
@@ -157,25 +143,22 @@ contains
       call push(self%late_key, self%late_contact, self%late_count, key, contact)
    end subroutine put
 
-   !> Take a contact out.
+   !> Remove a contact.
    pure subroutine remove(self, contact)
-      !> The order
       class(scan_order_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
 
       self%key(contact) = none
    end subroutine remove
 
-   !> Count all keys from another origin and in another unit, which keeps their order.
+   !> Shift and rescale all keys, which keeps their order.
    pure subroutine rescale(self, origin, factor, count, is_done)
-      !> The order
       class(scan_order_type), intent(inout) :: self
-      !> The origin, and one over the unit
+      !> The new origin, and the factor
       real(wp), intent(in) :: origin, factor
       !> Number of contacts
       integer, intent(in) :: count
-      !> Whether it was done; not if it is not all of them that have keys, or a key is too large
+      !> Whether it was done; not if contacts have no keys, or a key is too large
       logical, intent(out) :: is_done
 
       real(wp) :: highest
@@ -201,11 +184,9 @@ contains
       self%late_key(:self%late_count) = (self%late_key(:self%late_count) - origin) * factor
    end subroutine rescale
 
-   !> The lowest key, to be asked for again and again.
+   !> The lowest key, by the order of the next contacts; huge without contacts.
    pure subroutine first(self, key)
-      !> The order
       class(scan_order_type), intent(inout) :: self
-      !> The key, huge without contacts
       real(wp), intent(out) :: key
 
       logical :: is_late
@@ -219,13 +200,12 @@ contains
       end if
    end subroutine first
 
-   !> A contact the key of which has come: the first one.
+   !> The first contact if its key has been reached.
    pure subroutine due(self, reading, contact)
-      !> The order
       class(scan_order_type), intent(inout) :: self
-      !> Upper bound of the key
+      !> Reading up to which keys have been reached
       real(wp), intent(in) :: reading
-      !> Number of the contact, which stays; 0 if none is due
+      !> Number of the contact, which is not removed; 0 if no contact is due
       integer, intent(out) :: contact
 
       logical :: is_late
@@ -242,7 +222,7 @@ contains
    !> Find the next contact.
    pure subroutine find_next(self, is_late)
       class(scan_order_type), intent(inout) :: self
-      !> Whether it is the first of those that came late; if not, the first sorted one, if any
+      !> Whether it is the first late contact; otherwise it is the first sorted one, if any
       logical, intent(out) :: is_late
 
       do
@@ -265,7 +245,7 @@ contains
       end if
    end subroutine find_next
 
-   !> Drop the first of those that came late.
+   !> Drop the first late contact.
    pure subroutine drop_late(self)
       class(scan_order_type), intent(inout) :: self
 
@@ -273,7 +253,7 @@ contains
       self%late_count = self%late_count - 1
    end subroutine drop_late
 
-   !> Sort the contacts up to the next horizon, there being none before the present one.
+   !> Sort the contacts up to the next horizon; there are no contacts below the present one.
    pure subroutine scan(self)
       class(scan_order_type), intent(inout) :: self
 
@@ -289,7 +269,7 @@ contains
       if (self%reach < none - start) horizon = max(start + self%reach, nearest(start, 1.0_wp))
       last = slack
       associate (key => self%key, near_key => self%near_key, near_contact => self%near_contact)
-         ! Without a branch of the program: each is written, and counted if it is below.
+         ! Without a branch: each is written, and counted if it is below.
          do contact = 1, size(key)
             near_key(last + 1) = key(contact)
             near_contact(last + 1) = contact
@@ -313,11 +293,11 @@ contains
       end if
    end subroutine scan
 
-   !> Sort contacts by key, then by number, whose keys lie between two rather evenly.
+   !> Sort contacts by key, then by number; the keys are nearly uniform between two values.
    pure subroutine sort_evenly(key, contact, start, horizon)
       real(wp), intent(inout), contiguous :: key(:)
       integer, intent(inout), contiguous :: contact(:)
-      !> The two keys
+      !> The two values
       real(wp), intent(in) :: start, horizon
 
       integer, allocatable :: bin(:), last_contact(:)
@@ -370,7 +350,7 @@ contains
       end do
    end subroutine sort_evenly
 
-   !> Estimate how far a horizon is before which there are as many contacts as wanted.
+   !> Estimate the distance to a horizon with the wanted number of contacts below.
    pure subroutine estimate_reach(self, start)
       class(scan_order_type), intent(inout) :: self
       !> The lowest key
@@ -390,10 +370,10 @@ contains
       if (.not. self%reach > 0.0_wp) self%reach = none
    end subroutine estimate_reach
 
-   !> Sort those that came late in among the first of the others.
+   !> Merge the late contacts into the first sorted ones.
    pure subroutine absorb(self, limit)
       class(scan_order_type), intent(inout) :: self
-      !> How many others
+      !> Number of these sorted ones
       integer, intent(in) :: limit
 
       integer :: position, contact
@@ -431,7 +411,7 @@ contains
       end do
    end subroutine absorb
 
-   !> Make room before the sorted contacts, if they are few enough.
+   !> Make room before the sorted contacts, unless they are too many.
    pure subroutine make_room(self)
       class(scan_order_type), intent(inout) :: self
 
@@ -442,16 +422,15 @@ contains
       self%last = slack + self%last
    end subroutine make_room
 
-   !> The first contacts in their order: no other contact has the key of one of them.
+   !> The first contacts in their order; no other contact has the key of one of them.
    pure subroutine preview(self, limit, contact, key, number)
-      !> The order
       class(scan_order_type), intent(inout) :: self
       !> Maximum number
       integer, intent(in) :: limit
-      !> Their numbers and keys
+      !> Contacts and their keys
       integer, intent(out) :: contact(:)
       real(wp), intent(out) :: key(:)
-      !> How many they are; none perhaps of those that are there
+      !> Their number; may be 0 although there are contacts
       integer, intent(out) :: number
 
       real(wp) :: beyond
@@ -464,7 +443,7 @@ contains
       do position = self%next, self%last
          associate (one => self%near_contact(position))
             if (abs(self%near_key(position) - self%key(one)) > 0.0_wp) cycle
-            ! One that has left and come back with the same key is there twice.
+            ! A contact that was removed and inserted again with the same key is there twice.
             if (number > 0) then
                if (contact(number) == one) cycle
             end if

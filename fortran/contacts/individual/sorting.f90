@@ -1,4 +1,4 @@
-!> Contacts in the order of a key, then of their number: sorting, and a binary heap.
+!> Sorting contacts by key, then by number, and a binary heap of them.
 module mesoslip_contacts_individual_sorting
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -6,7 +6,7 @@ module mesoslip_contacts_individual_sorting
 
    public :: before, push, remove_first, sort, sort_in_place
 
-   !> Beyond this length sorting by counting gives way to merging.
+   !> Maximum length that is sorted by counting; longer runs are merged
    integer, parameter :: short_run = 32
 
 contains
@@ -20,7 +20,7 @@ contains
       before = key_a < key_b .or. (key_a <= key_b .and. contact_a < contact_b)
    end function before
 
-   !> Put a contact into a binary heap, the last position of which is free.
+   !> Insert a contact into a binary heap, the last position of which is free.
    pure subroutine push(heap_key, heap_contact, count, key, contact)
       real(wp), intent(inout), contiguous :: heap_key(:)
       integer, intent(inout), contiguous :: heap_contact(:)
@@ -70,7 +70,7 @@ contains
    end subroutine remove_first
 
    !> Sort contacts by key, then by number: short runs by counting, longer ones by merging, or in
-   !> place if there is not enough memory for that.
+   !> place without enough memory.
    pure subroutine sort(key, contact, count)
       real(wp), intent(inout), contiguous :: key(:)
       integer, intent(inout), contiguous :: contact(:)
@@ -103,7 +103,7 @@ contains
       end do
    end subroutine sort
 
-   !> Sort contacts by key, then by number, without more memory: by a heap.
+   !> Sort contacts by key, then by number, in place: by a heap.
    pure subroutine sort_in_place(key, contact, count)
       real(wp), intent(inout), contiguous :: key(:)
       integer, intent(inout), contiguous :: contact(:)
@@ -135,14 +135,14 @@ contains
       end do
    end subroutine sort_in_place
 
-   !> Sort one run by counting how many keys are smaller than each, without a branch that depends on
-   !> them, or by insertion if keys are equal.
+   !> Sort one run by counting the smaller keys for each, without a branch that depends on keys, or
+   !> by insertion if keys are equal.
    pure subroutine sort_run(key, contact, count)
       integer, intent(in) :: count
       real(wp), intent(inout) :: key(count)
       integer, intent(inout) :: contact(count)
 
-      ! Places are reals as keys are, so that two are compared and counted at once.
+      ! Places are reals like the keys, so that two are compared and counted at once.
       real(wp) :: unsorted_key(short_run), place(short_run)
       integer :: unsorted_contact(short_run), one
 
@@ -156,7 +156,7 @@ contains
             & + merge(1.0_wp, 0.0_wp, unsorted_key(one) < unsorted_key(:count))
       end do
       if (nint(sum(place(:count))) /= (count * (count + 1)) / 2) then
-         ! Keys that are equal share a place.
+         ! Equal keys share a place.
          call insertion_sort(key, contact, count)
          return
       end if

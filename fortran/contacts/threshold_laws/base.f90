@@ -1,12 +1,12 @@
 !> Interface of every threshold law: thresholds to draw, density and survival function.
 !>
 !> Thresholds are relative, u = f_si/f_s. A law has mean 1 before thresholds that could not attach,
-!> u <= minimum, are rejected. Rejecting is done by inversion: the law that is left is the same as
-!> that of drawing again, and one draw consumes one deviate.
+!> u <= minimum, are rejected. Rejection is done by inversion: the conditional law is that of
+!> drawing again, and one draw consumes one deviate.
 !>
 !> A table may have a stiffness for each threshold. Its law is that of the relative break stretches
-!> x_s = f_s/k, which stand for thresholds in quantiles, densities and survival: contacts break in
-!> their order, and each has one stiffness.
+!> x_s = f_s/k, which replace thresholds in quantiles, densities and survival: contacts break in
+!> their order, and each stretch has one stiffness.
 module mesoslip_contacts_threshold_laws_base
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: wp
@@ -15,7 +15,7 @@ module mesoslip_contacts_threshold_laws_base
    implicit none
    private
 
-   public :: threshold_law_type, take_relative_width
+   public :: threshold_law_type
 
    !> A law of relative thresholds, conditional on u > minimum.
    type, abstract :: threshold_law_type
@@ -25,63 +25,40 @@ module mesoslip_contacts_threshold_laws_base
       real(wp) :: minimum = 0.0_wp
       !> Probability that a draw is not rejected
       real(wp) :: acceptance = 1.0_wp
-      !> Whether the density varies with the logarithm of the threshold: thresholds close to 0 are
-      !> of many orders of magnitude
+      !> Whether the density is smooth in the logarithm of the threshold: thresholds span orders of
+      !> magnitude
       logical :: is_logarithmic = .false.
-      !> Number of cells in which the density is constant; 0 for a law with a formula
+      !> Number of cells in which the density is constant; 0 if it has no such cells
       integer :: cells = 0
       !> Whether the law is that of break stretches, each with a stiffness
       logical :: has_stiffnesses = .false.
-      !> Mean of the squared stiffnesses before rejection, that of contacts being 1: masses are
+      !> Mean squared stiffness before rejection, where the mean stiffness is 1: masses are
       !> proportional to squares
       real(wp) :: mean_square_stiffness = 1.0_wp
    contains
-      !> Take the parameters of the law
-      procedure(take_interface), deferred :: take
+      !> Take the parameters of the law, and compute its constants from its width
+      procedure :: take, set_constants
       !> Quantile, density and survival function before rejection
-      procedure(function_interface), deferred :: plain_quantile
-      procedure(function_interface), deferred :: plain_density
-      procedure(function_interface), deferred :: plain_survival
-      !> Thresholds that are exceeded with several probabilities, the same as those of quantile to
-      !> the bit: a law may find them in less time together
-      procedure :: quantiles
+      procedure(function_interface), deferred :: plain_quantile, plain_density, plain_survival
       !> Edges of the cells before rejection
       procedure :: cell_edges
-      !> Of a law with stiffnesses: what is left by rejection, and the stiffness of a break stretch
-      procedure :: stretch_cells
-      procedure :: stiffness_at
-      !> Reject what a force breaks of a law with stiffnesses
-      procedure :: reject_stretches
-      !> Threshold that is exceeded with a given probability
-      procedure, non_overridable :: quantile
-      !> Probability density
-      procedure, non_overridable :: density
-      !> Probability to exceed a threshold
-      procedure, non_overridable :: survival
+      !> For a law with stiffnesses: cells after rejection, stiffness at a break stretch, and
+      !> rejection of the contacts that a force breaks
+      procedure :: stretch_cells, stiffness_at, reject_stretches
       !> Reject thresholds at or below a minimum
       procedure, non_overridable :: reject_below
-      !> Smallest threshold that rejection leaves
-      procedure, non_overridable :: min_threshold
+      !> Quantile, density and survival function, and the smallest threshold
+      procedure, non_overridable :: quantile, density, survival, min_threshold
+      !> Quantiles of several probabilities, equal to those of quantile to the bit: some laws
+      !> compute them faster together
+      procedure :: quantiles
    end type threshold_law_type
 
    abstract interface
-      !> Take the parameters of the law.
-      subroutine take_interface(self, parameters, error)
-         import :: error_type, parameters_type, threshold_law_type
-         implicit none
-         !> The law
-         class(threshold_law_type), intent(inout) :: self
-         !> Named values
-         type(parameters_type), intent(inout) :: parameters
-         !> Set if one is missing, or the law does not exist
-         type(error_type), allocatable, intent(inout) :: error
-      end subroutine take_interface
-
       !> A function of the law before rejection.
       pure function function_interface(self, argument) result(value)
          import :: threshold_law_type, wp
          implicit none
-         !> The law
          class(threshold_law_type), intent(in) :: self
          !> Probability to exceed the threshold, or the threshold
          real(wp), intent(in) :: argument
@@ -92,25 +69,31 @@ module mesoslip_contacts_threshold_laws_base
 
 contains
 
-   !> Take the width of a law that has no other parameter.
-   subroutine take_relative_width(self, parameters, error)
-      !> The law
+   !> Take the parameters of the law: its relative width, unless a law has others.
+   subroutine take(self, parameters, error)
       class(threshold_law_type), intent(inout) :: self
       !> Named values
       type(parameters_type), intent(inout) :: parameters
-      !> Set if the width is missing or not positive
+      !> Set if one is missing or wrong
       type(error_type), allocatable, intent(inout) :: error
 
       call parameters%take("relative_width", self%width, error)
       if (allocated(error)) return
       if (.not. self%width > 0.0_wp) then
          call raise(error, status_invalid, "the relative width of a threshold law must be positive")
+         return
       end if
-   end subroutine take_relative_width
+      call self%set_constants()
+   end subroutine take
+
+   !> Compute the constants of the law from its width; by default there are none.
+   subroutine set_constants(self)
+      class(threshold_law_type), intent(inout) :: self
+
+   end subroutine set_constants
 
    !> Reject thresholds at or below a minimum.
    subroutine reject_below(self, minimum, error)
-      !> The law
       class(threshold_law_type), intent(inout) :: self
       !> Thresholds at or below are rejected; not negative
       real(wp), intent(in) :: minimum
@@ -134,7 +117,6 @@ contains
 
    !> Threshold that is exceeded with a given probability.
    elemental function quantile(self, probability) result(threshold)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> Probability to exceed the threshold, 0 < probability < 1
       real(wp), intent(in) :: probability
@@ -144,9 +126,8 @@ contains
       threshold = max(self%plain_quantile(self%acceptance * probability), self%min_threshold())
    end function quantile
 
-   !> Thresholds that are exceeded with given probabilities.
+   !> Thresholds that are exceeded with several probabilities.
    pure subroutine quantiles(self, probability, threshold)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> Probabilities to exceed the thresholds, 0 < probability < 1
       real(wp), intent(in), contiguous :: probability(:)
@@ -156,9 +137,8 @@ contains
       threshold = self%quantile(probability)
    end subroutine quantiles
 
-   !> Edges of the cells in which the density is constant; none unless a law has some.
+   !> Edges of the cells in which the density is constant; by default there are none.
    pure function cell_edges(self) result(edge)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> Relative thresholds, ascending, before rejection, shape (cells + 1)
       real(wp) :: edge(self%cells + 1)
@@ -166,9 +146,8 @@ contains
       edge = 0.0_wp
    end function cell_edges
 
-   !> Cells of break stretches, after rejection; none of a law without stiffnesses.
+   !> Cells of break stretches after rejection; empty for a law without stiffnesses.
    pure function stretch_cells(self) result(cells)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> The cells; their probabilities add up to 1
       type(stretch_cells_type) :: cells
@@ -176,10 +155,8 @@ contains
       allocate (cells%low(0), cells%high(0), cells%share(0), cells%stiffness(0))
    end function stretch_cells
 
-   !> Stiffness of contacts that break at a stretch; that of all contacts but for a law with
-   !> stiffnesses.
+   !> Stiffness of contacts that break at a stretch; 1 for a law without stiffnesses.
    elemental function stiffness_at(self, stretch) result(stiffness)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> Relative break stretch
       real(wp), intent(in) :: stretch
@@ -189,24 +166,21 @@ contains
       stiffness = 1.0_wp
    end function stiffness_at
 
-   !> Reject what a force breaks of a law with stiffnesses; others have none.
+   !> Reject the contacts of a law with stiffnesses that a force breaks.
    subroutine reject_stretches(self, force, error)
-      !> The law
       class(threshold_law_type), intent(inout) :: self
       !> Relative thresholds at or below are rejected
       real(wp), intent(in) :: force
-      !> Set if nothing is left
+      !> Set if the force breaks all contacts, or the law has no stiffnesses
       type(error_type), allocatable, intent(inout) :: error
 
       self%minimum = force
       call raise(error, status_invalid, "the threshold law has no stiffnesses")
    end subroutine reject_stretches
 
-   !> Smallest threshold that rejection leaves.
+   !> Smallest threshold after rejection, just above the minimum.
    pure function min_threshold(self) result(threshold)
-      !> The law
       class(threshold_law_type), intent(in) :: self
-      !> A threshold just above the minimum
       real(wp) :: threshold
 
       threshold = self%minimum + epsilon(1.0_wp) * max(self%minimum, 1.0_wp)
@@ -214,11 +188,9 @@ contains
 
    !> Probability density of the thresholds.
    elemental function density(self, threshold)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: threshold
-      !> Probability density
       real(wp) :: density
 
       density = 0.0_wp
@@ -227,11 +199,9 @@ contains
 
    !> Probability that a threshold is greater than a given one.
    elemental function survival(self, threshold)
-      !> The law
       class(threshold_law_type), intent(in) :: self
       !> Relative threshold
       real(wp), intent(in) :: threshold
-      !> Probability
       real(wp) :: survival
 
       survival = 1.0_wp

@@ -1,15 +1,13 @@
 !> Normal law.
 module mesoslip_contacts_threshold_laws_gaussian
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_contacts_threshold_laws_base, only: take_relative_width, threshold_law_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
    public :: gaussian_law_type, inverse_normal
 
-   !> Distance of a probability from one half up to which a deviate is in the middle of the law
+   !> Maximum distance of a probability from 1/2 in the middle of the law
    real(wp), parameter :: middle = 0.425_wp
 
    real(wp), parameter :: sqrt_2 = sqrt(2.0_wp), sqrt_2_pi = sqrt(2.0_wp * acos(-1.0_wp))
@@ -17,49 +15,24 @@ module mesoslip_contacts_threshold_laws_gaussian
    !> Normal law.
    type, extends(threshold_law_type) :: gaussian_law_type
    contains
-      procedure :: take
-      procedure :: plain_quantile
-      procedure :: plain_density
-      procedure :: plain_survival
+      procedure :: plain_quantile, plain_density, plain_survival
       procedure :: quantiles
    end type gaussian_law_type
 
 contains
 
-   !> Take the parameters of the law.
-   subroutine take(self, parameters, error)
-      !> The law
-      class(gaussian_law_type), intent(inout) :: self
-      !> Its relative width, by name
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if the width is missing or not positive
-      type(error_type), allocatable, intent(inout) :: error
-
-      call take_relative_width(self, parameters, error)
-   end subroutine take
-
-   !> Threshold that is exceeded with a given probability, before rejection.
-   pure function plain_quantile(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(gaussian_law_type), intent(in) :: self
-      !> Probability to exceed the threshold
       real(wp), intent(in) :: argument
-      !> Relative threshold
-      real(wp) :: value
 
       value = 1.0_wp - self%width * inverse_normal(argument)
    end function plain_quantile
 
-   !> Thresholds that are exceeded with given probabilities.
-   !>
-   !> Nearly all normal deviates are from the middle of the law, where no choice is to be made: they
-   !> are found side by side, and those of the tails, which are listed, one by one.
+   !> Most normal deviates are in the middle of the law, where the formula has no branch: they are
+   !> computed in one vectorized loop, those in the tails one by one.
    pure subroutine quantiles(self, probability, threshold)
-      !> The law
       class(gaussian_law_type), intent(in) :: self
-      !> Probabilities to exceed the thresholds, 0 < probability < 1
       real(wp), intent(in), contiguous :: probability(:)
-      !> Relative thresholds, shape that of probability
       real(wp), intent(out), contiguous :: threshold(:)
 
       integer :: draw, tail, tails, in_tail(size(probability) + 1)
@@ -70,7 +43,7 @@ contains
          centred = self%acceptance * probability(draw) - 0.5_wp
          threshold(draw) = max(1.0_wp - self%width * middle_normal(centred), min_threshold)
       end do
-      ! Listed without a branch, of which one in seven would be guessed wrong.
+      ! Listed without a branch, which would be predicted wrongly one time in seven.
       tails = 0
       do draw = 1, size(probability)
          in_tail(tails + 1) = draw
@@ -82,14 +55,9 @@ contains
       end do
    end subroutine quantiles
 
-   !> Probability density before rejection.
-   pure function plain_density(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_density(self, argument) result(value)
       class(gaussian_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability density
-      real(wp) :: value
 
       real(wp) :: z
 
@@ -97,14 +65,9 @@ contains
       value = exp(-0.5_wp * z**2) / (sqrt_2_pi * self%width)
    end function plain_density
 
-   !> Survival function before rejection.
-   pure function plain_survival(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(gaussian_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability to exceed it
-      real(wp) :: value
 
       value = 0.5_wp * erfc((argument - 1.0_wp) / (sqrt_2 * self%width))
    end function plain_survival
@@ -156,7 +119,7 @@ contains
 
    !> Inverse of the standard normal distribution function in the middle of the law.
    elemental function middle_normal(centred) result(z)
-      !> Probability less one half, at most 0.425 in size
+      !> Probability minus 1/2, at most 0.425 in size
       real(wp), intent(in) :: centred
       !> The deviate that is not exceeded with this probability
       real(wp) :: z

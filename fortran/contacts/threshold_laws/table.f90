@@ -6,7 +6,7 @@ module mesoslip_contacts_threshold_laws_table
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_contacts_stretch_cells, only: stretch_cells_type
+   use mesoslip_contacts_stretch_cells, only: cell_of, stretch_cells_type
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
@@ -16,38 +16,28 @@ module mesoslip_contacts_threshold_laws_table
    !> Maximum number of cells. Laws have no allocatable components: gfortran 12 frees those of
    !> polymorphic components twice.
    integer, parameter :: max_cells = 4000
-   !> Difference of the mean from 1 that counts as none
+   !> Tolerance of the means, which must be 1
    real(wp), parameter :: tolerance = 1.0e-9_wp
 
    !> Law of a table.
    type, extends(threshold_law_type) :: table_law_type
-      !> Edges of the cells, ascending, and the probability to exceed each; as many are in use as
-      !> there are, cells + 1
+      !> Edges of the cells, ascending, and the probability to exceed each; the first cells + 1 are
+      !> used
       real(wp), private :: edge(max_cells + 1) = 0.0_wp, above(max_cells + 1) = 0.0_wp
-      !> Lower end of what is left of each cell by rejection, if there are stiffnesses, its edge
-      !> otherwise, and the stiffness in each
+      !> Lower end of each cell, with stiffnesses after rejection, and the stiffness in it
       real(wp), private :: low(max_cells) = 0.0_wp, stiffness(max_cells) = 1.0_wp
    contains
       procedure :: take
-      procedure :: plain_quantile
-      procedure :: plain_density
-      procedure :: plain_survival
-      procedure :: cell_edges
-      procedure :: stretch_cells
-      procedure :: stiffness_at
-      procedure :: reject_stretches
+      procedure :: plain_quantile, plain_density, plain_survival
+      procedure :: cell_edges, stretch_cells, stiffness_at, reject_stretches
       procedure, non_overridable, private :: take_stiffnesses
    end type table_law_type
 
 contains
 
-   !> Take the parameters of the law.
    subroutine take(self, parameters, error)
-      !> The law
       class(table_law_type), intent(inout) :: self
-      !> Edges of the cells, ascending, and their weights, by name
       type(parameters_type), intent(inout) :: parameters
-      !> Set if edges do not ascend, a weight is not positive, or the mean is not 1
       type(error_type), allocatable, intent(inout) :: error
 
       real(wp), allocatable :: edge(:), weight(:)
@@ -89,7 +79,7 @@ contains
       end if
    end subroutine take
 
-   !> Take the stiffness of each cell: the edges are those of break stretches then.
+   !> Take the stiffness of each cell; the edges are then those of break stretches.
    subroutine take_stiffnesses(self, weight, parameters, error)
       class(table_law_type), intent(inout) :: self
       !> Probability of each cell
@@ -121,11 +111,8 @@ contains
       self%mean_square_stiffness = sum(weight * stiffness**2)
    end subroutine take_stiffnesses
 
-   !> Cells of break stretches, after rejection.
    pure function stretch_cells(self) result(cells)
-      !> The law
       class(table_law_type), intent(in) :: self
-      !> The cells; their probabilities add up to 1
       type(stretch_cells_type) :: cells
 
       allocate (cells%low, source=self%low(:self%cells))
@@ -134,25 +121,18 @@ contains
       cells%stiffness = self%stiffness(:self%cells)
    end function stretch_cells
 
-   !> Stiffness of contacts that break at a stretch.
    elemental function stiffness_at(self, stretch) result(stiffness)
-      !> The law
       class(table_law_type), intent(in) :: self
-      !> Relative break stretch
       real(wp), intent(in) :: stretch
-      !> Relative stiffness
       real(wp) :: stiffness
 
       stiffness = self%stiffness(cell_of(self%edge(:self%cells + 1), stretch, 1.0_wp))
    end function stiffness_at
 
-   !> Reject contacts whose threshold is not above a force: of each cell what is below f/k.
+   !> Reject contacts whose threshold is not above a force: the part of each cell below f/k.
    subroutine reject_stretches(self, force, error)
-      !> The law
       class(table_law_type), intent(inout) :: self
-      !> Relative thresholds at or below are rejected
       real(wp), intent(in) :: force
-      !> Set if nothing is left
       type(error_type), allocatable, intent(inout) :: error
 
       type(stretch_cells_type) :: cells
@@ -176,24 +156,16 @@ contains
       self%above(:self%cells) = self%above(:self%cells) / self%above(1)
    end subroutine reject_stretches
 
-   !> Edges of the cells.
    pure function cell_edges(self) result(edge)
-      !> The law
       class(table_law_type), intent(in) :: self
-      !> Relative thresholds, ascending, before rejection, shape (cells + 1)
       real(wp) :: edge(self%cells + 1)
 
       edge = self%edge(:self%cells + 1)
    end function cell_edges
 
-   !> Threshold that is exceeded with a given probability, before rejection.
-   pure function plain_quantile(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(table_law_type), intent(in) :: self
-      !> Probability to exceed the threshold
       real(wp), intent(in) :: argument
-      !> Relative threshold
-      real(wp) :: value
 
       integer :: cell
 
@@ -206,14 +178,9 @@ contains
       end associate
    end function plain_quantile
 
-   !> Probability density before rejection.
-   pure function plain_density(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_density(self, argument) result(value)
       class(table_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability density
-      real(wp) :: value
 
       integer :: cell
 
@@ -224,14 +191,9 @@ contains
       value = (self%above(cell) - self%above(cell + 1)) / (self%edge(cell + 1) - self%low(cell))
    end function plain_density
 
-   !> Survival function before rejection.
-   pure function plain_survival(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(table_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability to exceed it
-      real(wp) :: value
 
       real(wp) :: part
       integer :: cell
@@ -241,27 +203,5 @@ contains
       part = min(1.0_wp, max(0.0_wp, part))
       value = self%above(cell + 1) + part * (self%above(cell) - self%above(cell + 1))
    end function plain_survival
-
-   !> The cell that a value lies in, by bisection; the first or the last one beyond the edges.
-   pure function cell_of(edge, value, direction) result(cell)
-      !> Edges of the cells, shape (cells + 1)
-      real(wp), intent(in), contiguous :: edge(:)
-      !> The value, and +1 for edges that ascend, -1 for those that descend
-      real(wp), intent(in) :: value, direction
-      integer :: cell
-
-      integer :: last, middle
-
-      cell = 1
-      last = size(edge)
-      do while (last - cell > 1)
-         middle = (cell + last) / 2
-         if (direction * edge(middle) <= direction * value) then
-            cell = middle
-         else
-            last = middle
-         end if
-      end do
-   end function cell_of
 
 end module mesoslip_contacts_threshold_laws_table

@@ -1,9 +1,7 @@
 !> Weibull's law.
 module mesoslip_contacts_threshold_laws_weibull
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_contacts_threshold_laws_base, only: take_relative_width, threshold_law_type
+   use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    implicit none
    private
 
@@ -14,50 +12,30 @@ module mesoslip_contacts_threshold_laws_weibull
       !> Scale lambda, and shape
       real(wp), private :: scale = 0.0_wp, shape = 1.0_wp
    contains
-      procedure :: take
-      procedure :: plain_quantile
-      procedure :: plain_density
-      procedure :: plain_survival
+      procedure :: set_constants
+      procedure :: plain_quantile, plain_density, plain_survival
    end type weibull_law_type
 
 contains
 
-   !> Take the parameters of the law.
-   subroutine take(self, parameters, error)
-      !> The law
+   subroutine set_constants(self)
       class(weibull_law_type), intent(inout) :: self
-      !> Its relative width, by name
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if the width is missing or not positive
-      type(error_type), allocatable, intent(inout) :: error
 
-      call take_relative_width(self, parameters, error)
-      if (allocated(error)) return
       self%shape = shape_of(self%width)
       self%scale = exp(-log_gamma(1.0_wp + 1.0_wp / self%shape))
       self%is_logarithmic = .true.
-   end subroutine take
+   end subroutine set_constants
 
-   !> Threshold that is exceeded with a given probability, before rejection.
-   pure function plain_quantile(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_quantile(self, argument) result(value)
       class(weibull_law_type), intent(in) :: self
-      !> Probability to exceed the threshold
       real(wp), intent(in) :: argument
-      !> Relative threshold
-      real(wp) :: value
 
       value = self%scale * (-log(argument))**(1.0_wp / self%shape)
    end function plain_quantile
 
-   !> Probability density before rejection.
-   pure function plain_density(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_density(self, argument) result(value)
       class(weibull_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability density
-      real(wp) :: value
 
       real(wp) :: z
 
@@ -65,14 +43,9 @@ contains
       value = self%shape / self%scale * z**(self%shape - 1.0_wp) * exp(-z**self%shape)
    end function plain_density
 
-   !> Survival function before rejection.
-   pure function plain_survival(self, argument) result(value)
-      !> The law
+   pure real(wp) function plain_survival(self, argument) result(value)
       class(weibull_law_type), intent(in) :: self
-      !> Relative threshold
       real(wp), intent(in) :: argument
-      !> Probability to exceed it
-      real(wp) :: value
 
       value = 1.0_wp
       if (argument > 0.0_wp) value = exp(-(argument / self%scale)**self%shape)
@@ -86,7 +59,7 @@ contains
       real(wp) :: lower, upper
       integer :: iteration
 
-      ! The squared width is Gamma(1 + 2/shape)/Gamma(1 + 1/shape)**2 - 1 and falls with the shape.
+      ! The squared width, Gamma(1 + 2/shape)/Gamma(1 + 1/shape)**2 - 1, falls with the shape.
       lower = log(0.05_wp)
       upper = log(1.3_wp / min(width, 1.0_wp) + 1.0_wp)
       do iteration = 1, 100

@@ -1,19 +1,19 @@
-"""Threshold laws, each in a file of its own and listed here.
+"""Threshold laws: a file each, with its `ThresholdLawKind` in the variable ``LAW``.
 
-Adding a law is adding a file with a `ThresholdLawKind` and naming it in `LAWS`, and the same in the
-kernels (`fortran/contacts/threshold_laws`).
+Adding one is adding a file to this folder and its name to the build, and the same in the kernels
+(`fortran/contacts/threshold_laws`).
 """
 
 from __future__ import annotations
 
-from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
-from mesoslip.configuration.threshold_laws.exponential import EXPONENTIAL
-from mesoslip.configuration.threshold_laws.gaussian import GAUSSIAN
-from mesoslip.configuration.threshold_laws.lognormal import LOGNORMAL
-from mesoslip.configuration.threshold_laws.table import TABLE
-from mesoslip.configuration.threshold_laws.uniform import UNIFORM
-from mesoslip.configuration.threshold_laws.weibull import WEIBULL
+import pkgutil
+from importlib import import_module
 
-LAWS: dict[str, ThresholdLawKind] = {
-    law.name: law for law in (GAUSSIAN, UNIFORM, LOGNORMAL, WEIBULL, EXPONENTIAL, TABLE)
-}
+from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
+
+_KINDS: list[ThresholdLawKind] = [
+    import_module(f"{__name__}.{file.name}").LAW
+    for file in pkgutil.iter_modules(__path__)
+    if file.name != "base"
+]
+LAWS = {kind.name: kind for kind in _KINDS}

@@ -14,7 +14,7 @@ MIN_WIDTH = 1e-6
 
 
 class Keys(Protocol):
-    """The keys of [contacts.threshold] that laws are made of."""
+    """The keys of [contacts.threshold] that define a law."""
 
     @property
     def relative_width(self) -> float: ...
@@ -26,33 +26,24 @@ class Keys(Protocol):
 
 @dataclass(frozen=True)
 class ThresholdLawKind:
-    """A law of the relative thresholds, whose mean is 1.
-
-    Attributes
-    ----------
-    name
-        Name of the law, in files and in the kernels.
-    max_width
-        Maximum relative width.
-    if_wider
-        Why a larger one is wrong, as the end of a message.
-    jumps
-        Ends of the law's support at which its density is not continuous.
-    is_sampled
-        Whether it is made of samples, not of a width.
-    """
+    """A law of the relative thresholds, whose mean is 1."""
 
     name: str
+    """The name in files and in the kernels."""
     max_width: float = MAX_WIDTH
+    """Maximum relative width."""
     if_wider: str = ""
+    """Why a larger width is wrong, as the end of a message."""
     jumps: Literal["none", "lower", "both"] = "none"
+    """Ends of the support at which the density is discontinuous."""
     is_sampled: bool = False
+    """Whether the law is made of samples, not of a width."""
 
     def width_problem(self, width: float) -> str:
         """The error of a relative width; empty if it is possible."""
         if width < MIN_WIDTH:
             return f"must be at least {MIN_WIDTH:g} (is {width:g})"
-        # Four digits of an irrational bound stand for the bound.
+        # An irrational bound may be given with four digits.
         if width > self.max_width * (1 + 1e-4):
             return f"must be at most {self.max_width:.4g} for the {self.name} law{self.if_wider}"
         return ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
 
-EXPONENTIAL = ThresholdLawKind(
+LAW = ThresholdLawKind(
     "exponential",
     max_width=1.0,
     if_wider=", whose smallest threshold would be negative",

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
 
-GAUSSIAN = ThresholdLawKind("gaussian")
+LAW = ThresholdLawKind("gaussian")

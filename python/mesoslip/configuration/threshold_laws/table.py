@@ -18,13 +18,13 @@ from mesoslip.configuration.threshold_laws.base import Keys, ThresholdLawKind
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import FileError
 
-# Names of the columns; a threshold is proportional to the area of its contact.
+# Names of columns. Areas can stand for thresholds, which are proportional to them.
 SAMPLE_COLUMNS = ("threshold", "area")
 WEIGHT_COLUMN = "weight"
 STIFFNESS_COLUMN = "stiffness"
-# Maximum number of samples, and of the cells of a law in the kernels.
+# Maximum number of samples, and of cells of a law in the kernels.
 MAX_SAMPLES, MAX_CELLS = 100_000, 4000
-# Relative difference of break stretches that counts as none.
+# Relative difference up to which break stretches are equal.
 SAME_STRETCH = 1e-9
 WANTED = (
     "the header must name a column threshold or area, and may name the columns weight and stiffness"
@@ -45,6 +45,14 @@ class LawCells(NamedTuple):
         low, high = self.edges[:-1], self.edges[1:]
         square = float(np.sum(self.weights * (low**2 + low * high + high**2)) / 3)
         return math.sqrt(max(0.0, square - 1))
+
+    @property
+    def kernel_parameters(self) -> Parameters:
+        """Parameters of the law in the kernel."""
+        return {
+            "threshold_edges": tuple(self.edges.tolist()),
+            "threshold_weights": tuple(self.weights.tolist()),
+        }
 
 
 class StretchCells(NamedTuple):
@@ -83,17 +91,7 @@ def sample_problem(
     weights: Sequence[float] | None,
     stiffnesses: Sequence[float] | None = None,
 ) -> tuple[str, str]:
-    """The key and the error of samples; empty if they make a law.
-
-    Parameters
-    ----------
-    samples
-        Thresholds, in any unit.
-    weights
-        Weights of the samples; None for equal ones.
-    stiffnesses
-        Stiffnesses of the samples, in any unit; None if they are not known.
-    """
+    """The key and the error of samples, in any unit; empty strings if they make a law."""
     if len(samples) > MAX_SAMPLES:
         return "samples", f"must have at most {MAX_SAMPLES} values (has {len(samples)})"
     wrong = [one for one in samples if not one > 0]
@@ -123,7 +121,7 @@ def sample_problem(
 def _stiffness_problem(
     samples: Sequence[float], weights: Sequence[float] | None, stiffnesses: Sequence[float]
 ) -> tuple[str, str]:
-    """The same of stiffnesses, beside samples and weights without error."""
+    """The same for stiffnesses, after samples and weights without error."""
     if len(stiffnesses) != len(samples):
         return "stiffnesses", f"must have as many values as samples, {len(samples)}"
     wrong = [one for one in stiffnesses if not one > 0]
@@ -141,12 +139,11 @@ def _stiffness_problem(
 
 @lru_cache(maxsize=8)
 def law_cells(samples: tuple[float, ...], weights: tuple[float, ...] | None) -> LawCells:
-    """The law of samples: each has a cell around it, with its weight.
+    """The law of samples: each has a cell around it, with its weight; the mean of the law is 1.
 
-    A cell reaches half-way to the samples beside it, and as far on the other side at the ends, but
-    not below 0. Equal samples share a cell, and so do neighbours if there are more than `MAX_CELLS`
-    different ones. The mean of the law is 1, whatever the unit of the
-    samples.
+    A cell extends half-way to the adjacent samples, at the ends equally far to both sides, but not
+    below 0. Equal samples share a cell, and so do adjacent ones if there are more than `MAX_CELLS`
+    different ones.
     """
     value, place = np.unique(np.array(samples), return_inverse=True)
     shares = np.ones(len(samples)) if weights is None else np.array(weights)
@@ -171,7 +168,7 @@ def _edges(value: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _groups(weight: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Number of the group of each sample, such that there are no more than `MAX_CELLS`."""
+    """The group of each sample, of at most `MAX_CELLS` groups of about equal weight."""
     middle_share = (np.cumsum(weight) - weight / 2) / np.sum(weight)
     return np.unique((MAX_CELLS * middle_share).astype(int), return_inverse=True)[1]
 
@@ -182,9 +179,9 @@ def stretch_cells(
 ) -> StretchCells:
     """The law of samples with stiffnesses: each has a cell of break stretches around it.
 
-    The cells are those of `law_cells`, of thresholds over stiffnesses, in whose order contacts
-    break. Samples of one break stretch and several stiffnesses share a cell: each has a part of
-    it. Of neighbours that are combined the means of stretch and stiffness are kept.
+    The cells are those of `law_cells`, but of thresholds over stiffnesses, in whose order contacts
+    break. Samples of one break stretch and different stiffnesses have a part each of its cell.
+    Adjacent samples that are combined have their mean stretch and stiffness.
     """
     threshold, stiffness = np.array(samples), np.array(stiffnesses)
     weight = np.ones(len(samples)) if weights is None else np.array(weights)
@@ -205,7 +202,6 @@ def stretch_cells(
     place = np.concatenate([[0], np.cumsum(is_new)])
     first = np.concatenate([[0], np.flatnonzero(is_new) + 1])
     edges = _edges(stretch[first])
-    # Samples of one stretch have parts of its cell.
     before = np.cumsum(weight) - weight
     part = (before - before[first][place]) / np.bincount(place, weight)[place]
     low = edges[place] + part * np.diff(edges)[place]
@@ -220,31 +216,18 @@ class TableLaw(ThresholdLawKind):
     """The law of samples; its width is theirs."""
 
     def kernel_parameters(self, keys: Keys) -> Parameters:
-        """Cells of the law, see `law_cells`."""
-        cells = law_cells(keys.samples or (), keys.weights)
-        return {
-            "threshold_edges": tuple(cells.edges.tolist()),
-            "threshold_weights": tuple(cells.weights.tolist()),
-        }
+        return law_cells(keys.samples or (), keys.weights).kernel_parameters
 
 
-TABLE = TableLaw("table", jumps="lower", is_sampled=True)
+LAW = TableLaw("table", jumps="lower", is_sampled=True)
 
 
 def read_samples(path: Path) -> dict[str, list[float]]:
-    """Samples of a file, with weights and stiffnesses where it has them.
+    """Samples of a file, with weights and stiffnesses if it has them.
 
-    Parameters
-    ----------
-    path
-        A table, see `mesoslip.configuration.columns`. Its header names a column ``threshold`` or
-        ``area``, in any unit, and maybe the columns ``weight`` and ``stiffness``; others are not
-        read.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read or is not such a table; the message names the line and the fix.
+    The file is a table (`mesoslip.configuration.columns`) with a column ``threshold`` or ``area``,
+    in any unit, and maybe the columns ``weight`` and ``stiffness``; others are ignored. The
+    FileError of a file that is not such a table names the line and the fix.
     """
     cells = cells_of(text_of(path, "a table of thresholds"), str(path))
     columns = _columns(cells)
@@ -277,7 +260,7 @@ def read_samples(path: Path) -> dict[str, list[float]]:
 
 
 def _columns(cells: Cells) -> dict[str, int]:
-    """Places of the columns by name; sizes of units do not matter, as only ratios do."""
+    """Positions of the columns by name. The size of a unit does not matter, only ratios do."""
     if not cells.has_header:
         raise FileError(f"{cells.source}: there is no header; {WANTED}")
     columns: dict[str, int] = {}

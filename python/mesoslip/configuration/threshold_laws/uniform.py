@@ -6,7 +6,7 @@ import math
 
 from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
 
-UNIFORM = ThresholdLawKind(
+LAW = ThresholdLawKind(
     "uniform",
     max_width=1 / math.sqrt(3),
     if_wider=", whose smallest threshold would be negative",

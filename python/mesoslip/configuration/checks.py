@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from mesoslip.configuration.drive import DrivePart
+from mesoslip.configuration.run_tables import Curve, Run
 from mesoslip.configuration.sliders import SLIDERS, base
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Curve, Run
 
 
 class Setting(base.Setting, Protocol):

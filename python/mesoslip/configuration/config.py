@@ -29,9 +29,9 @@ from mesoslip.configuration.files import (
 )
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.configuration.run_tables import Curve, Output, Run
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
-from mesoslip.configuration.tables import Curve, Output, Run
 from mesoslip.errors import ConfigError
 from mesoslip.quantities import with_unit
 

@@ -17,7 +17,7 @@ from mesoslip.configuration.contacts.ensemble import EnsembleContacts
 from mesoslip.configuration.contacts.lattice import LatticeContacts
 from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
-from mesoslip.configuration.tables import Run
+from mesoslip.configuration.run_tables import Run
 
 KINDS: tuple[type[ContactKind], ...] = (
     ActivatedAgeingContacts,

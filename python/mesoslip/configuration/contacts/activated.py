@@ -18,8 +18,8 @@ from mesoslip.configuration.contacts.tables import (
     Thermal,
 )
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Run
 
 INITIAL_AGE = "contacts.ageing.initial_age"
 # Ages of the life of a contact that bears the back force: the first over the scales of time, and

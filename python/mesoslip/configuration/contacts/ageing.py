@@ -8,8 +8,8 @@ from mesoslip.configuration.contacts.base import ContactKind, Setting, common_pa
 from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables import Ageing, Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Run
 
 
 def ageing_of(config: Setting) -> Ageing:

@@ -8,8 +8,8 @@ from typing import ClassVar, Protocol
 
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaints
-from mesoslip.configuration.tables import Run
 
 
 class Block(Protocol):

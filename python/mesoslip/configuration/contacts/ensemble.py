@@ -7,8 +7,8 @@ from typing import ClassVar
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaints
-from mesoslip.configuration.tables import Run
 
 
 class EnsembleContacts(ContactKind):

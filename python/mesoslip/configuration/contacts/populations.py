@@ -7,8 +7,8 @@ from typing import ClassVar
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Run
 
 # Minimum step of the master equation, relative to the mean breaking stretch.
 MIN_STEP = 2e-5

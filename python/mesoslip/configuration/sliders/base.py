@@ -9,8 +9,8 @@ from typing import ClassVar, NamedTuple, Protocol
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import Contacts
 from mesoslip.configuration.drive import Drive
+from mesoslip.configuration.run_tables import Output
 from mesoslip.configuration.table import Complaints, Table
-from mesoslip.configuration.tables import Output
 
 
 class Oscillator(NamedTuple):

@@ -6,7 +6,7 @@ import mesoslip
 import numpy as np
 import pytest
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import ENERGY_COLUMNS
+from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
 from oracles import stationary_force
 
 LAWS = {"gaussian": 0.2, "uniform": 0.3, "lognormal": 0.5, "weibull": 0.5, "exponential": 0.8}

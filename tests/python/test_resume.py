@@ -25,7 +25,7 @@ from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.kernel import Kernel
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.run_realizations import Results, run_realizations
 
 ONCE = {}
 

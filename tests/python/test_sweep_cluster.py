@@ -20,7 +20,7 @@ from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Store
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.run_realizations import run_realizations
 from test_sweep import assert_same_numbers, tables
 
 pytest.importorskip("distributed")

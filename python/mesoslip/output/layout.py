@@ -22,7 +22,7 @@ from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.results import RunResults
 from mesoslip.output.variables import Group, Meaning
-from mesoslip.simulation import tables
+from mesoslip.simulation import recorded_tables as tables
 from mesoslip.simulation.audit import failed_promises
 
 Array = NDArray[Any]

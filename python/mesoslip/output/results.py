@@ -25,9 +25,10 @@ class Rows(Protocol):
 class RealizationResults(Protocol):
     """The results of a realization.
 
-    Tables, with the columns of `mesoslip.simulation.tables`: "trace", "slip_trace" (with the number
-    of the slip as its last column), "slips", "stages", "layers", "avalanches", "snapshot_events",
-    and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached), load, generation.
+    Tables, with the columns of `mesoslip.simulation.recorded_tables`: "trace", "slip_trace" (with
+    the number of the slip as its last column), "slips", "stages", "layers", "avalanches",
+    "snapshot_events", and "snapshots" with rows of shape (contacts, 3): stretch (NaN if detached),
+    load, generation.
     """
 
     @property

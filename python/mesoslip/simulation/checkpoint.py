@@ -29,7 +29,7 @@ from mesoslip import _build
 from mesoslip.errors import FileError
 from mesoslip.execution.store import Folder
 from mesoslip.simulation.realization import Realization, Saved
-from mesoslip.simulation.tables import TABLES, Rows, Stored
+from mesoslip.simulation.recorded_tables import TABLES, Rows, Stored
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config

@@ -18,9 +18,9 @@ from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.recorded import Recorded
+from mesoslip.simulation.recorded_tables import CONTACT_COLUMNS, ENERGY_COLUMNS, TABLES, Rows
 from mesoslip.simulation.start import START, End, follow
 from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
-from mesoslip.simulation.tables import CONTACT_COLUMNS, ENERGY_COLUMNS, TABLES, Rows
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -180,7 +180,7 @@ class Realization(Recorded):
             kernel, self._start = follow(self.config, self._parameters, self.number, self._after)
             self._after = None
         else:
-            kernel = self._start.assemble(self.config, self._parameters, self.number)
+            kernel = self._start.configured_kernel(self.config, self._parameters, self.number)
             if self._words is not None:
                 kernel.restore(self._words)
                 self._words = None

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array
-from mesoslip.simulation.tables import COLUMNS, SNAPSHOT_NUMBERS, FirstRows, Rows, structured
+from mesoslip.simulation.recorded_tables import (
+    COLUMNS,
+    SNAPSHOT_NUMBERS,
+    FirstRows,
+    Rows,
+    structured,
+)
 
 # Sentinel: the stretch of a detached contact.
 DETACHED = 1e300
@@ -65,7 +71,8 @@ class Recorded:
 
         Returns
         -------
-        Rows, shape (rows), with the columns of `mesoslip.simulation.tables.COLUMNS`, in SI units.
+        Rows, shape (rows), with the columns that `mesoslip.simulation.recorded_tables` states, in
+        SI units.
 
         Raises
         ------

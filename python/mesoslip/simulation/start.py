@@ -13,9 +13,9 @@ import numpy as np
 
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.simulation.archive import Archive
-from mesoslip.simulation.assembly import assemble
 from mesoslip.simulation.kernel import Array, Kernel, Progress, Words
-from mesoslip.simulation.tables import COLUMNS, ENERGY_COLUMNS
+from mesoslip.simulation.kernel_setup import configured_kernel
+from mesoslip.simulation.recorded_tables import COLUMNS, ENERGY_COLUMNS
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -54,10 +54,12 @@ class Start:
     slips: int = 0
     energy: Array = field(default_factory=lambda: np.zeros(len(ENERGY_COLUMNS)))
 
-    def assemble(self, config: Config, parameters: Parameters, number: int) -> Kernel:
+    def configured_kernel(self, config: Config, parameters: Parameters, number: int) -> Kernel:
         """A kernel of the run, to be restored, or started at time 0."""
         time = None if self.progress is None else self.progress.time
-        return assemble(config, parameters, number, start_time=time, earlier_slips=self.slips)
+        return configured_kernel(
+            config, parameters, number, start_time=time, earlier_slips=self.slips
+        )
 
     def progress_since(self, now: Progress) -> Progress:
         """How far the run has come."""
@@ -119,7 +121,7 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
     archive = Archive(end.words)
     slider = archive.section_with("drive part")
     slips = int(archive.number("slips", "slip_count"))
-    kernel = assemble(
+    kernel = configured_kernel(
         config,
         parameters,
         number,

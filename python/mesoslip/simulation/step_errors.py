@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mesoslip.simulation.kernel import Array
-from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
+from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 # Steps of the coarse run over those of the run itself, and their errors less 1.
 COARSENING = 2.0

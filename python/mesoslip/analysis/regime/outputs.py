@@ -20,7 +20,7 @@ from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.results import RunResults
-from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
+from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
     import xarray as xr

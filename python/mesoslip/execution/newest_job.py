@@ -15,7 +15,7 @@ from mesoslip.execution.stop import Stop
 Job = Callable[[Stop], None]
 
 
-class Newest:
+class NewestJob:
     """A thread that does the newest of the jobs that it is given.
 
     Each job requests that the one before it stops; of those that have not begun only the newest is

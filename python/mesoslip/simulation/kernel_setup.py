@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NEVER = float(np.finfo(np.float64).max)
 
 
-def assemble(
+def configured_kernel(
     config: Config,
     parameters: Parameters | Kernel,
     number: int = 0,

@@ -17,7 +17,7 @@ from mesoslip.execution.executors import Executor, ExecutorLike, as_executor, co
 from mesoslip.execution.pool import PoolError, WorkerLostError
 from mesoslip.execution.stop import Stop, StopRequest
 from mesoslip.simulation.realization import Realization, Saved
-from mesoslip.simulation.tables import Rows
+from mesoslip.simulation.recorded_tables import Rows
 
 if TYPE_CHECKING:
     from mesoslip.simulation.checkpoint import Checkpoint

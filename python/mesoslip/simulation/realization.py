@@ -17,8 +17,13 @@ import numpy as np
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
-from mesoslip.simulation.recorded import Recorded
-from mesoslip.simulation.recorded_tables import CONTACT_COLUMNS, ENERGY_COLUMNS, TABLES, Rows
+from mesoslip.simulation.recorded_tables import (
+    CONTACT_COLUMNS,
+    ENERGY_COLUMNS,
+    TABLES,
+    Recorded,
+    Rows,
+)
 from mesoslip.simulation.start import START, End, follow
 from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
 

@@ -141,7 +141,7 @@ def test_lost_workers_and_a_lost_scheduler(cluster, tmp_path):
         if len(done) == 60:
             started.scheduler.send_signal(signal.SIGKILL)
 
-    with pytest.raises(RunError, match="scheduler of the cluster is gone"):
+    with pytest.raises(RunError, match="scheduler of the cluster is lost"):
         mesoslip.sweep(
             wanted, store=store, executor=mesoslip.Dask(started.address), progress=progress
         )

@@ -47,17 +47,18 @@ def differences(configs: Sequence[Config]) -> list[Difference]:
 
 def flat(config: Config) -> dict[str, Any]:
     """Values of a configuration by dotted key, including defaults; lists are not split."""
-    return dict(_flat(config.to_dict(), ""))
+    return by_dotted_key(config.to_dict())
 
 
-def _flat(table: Mapping[str, Any], outer: str) -> list[tuple[str, Any]]:
-    rows: list[tuple[str, Any]] = []
-    for name, value in table.items():
+def by_dotted_key(tables: Mapping[str, Any], outer: str = "") -> dict[str, Any]:
+    """Values of nested tables by dotted key."""
+    values: dict[str, Any] = {}
+    for name, value in tables.items():
         if isinstance(value, Mapping):
-            rows += _flat(value, f"{outer}{name}.")
+            values |= by_dotted_key(value, f"{outer}{name}.")
         else:
-            rows.append((outer + name, value))
-    return rows
+            values[outer + name] = value
+    return values
 
 
 def text_of(key: str, value: Any) -> str:
@@ -135,7 +136,7 @@ def changes(config: Config, base: Config) -> list[str]:
     Keys of [run], [output] and [curve] come last. Keys that only the other one has, and defaults
     that only this one has, are left out.
     """
-    own = dict(_flat(config.model_dump(exclude_none=True, exclude_defaults=True), ""))
+    own = by_dotted_key(config.model_dump(exclude_none=True, exclude_defaults=True))
     texts: list[str] = []
     last: list[str] = []
     for key, (value, before) in differences([config, base]):

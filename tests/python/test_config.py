@@ -464,7 +464,7 @@ def test_overrides():
     assert config.title == "another"
     with pytest.raises(ConfigError, match=r"did you mean 'contacts\.delay'"):
         Config.load(path, ["delay=1ms"])
-    with pytest.raises(ConfigError, match=r"base: names the file that a file is based on"):
+    with pytest.raises(ConfigError, match=r"base: names the base of a file"):
         Config.load(path, ["base=klein.toml"])
     with pytest.raises(ConfigError, match="did you mean 'delay'"):
         Config.load(path, ["contacts.delays=1ms"])

@@ -10,7 +10,7 @@ from mesoslip.configuration.reading import PathLike
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.output.inputs import as_config
 from mesoslip.output.tree import build_tree
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.run_realizations import run_realizations
 
 if TYPE_CHECKING:
     import xarray as xr

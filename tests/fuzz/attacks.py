@@ -34,7 +34,7 @@ from mesoslip import Config
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.run_realizations import Results, run_realizations
 
 # Time that a run has before it is interrupted [s].
 SECONDS = 2.0

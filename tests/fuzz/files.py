@@ -25,8 +25,8 @@ from mesoslip import Config, MesoslipError
 from mesoslip.output.tree import build_tree
 from mesoslip.output.writing import write
 from mesoslip.simulation.checkpoint import checkpoint_folder
-from mesoslip.simulation.runner import Results, run_realizations
-from mesoslip.simulation.tables import TABLES
+from mesoslip.simulation.recorded_tables import TABLES
+from mesoslip.simulation.run_realizations import Results, run_realizations
 
 # Time that a command has [s].
 SECONDS = 20.0

@@ -12,7 +12,7 @@ from kinds import KINDS, configuration
 from mesoslip import Config, ConfigError
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.run_realizations import run_realizations
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import Contacts, aged, ageing_force, fixed_step, stationary_force

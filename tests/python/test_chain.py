@@ -17,7 +17,7 @@ from mesoslip.campaign.runner import run_sweep
 from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Store
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import COLUMNS
+from mesoslip.simulation.recorded_tables import COLUMNS
 
 # Each way in which a slider moves and contacts are kept, once.
 CHAINED = (

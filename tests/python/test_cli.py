@@ -380,8 +380,8 @@ def test_a_drive_that_the_run_cuts_is_reported(short, tmp_path, command):
     assert f"warning: {printed}" in command("run", stages, *cut, "-o", tmp_path / "cut.nc")[2]
     whole = command("info", stages, "--set", "run.duration=6 s")[1]
     assert "ends the run" not in whole
-    assert "goes on" not in whole
-    printed = "the stages end after 6 s: the last one goes on for another 3 s, until run.duration"
+    assert "continues" not in whole
+    printed = "the stages end after 6 s: the last one continues for another 3 s, until run.duration"
     assert printed in command("info", stages, "--set", "run.duration=9 s")[1]
 
 

@@ -362,6 +362,8 @@ def test_a_quantity_is_one_number_and_one_unit(text, unit):
         ("956 kg m**-3", "kg/m^3", 956.0),
         ("0.956 g·cm⁻³", "kg/m^3", 956.0),
         ("2 J/m/m", "N/m", 2.0),
+        ("2 J/m^2*m", "N", 2.0),
+        ("2 J/s·s/m", "N", 2.0),
         ("20 %", "1", 0.2),
         ("2 minute", "s", 120.0),
         ("1 lbf", "N", pytest.approx(4.4482216152605)),
@@ -462,7 +464,7 @@ def test_overrides():
     assert config.title == "another"
     with pytest.raises(ConfigError, match=r"did you mean 'contacts\.delay'"):
         Config.load(path, ["delay=1ms"])
-    with pytest.raises(ConfigError, match=r"base: names the file that a file is based on"):
+    with pytest.raises(ConfigError, match=r"base: names the base of a file"):
         Config.load(path, ["base=klein.toml"])
     with pytest.raises(ConfigError, match="did you mean 'delay'"):
         Config.load(path, ["contacts.delays=1ms"])

@@ -13,7 +13,7 @@ from conftest import klein_tables
 from kinds import KINDS, RAMPS, configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import AVALANCHE_COLUMNS
+from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
 from scipy.integrate import solve_ivp
 
 RAMP = [stage for stage in RAMPS["drive"]["stage"] if "start_velocity" in stage]

@@ -277,7 +277,7 @@ def test_a_link_to_itself_is_no_checkpoint(tmp_path, run_file, command):
 def stopped_run(config, output: Path, seed: int) -> None:
     """Have a run stopped as soon as it has started."""
     from mesoslip.simulation.checkpoint import Checkpoint
-    from mesoslip.simulation.runner import run_realizations
+    from mesoslip.simulation.run_realizations import run_realizations
 
     config, stop = config.replace({"run.seed": seed}), Stop()
 

@@ -21,7 +21,7 @@ from kinds import KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.errors import ConfigError, FileError
-from mesoslip.execution.newest import Newest
+from mesoslip.execution.newest_job import NewestJob
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import CONTROLS, ROW_HEIGHTS, STEPS, lattice_size, values
 from mesoslip.explorer.live_run import Pace, explored, run_live
@@ -38,7 +38,7 @@ from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.quantities import with_unit
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.run_realizations import Results, run_realizations
 
 KLEIN = str(ROOT / "runs" / "klein.toml")
 RANGES = [one for one in CONTROLS if not one.choices and not one.is_text]
@@ -452,7 +452,7 @@ def test_a_run_is_cut_off_by_the_next_one():
             KLEIN, ["run.duration=1e5 s", "output.interval=1 s", "output.slip_interval=10 ms"]
         )
     )
-    worker, begun, done = Newest(), threading.Event(), []
+    worker, begun, done = NewestJob(), threading.Event(), []
 
     def hour(stop):
         begun.set()
@@ -487,7 +487,7 @@ def test_the_first_picture_comes_though_the_next_change_is_there():
 def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
     reported, done = [], threading.Event()
     monkeypatch.setattr(threading, "excepthook", lambda args: reported.append(args.exc_value))
-    worker = Newest()
+    worker = NewestJob()
     worker.submit(lambda _: 1 / 0)
     while not reported:
         time.sleep(0.01)
@@ -499,7 +499,7 @@ def test_a_job_that_fails_does_not_end_the_thread(monkeypatch):
 
 def test_a_worker_that_rests_does_the_newest_only():
     done, finished = [], threading.Event()
-    worker = Newest(delay=0.5)
+    worker = NewestJob(delay=0.5)
     for number in range(5):
         worker.submit(lambda _, number=number: done.append(number))
     worker.submit(lambda _: finished.set())
@@ -706,7 +706,7 @@ def test_memory_of_a_run_that_was_replaced_is_returned():
 
     large = explored(Config.load(KLEIN, ["contacts.count=1000000", "run.duration=1000 s"]))
     small = explored(Config.load(KLEIN, ["run.duration=0.1 s"]))
-    worker, peaks, done = Newest(), [], threading.Event()
+    worker, peaks, done = NewestJob(), [], threading.Event()
     before = resident()
     try:
         worker.submit(lambda stop: run_live(large, stop, lambda _: peaks.append(resident())))

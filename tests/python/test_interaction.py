@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mesoslip import Config
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import AVALANCHE_COLUMNS
+from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
 from oracles import exact_events, quasistatic
 from states import reals, saved, taken_up
 

@@ -20,8 +20,8 @@ from mesoslip.output import files, filling, targets, writing
 from mesoslip.output.arrays import Arrays
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import run_realizations
-from mesoslip.simulation.tables import FirstRows
+from mesoslip.simulation.recorded_tables import FirstRows
+from mesoslip.simulation.run_realizations import run_realizations
 
 QUICK = {
     "contacts__count": 48,

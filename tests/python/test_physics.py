@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mesoslip.configuration.threshold_laws import LAWS as LAWS_BY_NAME
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import ENERGY_COLUMNS
+from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
 from oracles import stationary_force
 
 LAWS = {"gaussian": 0.2, "uniform": 0.3, "lognormal": 0.5, "weibull": 0.5, "exponential": 0.8}

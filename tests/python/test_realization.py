@@ -7,7 +7,7 @@ import doctest
 import numpy as np
 import pytest
 from mesoslip import Realization, RunError
-from mesoslip.simulation.tables import COLUMNS
+from mesoslip.simulation.recorded_tables import COLUMNS
 
 SHORT = {"contacts__count": 200, "run__duration": 2.5, "output__slip_interval": 1e-3}
 

@@ -25,7 +25,7 @@ from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.kernel import Kernel
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import Results, run_realizations
+from mesoslip.simulation.run_realizations import Results, run_realizations
 
 ONCE = {}
 
@@ -119,7 +119,7 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
         while not one.finished:
             one.advance(100)
             checkpoint.visit(one)
-            checkpoint.look([one])
+            checkpoint.update([one])
             assert sum(rows.waiting_bytes for _, rows in one.waiting) <= 1000
     assert_same(whole("rigid, lattice"), build_tree(Results(config, [one], True, 0.0)))
 
@@ -283,7 +283,7 @@ def test_realizations_that_wait_for_a_worker_do_not_hold_up_checkpoints(tmp_path
         for _ in range(3):
             realizations[0].advance(10)
             checkpoint.visit(realizations[0])
-            checkpoint.look(realizations)
+            checkpoint.update(realizations)
         assert (tmp_path / "state.npz").stat().st_ino != before
 
 

@@ -20,7 +20,7 @@ from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Store
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint
-from mesoslip.simulation.runner import run_realizations
+from mesoslip.simulation.run_realizations import run_realizations
 from test_sweep import assert_same_numbers, tables
 
 pytest.importorskip("distributed")
@@ -141,7 +141,7 @@ def test_lost_workers_and_a_lost_scheduler(cluster, tmp_path):
         if len(done) == 60:
             started.scheduler.send_signal(signal.SIGKILL)
 
-    with pytest.raises(RunError, match="scheduler of the cluster is gone"):
+    with pytest.raises(RunError, match="scheduler of the cluster is lost"):
         mesoslip.sweep(
             wanted, store=store, executor=mesoslip.Dask(started.address), progress=progress
         )

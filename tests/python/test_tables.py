@@ -7,7 +7,7 @@ import csv
 import mesoslip
 import pytest
 from conftest import ROOT
-from mesoslip.output.tables import PrintedTable, latex, markdown, write_printed
+from mesoslip.output.table_files import PrintedTable, latex, markdown, write_printed
 from mesoslip.output.writing import write
 
 OLD = ROOT / "tests" / "reference" / "old.nc"

@@ -134,7 +134,7 @@ class Study:
             if process.returncode not in {0, 1, -signal.SIGKILL}:
                 self.wrong.append(f"exit status {process.returncode}: {printed.decode()}")
                 return
-            if process.returncode == 1 and b"cost 3 workers" in printed:
+            if process.returncode == 1 and b"3 workers died" in printed:
                 output.unlink()
         self._check_stored(output, stored)
         self._check_log(log, output, told_before)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from mesoslip import Config, Realization
-from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
+from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 CASES = 24
 FINEST, RESOLUTIONS = 0.0625, (1.0, 0.5, 0.25)

@@ -19,7 +19,7 @@ from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.tables import PrintedTable, write_table
+from mesoslip.output.table_files import PrintedTable, write_table
 from mesoslip.quantities import column
 
 if TYPE_CHECKING:

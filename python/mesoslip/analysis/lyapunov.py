@@ -26,7 +26,7 @@ from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import LYAPUNOV
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import TRACE_COLUMNS
+from mesoslip.simulation.recorded_tables import TRACE_COLUMNS
 
 if TYPE_CHECKING:
     import xarray as xr

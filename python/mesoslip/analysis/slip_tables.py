@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from mesoslip.analysis.slips import Catalogue, as_recorded
-from mesoslip.output.tables import PrintedTable
+from mesoslip.output.table_files import PrintedTable
 from mesoslip.quantities import Column, column, number
 
 # Columns of the catalogue of slips: header, and unit in SI.

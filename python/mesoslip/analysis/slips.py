@@ -16,7 +16,7 @@ from mesoslip.analysis.stick_phases import stick_phases
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.tables import write_table
+from mesoslip.output.table_files import write_table
 
 if TYPE_CHECKING:
     import xarray as xr

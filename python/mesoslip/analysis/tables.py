@@ -7,7 +7,7 @@ import xarray as xr
 from mesoslip.analysis import avalanches, response, slip_tables, slips
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
-from mesoslip.output.tables import is_printed, write_printed
+from mesoslip.output.table_files import is_printed, write_printed
 
 
 def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:

@@ -12,7 +12,7 @@ from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.runner import groups, stored_measures
 from mesoslip.execution.store import Pieces
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import COLUMNS
+from mesoslip.simulation.recorded_tables import COLUMNS
 
 # Maximum number of combinations that are tried, and time for all of them [s].
 MAX_TRIED = 12

@@ -22,7 +22,7 @@ from mesoslip.execution.stop import Stop
 from mesoslip.output import writing
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import NO_MEMORY, Results
+from mesoslip.simulation.run_realizations import NO_MEMORY, Results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

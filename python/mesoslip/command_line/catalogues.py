@@ -29,7 +29,7 @@ def slips(
     from mesoslip.analysis import slip_tables
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
-    from mesoslip.output.tables import is_printed, write_printed
+    from mesoslip.output.table_files import is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
@@ -106,7 +106,7 @@ def avalanches(
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
-    from mesoslip.output.tables import is_printed, write_printed
+    from mesoslip.output.table_files import is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])

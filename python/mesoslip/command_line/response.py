@@ -57,7 +57,7 @@ def response(
         write_csv,
     )
     from mesoslip.output import targets
-    from mesoslip.output.tables import is_printed, latex, markdown, write_printed
+    from mesoslip.output.table_files import is_printed, latex, markdown, write_printed
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:

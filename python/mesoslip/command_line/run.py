@@ -25,7 +25,7 @@ from mesoslip.execution.stop import Stop, stopped_by_signals
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.simulation.checkpoint import Checkpoint
-    from mesoslip.simulation.runner import Results
+    from mesoslip.simulation.run_realizations import Results
 
 # Exit status after Ctrl-C.
 INTERRUPTED = 130
@@ -73,7 +73,7 @@ def run(
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
     from mesoslip.simulation.memory import check_memory
-    from mesoslip.simulation.runner import run_realizations
+    from mesoslip.simulation.run_realizations import run_realizations
 
     checked = load(config, changes)
     interval = quantity(checkpoint_interval, "--checkpoint-interval", "s", "30 s", negative=False)
@@ -189,7 +189,7 @@ def _mean_velocity(results: Results, config: Config) -> str:
     import numpy as np
 
     from mesoslip.quantities import with_unit
-    from mesoslip.simulation.tables import TRACE_COLUMNS
+    from mesoslip.simulation.recorded_tables import TRACE_COLUMNS
 
     wanted = [TRACE_COLUMNS.index(name) for name in ("time", "displacement")]
     velocities = []

@@ -1,4 +1,4 @@
-"""Checks between the tables of a configuration, whatever the kinds of its slider and contacts."""
+"""Checks between the tables of a configuration that hold for all kinds of sliders and contacts."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from mesoslip.configuration.drive import DrivePart
+from mesoslip.configuration.run_tables import Curve, Run
 from mesoslip.configuration.sliders import SLIDERS, base
 from mesoslip.configuration.table import Complaint, Complaints
-from mesoslip.configuration.tables import Curve, Run
 
 
 class Setting(base.Setting, Protocol):
@@ -62,7 +62,7 @@ def drive_problems(config: Setting) -> Complaints:
                 f"is never reached: the stages move the drive by {reach:g} m, and the last one "
                 f"{'stands still' if drive.continues else 'ends'}"
                 if drive.parts
-                else f"takes for ever at {drive.velocity:g} m/s",
+                else f"is never reached at {drive.velocity:g} m/s",
                 distance,
             )
     yield from _stop_problems(config)
@@ -110,7 +110,7 @@ def _stop_problems(config: Setting) -> Complaints:
 
 
 def output_problems(config: Setting) -> Complaints:
-    """Errors of [output], if the drive is right."""
+    """Errors of [output]; the drive must be right."""
     if not (config.expected_duration > 0 and math.isfinite(config.expected_duration)):
         yield Complaint("drive", "too slow or too fast for a finite duration of the run")
         return
@@ -151,7 +151,7 @@ def output_problems(config: Setting) -> Complaints:
 
 
 def curve_problems(config: Setting) -> Complaints:
-    """Errors that concern the force curve."""
+    """Errors of [curve]."""
     width, stretch = config.curve.newborn_width, config.contacts.break_stretch
     if width > 0.25 * stretch:
         yield Complaint(
@@ -162,7 +162,7 @@ def curve_problems(config: Setting) -> Complaints:
     if width > 0 and config.contacts.newborn_width > 0:
         yield Complaint(
             "curve.newborn_width",
-            "is for contacts without contacts.newborn_width, which the curve uses if it is given",
+            "must be 0 with contacts.newborn_width, which the curve uses then",
             width,
         )
     if width > 0 and config.contacts.initial == "steady":
@@ -174,7 +174,7 @@ def curve_problems(config: Setting) -> Complaints:
 
 
 def _below(bound: float, value: float) -> str:
-    """A bound that a value exceeds, with as many digits as distinguish them."""
+    """A bound with enough digits to distinguish it from a value above it."""
     texts = (f"{bound:.{digits}g}" for digits in range(6, 18))
     return next(text for text in texts if float(text) < value)
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from mesoslip.configuration.units import GROUPED, number_of, to_si
 from mesoslip.errors import FileError, shown
 
-# Stands for a column that is not read.
+# Header of a column that is not read.
 IGNORED = "-"
 HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
 DELIMITERS = ",;\t"
@@ -38,21 +38,8 @@ class FoundColumn(NamedTuple):
 
 @dataclass(frozen=True)
 class Cells:
-    """A table as text.
-
-    Attributes
-    ----------
-    source
-        Name of the file, for messages.
-    delimiter
-        Separator of columns; a space stands for any number of spaces.
-    first
-        Cells of the first row.
-    has_header
-        Whether the first row is a header.
-    lines
-        Number and text of the lines of numbers.
-    """
+    """A table as text, of a file ``source``: the delimiter (a space stands for any number of them),
+    cells of the first row, and the lines of numbers with their line numbers."""
 
     source: str
     delimiter: str
@@ -64,12 +51,7 @@ class Cells:
 def cells_of(text: str, source: str) -> Cells:
     """A table as text: columns separated by comma, semicolon, tab or spaces.
 
-    Lines that are empty or start with ``#`` are skipped.
-
-    Raises
-    ------
-    FileError
-        If it is empty, or its first row cannot be read.
+    Lines that are empty or start with ``#`` are skipped; a table without lines is a `FileError`.
     """
     lines = [
         (number, line.strip(" \r"))
@@ -80,7 +62,7 @@ def cells_of(text: str, source: str) -> Cells:
         raise FileError(f"{source}: is empty; expected columns with units, such as 'time [s]'")
     number, line = lines[0]
     found = {one: line.count(one) for one in DELIMITERS}
-    # A comma beside a semicolon or a tab is no separator.
+    # In a line with semicolons or tabs, a comma does not separate columns.
     delimiter = "," if found[","] else " "
     if found[";"] or found["\t"]:
         delimiter = ";" if found[";"] >= found["\t"] else "\t"
@@ -92,7 +74,7 @@ def cells_of(text: str, source: str) -> Cells:
 def _split(line: str, delimiter: str, source: str, number: int) -> list[str]:
     """Cells of a line."""
     if delimiter == " ":
-        # Units stand apart from names.
+        # A space may separate a name from its unit.
         return re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", line)
     if '"' not in line:
         return [cell.strip() for cell in line.split(delimiter)]
@@ -112,21 +94,10 @@ def _is_number(cell: str, delimiter: str) -> bool:
 def find_columns(
     headers: Sequence[str], known: Mapping[str, Quantity], source: str
 ) -> dict[str, FoundColumn]:
-    """Find the known columns, by the name of their quantity; others are not read.
+    """The columns of known quantities, by the name of the quantity; others are not read.
 
-    Parameters
-    ----------
-    headers
-        Headers such as "time [s]".
-    known
-        Quantities by the names that headers may have, in lower case, with underscores for spaces.
-    source
-        Name of the file, for messages.
-
-    Raises
-    ------
-    FileError
-        If a column occurs twice, or has no unit or a wrong one.
+    Keys of ``known`` are names of headers in lower case, with underscores for spaces. A `FileError`
+    if a column occurs twice, or has no unit or a wrong one.
     """
     places: dict[str, FoundColumn] = {}
     for column, header in enumerate(headers):
@@ -152,26 +123,12 @@ def find_columns(
 
 
 def values_of(
-    cells: Cells,
-    headers: Sequence[str],
-    places: Mapping[str, FoundColumn],
+    cells: Cells, headers: Sequence[str], places: Mapping[str, FoundColumn]
 ) -> dict[str, list[float]]:
-    """Values of columns in SI.
+    """Values in SI of the columns in ``places``, see `find_columns`.
 
-    Parameters
-    ----------
-    cells
-        The table.
-    headers
-        Headers of all its columns.
-    places
-        The columns to read, see `find_columns`.
-
-    Raises
-    ------
-    FileError
-        If a row has more cells than there are headers or lacks one that is read, or a cell is not
-        one unambiguous finite number.
+    A `FileError` if a row has more cells than there are headers, a cell is missing, or it is not
+    one unambiguous finite number.
     """
     values: dict[str, list[float]] = {name: [] for name in places}
     decimal = "." if cells.delimiter == "," else _decimal_of(cells, places.values())
@@ -199,13 +156,12 @@ POINT = "; numbers have a decimal point, and a comma would begin another cell"
 
 
 def _decimal_of(cells: Cells, places: Iterable[FoundColumn]) -> str:
-    """The decimal sign of a table in which commas separate no columns.
+    """The decimal sign of a table in which commas do not separate columns.
 
     It is a comma if some number has a comma that cannot group thousands, and no number has a point.
-    `number_of` refuses numbers that contradict it.
     """
     columns = [place.column for place in places]
-    comma = False
+    has_comma = False
     for number, line in cells.lines:
         if "," not in line:
             continue
@@ -213,5 +169,5 @@ def _decimal_of(cells: Cells, places: Iterable[FoundColumn]) -> str:
         numbers = [row[one] for one in columns if one < len(row)]
         if any("." in cell for cell in numbers):
             return "."
-        comma = comma or any("," in cell and not GROUPED.fullmatch(cell) for cell in numbers)
-    return "," if comma else "."
+        has_comma |= any("," in cell and not GROUPED.fullmatch(cell) for cell in numbers)
+    return "," if has_comma else "."

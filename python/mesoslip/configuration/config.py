@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import html
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -30,19 +31,28 @@ from mesoslip.configuration.files import (
 )
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
+from mesoslip.configuration.run_tables import Curve, Output, Run
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
-from mesoslip.configuration.tables import Curve, Output, Run
 from mesoslip.errors import ConfigError
 from mesoslip.quantities import with_unit
 
-# Samples of slips by default: in a period of the ringing on the pinned contacts, in a delay, and in
-# all slips of a run together at most as many as in its trace, or this number.
+# Default number of finer samples in a period of the ringing on the pinned contacts, and in a delay.
 SAMPLES_IN_RINGING = 50
 SAMPLES_IN_DELAY = 5
+# Default maximum number of samples in all slips together, unless the trace has more.
 SAMPLES_IN_SLIPS = 20_000
 # Tables and keys that do not describe contacts; all others have to be answered by their kind.
 OTHER_TABLES = frozenset({"title", "run", "drive", "slider", "contacts", "output", "curve"})
+
+
+@contextmanager
+def _problems_of(source: str) -> Iterator[None]:
+    """Raise the errors that pydantic finds as a `ConfigError` that names the source."""
+    try:
+        yield
+    except ValidationError as error:
+        raise ConfigError(problems(error, source, Config)) from None
 
 
 class Config(Table):
@@ -64,44 +74,28 @@ class Config(Table):
     _dropped: tuple[str, ...] = PrivateAttr(default=())
 
     def __init__(self, **tables: Any) -> None:
-        """Check a configuration given as its tables; see `from_dict`.
-
-        Raises
-        ------
-        ConfigError
-            If anything in it is wrong.
-        """
-        try:
+        """Check a configuration given as its tables; see `from_dict`."""
+        with _problems_of("configuration"):
             super().__init__(**tables)
-        except ValidationError as error:
-            raise ConfigError(problems(error, "configuration", type(self))) from None
 
-    # Validation does not call it, as it does the initializer of any model without this mark.
+    # Without this mark of pydantic, validation would call the initializer.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """Check a configuration given as its tables, as pydantic does; see `from_dict`.
-
-        Raises
-        ------
-        ConfigError
-            If anything in it is wrong.
-        """
-        try:
+        """Check a configuration given as its tables, as pydantic does; see `from_dict`."""
+        with _problems_of("configuration"):
             return super().model_validate(obj, **options)
-        except ValidationError as error:
-            raise ConfigError(problems(error, "configuration", cls)) from None
 
     def __eq__(self, other: object) -> bool:
-        """Whether another configuration describes the same run, whatever both are based on."""
+        """Whether both describe the same run; their bases are not compared."""
         return isinstance(other, Config) and self.__dict__ == other.__dict__
 
     @property
     def base(self) -> Config | None:
-        """The configuration that this one changes, if it can be run by itself.
+        """The configuration that this one changes, if it is a valid one by itself.
 
-        It is the file named by ``base``; without one, the configuration before changes were made.
+        It is the file named by ``base``; without one, the configuration before the changes.
         """
         if self._base is None:
             return None
@@ -137,7 +131,7 @@ class Config(Table):
             *self.contact_kind.problems(self, self.given_contact_keys),
             *checks.curve_problems(self),
         ]
-        # Output intervals are compared with the duration, which a wrong drive does not have.
+        # Intervals are compared with the duration, which needs a valid drive.
         return complaints or [*checks.output_problems(self)]
 
     @cached_property
@@ -173,7 +167,7 @@ class Config(Table):
     def duration(self) -> float:
         """Duration of the run [s]; infinite if only avalanches end it."""
         if self.run.duration is not None:
-            # A cycle or a history ends the run.
+            # The end of a cycle or a history ends the run.
             limit = math.inf if self.drive.continues else self.drive.length
             return min(self.run.duration, limit)
         if self.run.drive_displacement is not None:
@@ -182,7 +176,7 @@ class Config(Table):
 
     @property
     def expected_duration(self) -> float:
-        """Duration of the run [s], or an estimate of it if only avalanches end it."""
+        """Duration of the run [s], estimated if only avalanches end it."""
         if math.isfinite(self.duration):
             return self.duration
         contacts = self.contacts
@@ -193,18 +187,15 @@ class Config(Table):
         stiffness = self.spring_stiffness
         stretch = contacts.break_stretch
         loading = stretch + contacts.static_force / stiffness
-        # A break is followed by Nk/K others in the mean, or the slider would not keep up.
+        # An avalanche has 1 + Nk/K breaks on average, so that the slider keeps up with the drive.
         sliding = (self.run.avalanches or 0) * stretch / contacts.count
         sliding *= 1 + contacts.stiffness / stiffness
         return (loading + sliding) / abs(self.drive.velocity or math.nan)
 
     @property
     def steady_block(self) -> float:
-        """Distance that the drive moves in a block of the criterion for a steady state [m].
-
-        By default the one that loads spring and contacts to the static force; 0 without the
-        criterion.
-        """
+        """Distance of the drive in a block of the criterion for a steady state [m], by default that
+        which loads spring and contacts to the static force; 0 without the criterion."""
         steady = self.run.stops.steady
         if steady is None:
             return 0.0
@@ -218,7 +209,7 @@ class Config(Table):
 
     @property
     def series_stiffness(self) -> float:
-        """K, in series with the spring of a base [N/m]: what decides against K*."""
+        """K in series with the spring of a base [N/m], to be compared with K*."""
         return self.slider.series_stiffness
 
     @property
@@ -228,10 +219,8 @@ class Config(Table):
 
     @property
     def drive_speed(self) -> float:
-        """Speed of the first moving stage of the drive [m/s]; 0 if none moves.
-
-        For a ramp the maximum, for a measured history the mean.
-        """
+        """Speed of the first stage in which the drive moves [m/s], 0 if there is none; the maximum
+        of a ramp, the mean of a measured history."""
         if self.drive.is_force:
             return 0.0
         if self.drive.history is not None:
@@ -245,10 +234,9 @@ class Config(Table):
 
     @property
     def unreached_drive(self) -> str | None:
-        """A message about the part of a finite drive that the run does not reach; None if it
-        reaches all of it."""
+        """A message if the run ends before a finite drive; otherwise None."""
         length = self.drive.length
-        # Allow for rounding in the sum of the stages.
+        # The sum of the stages has rounding errors.
         if not self.duration < (1 - 1e-9) * length < math.inf:
             return None
         stages, reached = self.drive.parts[-1].stage + 1, self.drive_parts[-1].stage + 1
@@ -261,28 +249,28 @@ class Config(Table):
 
     @property
     def continued_drive(self) -> str | None:
-        """A message about a last stage that goes on beyond its end; None if none does."""
+        """A message if the last stage continues beyond its end; otherwise None."""
         length = self.drive.length
-        # As with stages whose durations are rounded in the file.
+        # Durations of stages may be rounded in the file.
         if not self.drive.parts or not 1.01 * length < self.duration < math.inf:
             return None
         given = "duration" if self.run.duration is not None else "drive_displacement"
         return (
-            f"the stages end after {with_unit(length, 's')}: the last one goes on for another "
+            f"the stages end after {with_unit(length, 's')}: the last one continues for another "
             f"{with_unit(self.duration - length, 's')}, until run.{given}"
         )
 
     @property
     def unreachable_stop(self) -> str | None:
-        """A message about a displacement that should end the run, but is farther away than the
-        drive and the contacts can move the slider; None if it can be reached."""
+        """A message if drive and contacts cannot move the slider to the displacement that should
+        end the run; otherwise None."""
         target = self.run.stops.displacement
         if target is None or self.drive.force_rate is not None or not self.spring_stiffness:
             return None
         length = math.fsum(part.path_length for part in self.drive_parts)
-        # A slip goes beyond the equilibrium of the spring by at most what the spring was stretched.
-        beyond = self.contacts.static_force / self.spring_stiffness
-        if not length + beyond < abs(target):
+        # A slip overshoots the equilibrium of the spring by at most the stretch of the spring.
+        overshoot = self.contacts.static_force / self.spring_stiffness
+        if not length + overshoot < abs(target):
             return None
         return (
             f"run.stop.displacement = {with_unit(target, 'm')} is out of reach: the drive moves "
@@ -355,8 +343,8 @@ class Config(Table):
     ) -> Config:
         """Check a configuration given as the text of a TOML file, with changes applied.
 
-        Without changes, ``base`` is the text of the configuration that it is based on. Both come
-        from an output and name no files; changes may.
+        ``base`` is the text of the configuration that it is based on, if there are no changes.
+        Both are of an output and must not name files; changes may.
         """
         tables, overrides = parse_toml(text, source), tuple(overrides)
         below = None if base is None else parse_toml(base, source)
@@ -367,10 +355,8 @@ class Config(Table):
 
     @classmethod
     def _checked(cls, merged: Merged, source: str, base: Mapping[str, Any] | None = None) -> Config:
-        try:
+        with _problems_of(source):
             config = super().model_validate(merged.tables)
-        except ValidationError as error:
-            raise ConfigError(problems(error, source, cls)) from None
         config._base, config._dropped = base, tuple(merged.dropped)
         return config
 
@@ -393,20 +379,12 @@ class Config(Table):
         return self._checked(override(Merged(old), (*changes, tables)), "configuration", old)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy, with other tables if given.
-
-        Raises
-        ------
-        ConfigError
-            If anything in it is wrong.
-        """
-        try:
+        """A copy, with other tables if given, which are checked."""
+        with _problems_of("configuration"):
             return super().model_copy(update=update, deep=deep)
-        except ValidationError as error:
-            raise ConfigError(problems(error, "configuration", type(self))) from None
 
     def _repr_html_(self) -> str:
-        """A short table of the keys that are set, for notebooks."""
+        """A short table of the given keys, for notebooks."""
         rows = "".join(
             f"<tr><th>{html.escape(name)}</th>"
             f"<td style='text-align: left'>{html.escape(_summary(table))}</td></tr>"

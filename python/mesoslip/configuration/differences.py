@@ -19,12 +19,12 @@ BOOKKEEPING = ("run.", "output.", "curve.")
 
 
 def is_bookkeeping(key: str) -> bool:
-    """Whether a key affects only how much is computed and recorded, not the motion."""
+    """Whether a key affects the length of a run and its record, but not the motion."""
     return key.startswith(BOOKKEEPING) and key != "run.engine"
 
 
 class Difference(NamedTuple):
-    """A key, and its values in the compared configurations, as text."""
+    """A key, and its values in the compared configurations as texts."""
 
     key: str
     values: tuple[str, ...]
@@ -47,17 +47,18 @@ def differences(configs: Sequence[Config]) -> list[Difference]:
 
 def flat(config: Config) -> dict[str, Any]:
     """Values of a configuration by dotted key, including defaults; lists are not split."""
-    return dict(_flat(config.to_dict(), ""))
+    return by_dotted_key(config.to_dict())
 
 
-def _flat(table: Mapping[str, Any], outer: str) -> list[tuple[str, Any]]:
-    rows: list[tuple[str, Any]] = []
-    for name, value in table.items():
+def by_dotted_key(tables: Mapping[str, Any], outer: str = "") -> dict[str, Any]:
+    """Values of nested tables by dotted key."""
+    values: dict[str, Any] = {}
+    for name, value in tables.items():
         if isinstance(value, Mapping):
-            rows += _flat(value, f"{outer}{name}.")
+            values |= by_dotted_key(value, f"{outer}{name}.")
         else:
-            rows.append((outer + name, value))
-    return rows
+            values[outer + name] = value
+    return values
 
 
 def text_of(key: str, value: Any) -> str:
@@ -76,21 +77,8 @@ def text_of(key: str, value: Any) -> str:
 
 
 def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
-    """A key with its unit, and values of it in that unit.
-
-    Parameters
-    ----------
-    key
-        Dotted key.
-    values
-        Values in SI, None where the key is not given.
-
-    Returns
-    -------
-    tuple
-        The key, such as "contacts.delay (ms)", and a text for each value. Lists of tables have
-        their units inside.
-    """
+    """A key with a unit, such as "contacts.delay (ms)", and its values (SI, or None) in that unit
+    as texts."""
     kind = key_kind(key)
     numbers = [one for value in values for one in _numbers(value)]
     if kind is None or kind.unit is None or not numbers:
@@ -108,7 +96,7 @@ def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
 
 
 def _numbers(value: Any) -> list[float]:
-    """The finite numbers of a value or of a list."""
+    """The finite numbers of a value or a list."""
     inner = value if isinstance(value, list | tuple) else [value]
     return [
         one
@@ -118,7 +106,7 @@ def _numbers(value: Any) -> list[float]:
 
 
 def _shortened(text: str, count: int) -> str:
-    """A list as text, with its end cut off if it is long."""
+    """The text of a list, cut off if it is long."""
     return text if len(text) <= MAX_LENGTH else f"{text[: MAX_LENGTH - 10]} … ({count} in total)"
 
 
@@ -130,12 +118,11 @@ def _text_in_list(key: str, value: Any) -> str:
 
 
 def changes(config: Config, base: Config) -> list[str]:
-    """Changes of a configuration relative to another one, a text for each key.
+    """Changes of a configuration relative to a base, a text for each key; bookkeeping comes last.
 
-    Keys of [run], [output] and [curve] come last. Keys that only the other one has, and defaults
-    that only this one has, are left out.
+    Keys that only the base has, and defaults that only the configuration has, are left out.
     """
-    own = dict(_flat(config.model_dump(exclude_none=True, exclude_defaults=True), ""))
+    own = by_dotted_key(config.model_dump(exclude_none=True, exclude_defaults=True))
     texts: list[str] = []
     last: list[str] = []
     for key, (value, before) in differences([config, base]):
@@ -149,8 +136,8 @@ def changes(config: Config, base: Config) -> list[str]:
 def labels(configs: Sequence[Config], names: Sequence[str]) -> list[str]:
     """A label for each configuration, from the keys in which it differs from the others.
 
-    Keys of [run], [output] and [curve] count only if no others differ. The name is the label of
-    configurations that are all alike, and is added to labels that several of them share.
+    Keys of [run], [output] and [curve] count only if no others differ. Equal configurations are
+    labelled with their names, and equal labels have the names in addition.
     """
     all_found = differences(configs)
     found = [one for one in all_found if not is_bookkeeping(one.key)] or all_found

@@ -1,7 +1,7 @@
-"""The drive: its tables in a file, and the parts of constant acceleration that the kernel is given.
+"""The drive: its tables in a file, and its parts of constant acceleration for the kernel.
 
 Every drive is a sequence of parts, in each of which the velocity changes linearly with time. Each
-part carries the number of its stage.
+part has the number of its stage.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.errors import FileError
 
-# Upper limit for the parts of a drive.
+# Maximum number of parts of a drive.
 MAX_PARTS = 1_000_000
 
-# The columns of a measured history that are read.
+# Columns of a measured history.
 COLUMNS = {
     "time": Quantity("time", "s", "time [s]"),
     "displacement": Quantity("displacement", "m", "displacement [um]"),
@@ -44,17 +44,8 @@ COLUMNS = {
 
 
 class DrivePart(NamedTuple):
-    """A part of the drive with constant acceleration.
-
-    Attributes
-    ----------
-    duration
-        Duration [s].
-    start_velocity, end_velocity
-        Velocities at its start and end [m/s]; for a drive by force, the rate of the force [N/s].
-    stage
-        Number of its stage, from 0.
-    """
+    """A part of the drive: duration [s], velocities at start and end [m/s] (of a force, its rate
+    [N/s]), and the number of its stage, from 0."""
 
     duration: float
     start_velocity: float
@@ -68,12 +59,12 @@ class DrivePart(NamedTuple):
 
     @property
     def path_length(self) -> float:
-        """Path length of the drive: distances in both directions add up [m]."""
+        """Path length of the drive [m]; distances in both directions add up."""
         return self.path_length_in(self.duration)
 
     @property
     def directions(self) -> set[float]:
-        """Signs of its velocities other than 0."""
+        """Signs of its velocities, without 0."""
         velocities = (self.start_velocity, self.end_velocity)
         return {math.copysign(1, one) for one in velocities if one}
 
@@ -115,16 +106,15 @@ class DrivePart(NamedTuple):
 
 
 class Stage(Table):
-    """A stage of the drive, which ends after a duration or a displacement: a constant velocity of
-    either sign, a ramp from one velocity to another, or a hold; or a force, constant or a ramp,
-    which ends after a duration."""
+    """A stage of the drive: a constant velocity, a ramp from one velocity to another, or a hold,
+    for a duration or a displacement; or a force, constant or a ramp, for a duration."""
 
     duration: Annotated[Time, Field(gt=0)] | None = None
     """Duration of the stage."""
     displacement: Annotated[Length, Field(gt=0)] | None = None
     """Distance that the drive moves in the stage, instead of a duration."""
     velocity: Velocity | None = None
-    """Velocity of the drive, of either sign."""
+    """Velocity of the drive; may be negative."""
     start_velocity: Velocity | None = None
     """Velocity at the start of a ramp."""
     end_velocity: Velocity | None = None
@@ -132,7 +122,7 @@ class Stage(Table):
     hold: StrictBool | None = None
     """Whether the drive stands still."""
     force: SignedForce | None = None
-    """Force on a slider without a spring, of either sign."""
+    """Force on a slider without a spring; may be negative."""
     start_force: SignedForce | None = None
     """Force at the start of a ramp."""
     end_force: SignedForce | None = None
@@ -214,8 +204,8 @@ class Stage(Table):
 
 
 class Cycle(Table):
-    """An oscillating drive: from 0 to plus the amplitude, to minus the amplitude, and so on, back
-    to 0 at the end. Each stroke is a stage."""
+    """An oscillating drive, between plus and minus the amplitude, from 0 and back to 0 at the end.
+    Each stroke is a stage."""
 
     shape: Literal["triangle"] = "triangle"
     """`triangle`: constant speed in each stroke."""
@@ -236,7 +226,7 @@ class Cycle(Table):
 
     @property
     def speed(self) -> float:
-        """Speed of the drive; a cycle is four amplitudes long [m/s]."""
+        """Speed of the drive [m/s]; the path length of a cycle is four amplitudes."""
         if self.velocity is not None:
             return self.velocity
         assert self.frequency is not None
@@ -302,18 +292,9 @@ class History(Table):
 
 
 def read_history(path: Path) -> dict[str, list[float]]:
-    """Points of a measured history of the drive [s, m].
+    """Points of a measured history of the drive [s, m] from a file, see `columns`.
 
-    Parameters
-    ----------
-    path
-        A table, see `mesoslip.configuration.columns`. Its header names the columns with their
-        units, ``time [s]`` first and ``displacement [um]`` anywhere; others are not read.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read or is not such a table; the message names the line and the fix.
+    The first column must be ``time [s]``; ``displacement [um]`` may be any other.
     """
     cells = cells_of(text_of(path, "a history of the drive"), str(path))
     wanted = "the header must name the columns with units, such as time [s],displacement [um]"
@@ -334,13 +315,13 @@ def read_history(path: Path) -> dict[str, list[float]]:
 
 
 class Drive(Table):
-    """The drive: one velocity, stages (which may be repeated), oscillation, a measured history, or
-    a force, constant or growing."""
+    """The drive: one velocity, stages, an oscillation, a measured history, or a force, constant or
+    growing."""
 
     velocity: Velocity | None = None
     """One velocity for the whole run."""
     stage: tuple[Stage, ...] | None = None
-    """Stages one after another, as `[[drive.stage]]` tables."""
+    """Successive stages, as `[[drive.stage]]` tables."""
     repeat: Annotated[Whole, Field(ge=1, le=MAX_PARTS)] | None = None
     """Number of passes through the list of stages."""
     cycle: Cycle | None = None
@@ -348,9 +329,9 @@ class Drive(Table):
     history: History | None = None
     """A measured motion of the drive."""
     force: SignedForce | None = None
-    """Constant force on a slider of kind "force", from the start of the run on."""
+    """Constant force on a slider of kind "force", from the start of the run."""
     force_rate: ForceRate | None = None
-    """Rate of a force that acts on a slider without a spring, from 0 on."""
+    """Rate of a force on a slider without a spring, which grows from 0."""
 
     @model_validator(mode="after")
     def _one_of_them(self) -> Self:
@@ -376,7 +357,7 @@ class Drive(Table):
 
     @cached_property
     def parts(self) -> tuple[DrivePart, ...]:
-        """Its given parts; none for one velocity or rate without end."""
+        """The given parts; empty for one velocity or rate without end."""
         if self.stage is not None:
             once = [one.part(0) for one in self.stage]
             times = range(self.repeat or 1)
@@ -390,7 +371,7 @@ class Drive(Table):
 
     @property
     def is_force(self) -> bool:
-        """Whether it prescribes a force instead of a displacement."""
+        """Whether the drive is a force instead of a displacement."""
         return (
             self.force is not None
             or self.force_rate is not None
@@ -398,13 +379,8 @@ class Drive(Table):
         )
 
     def start_forces(self, parts: Sequence[DrivePart]) -> tuple[float, ...] | None:
-        """Force at the start of each part [N]; None where the drive's value is continuous.
-
-        Parameters
-        ----------
-        parts
-            The parts of a run, as of `until`.
-        """
+        """Force at the start of each part of a run [N]; None where the drive's value is continuous,
+        or not a force."""
         if self.force is not None:
             return (self.force,) * len(parts)
         if self.stage is None or not self.is_force:
@@ -412,7 +388,7 @@ class Drive(Table):
         given = [one.first_force for one in self.stage] * (self.repeat or 1)
         last = parts[-1]
         if last.stage == len(given):
-            # The force stays where the last stage left it.
+            # The last force continues.
             final = self.stage[-1]
             given.append(final.force if final.force is not None else final.end_force or 0.0)
         return tuple(given[part.stage] for part in parts)
@@ -427,7 +403,7 @@ class Drive(Table):
 
     @property
     def continues(self) -> bool:
-        """Whether it continues after its parts, at its last velocity or with its last force."""
+        """Whether it continues after its parts, with its last velocity or force."""
         return self.cycle is None and self.history is None
 
     @cached_property
@@ -445,7 +421,7 @@ class Drive(Table):
         return (self.velocity if self.force_rate is None else self.force_rate) or 0.0
 
     def time_for(self, path_length: float) -> float:
-        """Time that a path length takes [s]; infinite if the drive does not get so far."""
+        """Time that a path length takes [s]; infinite if the drive does not reach it."""
         time = 0.0
         for part in self.parts:
             if part.path_length >= path_length:
@@ -458,18 +434,18 @@ class Drive(Table):
     def until(self, duration: float) -> tuple[DrivePart, ...]:
         """Its parts until a time [s], continued at the last velocity if they are shorter."""
         parts: list[DrivePart] = []
-        left = duration
+        remaining = duration
         for part in self.parts:
-            parts.append(part.cut(left))
-            left -= parts[-1].duration
-            if left <= 0:
+            parts.append(part.cut(remaining))
+            remaining -= parts[-1].duration
+            if remaining <= 0:
                 break
-        if left > 0 or not parts:
+        if remaining > 0 or not parts:
             velocity = self.last_velocity
             last = parts[-1] if parts else DrivePart(0.0, velocity, velocity, 0)
             if last.start_velocity == velocity and last.end_velocity == velocity:
-                parts[-1:] = [last._replace(duration=last.duration + left)]
-            elif left > 1e-12 * duration:
-                # After a ramp.
-                parts.append(DrivePart(left, velocity, velocity, last.stage + 1))
+                parts[-1:] = [last._replace(duration=last.duration + remaining)]
+            elif remaining > 1e-12 * duration:
+                # After a ramp, a constant velocity is another stage.
+                parts.append(DrivePart(remaining, velocity, velocity, last.stage + 1))
         return tuple(parts)

@@ -13,7 +13,7 @@ from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.sliders import DEFAULT, SLIDERS
 from mesoslip.errors import ConfigError, FileError, Problem
 
-# Keys that exclude each other: one replaces another one of the base.
+# Keys that exclude each other: each replaces those of the base.
 EXCLUSIVE = {
     "run": ("duration", "drive_displacement"),
     "drive": ("velocity", "stage", "cycle", "history", "force", "force_rate"),
@@ -26,7 +26,7 @@ EXCLUSIVE = {
 # Keys that name a file, relative to the folder of the configuration.
 FILES = (("drive", "history", "file"), ("contacts", "threshold", "file"))
 
-# Removes a key.
+# Value of a change that removes a key.
 NONE = "none"
 
 Change = str | Mapping[str, Any]
@@ -34,47 +34,25 @@ Change = str | Mapping[str, Any]
 
 @dataclass
 class Merged:
-    """Merged tables.
-
-    Attributes
-    ----------
-    tables
-        The result.
-    dropped
-        Dotted keys that were dropped because the new kind of slider does not have them.
-    """
+    """Merged tables, and dotted keys that the new kind of slider does not have."""
 
     tables: dict[str, Any]
     dropped: list[str] = field(default_factory=list)
 
 
 def read_toml(path: Path) -> Merged:
-    """Tables of a file, merged with those of its base.
-
-    Raises
-    ------
-    FileError
-        If a file cannot be read.
-    ConfigError
-        If it is not valid TOML, or files are based on each other in a circle.
-    """
+    """Tables of a file, merged with those of its base."""
     return _read(path, ())
 
 
 def base_of(path: Path) -> dict[str, Any] | None:
-    """Tables of the file that a file names as its base, if it names one; see `read_toml`."""
+    """Tables of the base of a file, if it has one."""
     base = parse_toml(text_of(path, "a configuration file"), str(path)).get("base")
     return None if base is None else _read(path.parent / base, (path,)).tables
 
 
 def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> Merged:
-    """Tables merged with those of the file that their key ``base`` names, relative to a folder.
-
-    Raises
-    ------
-    FileError, ConfigError
-        See `read_toml`.
-    """
+    """Tables merged with those of the file that their key ``base`` names, relative to a folder."""
     return _on_base(dict(tables), source, folder, ())
 
 
@@ -103,7 +81,7 @@ def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Pat
 
 
 def _check_base(path: Path, source: str, base: str) -> None:
-    """Check that a base exists; its other errors are found when it is read."""
+    """Check that a base exists; reading it finds other errors."""
     try:
         path.stat()
     except FileNotFoundError:
@@ -116,7 +94,7 @@ def _check_base(path: Path, source: str, base: str) -> None:
 
 
 def _place_file(tables: dict[str, Any], keys: Sequence[str], folder: Path) -> None:
-    """Make a file relative to the folder of the file that names it, in copies of the tables."""
+    """Replace the name of a file by its path, in copies of the tables."""
     key, *inner = keys
     value = tables.get(key)
     if inner and isinstance(value, Mapping):
@@ -136,31 +114,19 @@ def _are_the_same(path: Path, other: Path) -> bool:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """Tables of a text in TOML.
-
-    Raises
-    ------
-    ConfigError
-        If it is not valid TOML, or nested too deeply to be read.
-    """
+    """Tables of a text in TOML; a `ConfigError` if it is not valid or nested too deeply."""
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise ConfigError([Problem(source, "", "is nested too deeply")]) from None
-    # This includes the parser's own error, and that of numbers with too many digits.
+    # The error of the parser, or of a number with too many digits.
     except ValueError as error:
         message = f'not valid TOML: {error}; quantities have quotes, as in "97 N/m"'
         raise ConfigError([Problem(source, "", message)]) from None
 
 
 def check_no_files(tables: Mapping[str, Any], source: str, prefix: str = "") -> None:
-    """Check that tables of an output name no files: they contain what was read.
-
-    Raises
-    ------
-    ConfigError
-        If a table has a key ``file``.
-    """
+    """Refuse a key ``file`` in the tables of an output, which contain the data themselves."""
     for key, value in tables.items():
         where = f"{prefix}{key}"
         if isinstance(value, Mapping):
@@ -170,7 +136,7 @@ def check_no_files(tables: Mapping[str, Any], source: str, prefix: str = "") -> 
 
 
 def _merge_over(base: Merged, over: Mapping[str, Any]) -> Merged:
-    """Merge tables into those of a base; a new kind of slider keeps the keys that it also has."""
+    """Merge tables over those of a base; a new kind of slider keeps the keys that it has too."""
     tables, dropped = base.tables, []
     slider, change = tables.get("slider"), over.get("slider")
     if isinstance(slider, Mapping) and isinstance(change, Mapping) and "kind" in change:
@@ -181,12 +147,12 @@ def _merge_over(base: Merged, over: Mapping[str, Any]) -> Merged:
 
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any], table: str = "") -> dict[str, Any]:
-    """Merge tables; of keys that exclude each other the new one stays, and None removes a key."""
+    """Merge tables; a new key replaces those that it excludes, and None removes a key."""
     merged = dict(base)
     exclusive = EXCLUSIVE.get(table, ())
     if any(over.get(key) is not None for key in exclusive):
         dropped = {key for key in exclusive if key not in over}
-        # The number of repetitions goes with the stages.
+        # Without the stages, the number of repetitions is dropped too.
         dropped |= {"repeat"} if "stage" in dropped else set()
         merged = {key: value for key, value in merged.items() if key not in dropped}
     for key, value in over.items():
@@ -213,21 +179,8 @@ def _of_kind(slider: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
 
 
 def override(base: Merged, changes: Iterable[Change]) -> Merged:
-    """Apply changes to tables.
-
-    Parameters
-    ----------
-    base
-        The tables.
-    changes
-        Strings such as "contacts.delay=1ms", or tables, whose names may be dotted. "none", or None
-        in tables, removes a key.
-
-    Raises
-    ------
-    ConfigError
-        If a string does not have that form.
-    """
+    """Apply changes to tables: strings such as "contacts.delay=1ms", or tables, whose names may be
+    dotted; "none", or None in tables, removes a key."""
     # All changes at once: keys set together with a new kind are not dropped.
     together: dict[str, Any] = {}
     for change in changes:

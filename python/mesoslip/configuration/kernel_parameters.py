@@ -1,4 +1,4 @@
-"""Parameters as kernels take them: names with numbers, words or lists of numbers."""
+"""Parameters for the kernels: names with numbers, words or lists of numbers."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 Names = NDArray[np.bytes_]
-# Numbers, words, or lists of numbers, by name.
 Parameters = dict[str, float | str | tuple[float, ...]]
 
-# Characters of a name, see fortran/numerics/parameters.f90.
+# Number of characters of a name, see fortran/numerics/parameters.f90.
 NAME_LENGTH = 32
 
 
 def named(
     parameters: Mapping[str, float | str | tuple[float, ...]],
 ) -> tuple[Names, NDArray[np.float64], Names]:
-    """Parameters as a kernel takes them: names, numbers, and words where there are no numbers.
+    """Arrays of names, numbers and words; the name of a list is repeated for each of its numbers.
 
-    The name of a list occurs as often as it has numbers.
+    A word has the number 0, and a number an empty word.
     """
     names: list[str] = []
     numbers: list[float] = []
@@ -30,10 +29,10 @@ def named(
         names += [name] * len(several)
         numbers += [0.0 if isinstance(one, str) else float(one) for one in several]
         words += [one if isinstance(one, str) else "" for one in several]
-    # Of arrays of one length f2py refuses all but the first if that is 0.
+    # f2py refuses arrays that share a length if that is 0.
     return padded(names), np.array(numbers or [0.0]), padded(words or [""])
 
 
 def padded(words: Iterable[str]) -> Names:
-    """Words with blanks behind, as Fortran compares them."""
+    """Words padded with blanks, for Fortran."""
     return np.array([word.ljust(NAME_LENGTH).encode() for word in words], dtype=f"S{NAME_LENGTH}")

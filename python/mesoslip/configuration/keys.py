@@ -18,18 +18,9 @@ from mesoslip.configuration.units import cf_units
 
 @dataclass(frozen=True)
 class KeyKind:
-    """The kind of value of a key.
+    """The kind of value of a key, with an example; ``unit`` is None for whole numbers and names.
 
-    Attributes
-    ----------
-    unit
-        Unit of a quantity, such as "N/m", "1" for a plain number; None for whole numbers and names.
-    example
-        A right value of a quantity.
-    is_whole
-        Whether it is a whole number.
-    is_single
-        Whether it is one value, not a list or a table.
+    A key whose value is a list or a table is not single.
     """
 
     unit: str | None
@@ -90,7 +81,7 @@ def _parts(annotation: Any) -> Iterator[Any]:
 
 
 def nearest_keys(key: str) -> list[str]:
-    """Known keys that a wrong one may be meant to be."""
+    """Known keys similar to a wrong one."""
     known = list(dict.fromkeys(all_keys(Config)))
     name = key.rpartition(".")[2]
     elsewhere = [one for one in known if one.rpartition(".")[2] == name]

@@ -15,17 +15,7 @@ from mesoslip.errors import Problem
 
 
 def problems(error: ValidationError, source: str, whole: type[Table]) -> list[Problem]:
-    """All errors of a configuration.
-
-    Parameters
-    ----------
-    error
-        The errors that pydantic found.
-    source
-        Name of the configuration.
-    whole
-        The outermost table.
-    """
+    """The errors that pydantic found in a configuration, whose outermost table is ``whole``."""
     found = []
     for details in error.errors():
         if details["type"] == "tables":
@@ -74,7 +64,7 @@ def _unknown_key(path: list[Any], slider: str, whole: type[Table]) -> str:
     """The message about a key that its table does not have."""
     table, name = _dotted(path[:-1]), str(path[-1])
     if (table, name) == ("", "base"):
-        return "names the file that a file is based on, and cannot be changed"
+        return "names the base of a file, and cannot be changed"
     if (table, name) == ("", "sweep"):
         return "describes many runs; the command for it is mesoslip sweep"
     kinds = [kind for kind, model in SLIDERS.items() if name in model.model_fields]
@@ -83,7 +73,7 @@ def _unknown_key(path: list[Any], slider: str, whole: type[Table]) -> str:
         return f"is for slider.kind = {named} only"
     keys = _table_at(path[:-1], slider, whole).model_fields.keys()
     near = difflib.get_close_matches(name, [*keys, *([] if table else ["base"])], 1)
-    # A right name in the wrong table is more likely than a similar name.
+    # The same name in another table is more likely than a similar name.
     elsewhere = sorted({key for key in all_keys(whole) if key.rpartition(".")[2] == name})
     meant = " or ".join(repr(key) for key in elsewhere or near)
     return f"unknown key; did you mean {meant}?" if meant else "unknown key"

@@ -1,4 +1,4 @@
-"""Text files named by a user."""
+"""Text files that users name."""
 
 from __future__ import annotations
 
@@ -16,30 +16,24 @@ MAX_BYTES = 2**26
 
 
 def as_path(path: PathLike) -> Path:
-    """The path of a file.
-
-    Raises
-    ------
-    FileError
-        If it is not one.
-    """
+    """The path of a file; a `FileError` for other objects."""
     if not isinstance(path, str | os.PathLike):
         raise FileError(f"{shown(path)}: is not the path of a file")
     return Path(path)
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a regular file; false for names that the system refuses, as too long."""
+    """Whether there is a regular file; false for names that the system refuses."""
     return stat.S_ISREG(_mode(path))
 
 
 def is_directory(path: Path) -> bool:
-    """Whether there is a directory; false for names that the system refuses, as too long."""
+    """Whether there is a directory; false for names that the system refuses."""
     return stat.S_ISDIR(_mode(path))
 
 
 def _mode(path: Path) -> int:
-    """Type and permissions of a file; 0 if there is none."""
+    """Type and permissions of a file; 0 if there is no file."""
     try:
         return path.stat().st_mode
     except (OSError, ValueError):
@@ -47,22 +41,7 @@ def _mode(path: Path) -> int:
 
 
 def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
-    """Text of a file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    kind
-        Its kind, such as "a configuration file".
-    max_bytes
-        Maximum size of the file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, is not a regular file, or is too long.
-    """
+    """Text of a regular file; errors name its kind, such as "a configuration file"."""
     try:
         state = path.stat()
         if stat.S_ISDIR(state.st_mode):

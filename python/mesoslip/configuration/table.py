@@ -1,4 +1,4 @@
-"""Parts of the tables of a configuration file: quantities in SI units, and choices."""
+"""The base of all tables of a configuration file, and types of keys: quantities, choices, texts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_POINTS = 100_000
 
 
 def _within(value: object, unit: str, example: str, minimum: float, maximum: float) -> float:
-    """A quantity in an SI unit: 0, or of a size within bounds."""
+    """A quantity in an SI unit: 0, or a size within bounds."""
     number = to_si(value, unit, example)
     if number != 0 and not minimum <= abs(number) <= maximum:
         in_unit = "" if unit == "1" else f" {unit}"
@@ -41,13 +41,7 @@ def _quantity(unit: str, example: str, minimum: float, maximum: float) -> Any:
 
 
 def with_ranges(values: object) -> object:
-    """A list of times in which each ``{ from, to, points }`` is replaced by equidistant times [s].
-
-    Raises
-    ------
-    ValueError
-        If a range has other keys, or wrong values.
-    """
+    """A list of times [s], with equidistant times for each ``{ from, to, points }``."""
     if not isinstance(values, list | tuple):
         return values
     return [time for one in values for time in _times(one)]
@@ -79,7 +73,7 @@ def _whole(value: object) -> object:
 
 
 def _writable(text: str) -> str:
-    """A text that can be written to any file; arguments of a command line may not be."""
+    """A text that can be written to files, unlike some arguments of a command line."""
     try:
         text.encode()
     except UnicodeEncodeError as error:
@@ -89,9 +83,9 @@ def _writable(text: str) -> str:
     return text
 
 
-# From below an atom's vibration to the age of the Earth.
+# From less than an atom's vibration to the age of the Earth.
 Time = Annotated[float, _quantity("s", "0.5 ms", 1e-18, 1e18)]
-# Up to that of light.
+# Up to the speed of light.
 Velocity = Annotated[float, _quantity("m/s", "0.1 um/s", 1e-20, 3e8)]
 Mass = Annotated[float, _quantity("kg", "1.47 g", 1e-27, 1e24)]
 Stiffness = Annotated[float, _quantity("N/m", "97 N/m", 1e-18, 1e18)]
@@ -125,7 +119,7 @@ Complaints = Iterator[Complaint]
 
 
 class Table(BaseModel):
-    """A table of the file: unknown keys are errors, and it is immutable."""
+    """An immutable table of the file; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -147,7 +141,7 @@ class Table(BaseModel):
         }
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy, with other values if given, which are checked."""
+        """A copy; updated values are checked."""
         if not update:
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in self.model_fields_set}

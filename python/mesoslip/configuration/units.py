@@ -1,7 +1,7 @@
 """Quantities with units, converted to plain numbers in SI.
 
 A quantity is one number and one unit, read by strict patterns. SI units are converted here,
-exactly; other units by pint, which takes a while to load.
+exactly; other units by pint, which is slow to load.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PREFIXES |= {"c": -2, "d": -1, "k": 3, "M": 6, "G": 9, "T": 12}
 # Maximum number of characters of a quantity.
 MAX_LENGTH = 200
 
-# More digits than any conversion needs, and exponents of any size, which become 0 or infinity.
+# More digits than any conversion needs; extreme exponents become 0 or infinity.
 EXACT = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN, traps=[])
 
 
@@ -62,15 +62,9 @@ NONE = Unit(Decimal(1), (0, 0, 0))
 
 
 def number_of(text: str, decimal: str = ".") -> float:
-    """A text as a number: digits 0 to 9, with a decimal point or the given decimal sign.
-
-    Raises
-    ------
-    ValueError
-        If it is not a number; the message says what would be right.
-    """
+    """A text as a number: digits 0 to 9, with a decimal point or the given decimal sign."""
     plain = text.replace(",", ".") if decimal == "," and text.count(",") <= 1 else text
-    # Python reads digits of all scripts, and underscores between them.
+    # Python would accept digits of all scripts, and underscores between them.
     if plain.isascii() and "_" not in plain and not (decimal == "," and "." in text):
         try:
             return float(plain)
@@ -94,22 +88,8 @@ def _with_comma(text: str, decimal: str) -> str:
 
 
 def to_si(value: object, unit: str, example: str) -> float:
-    """A quantity as a plain number in an SI unit.
-
-    Parameters
-    ----------
-    value
-        A number of any library, taken to be in ``unit``, or a string with one number and one unit.
-    unit
-        The SI unit, such as "N/m".
-    example
-        A right value, for the message.
-
-    Raises
-    ------
-    ValueError
-        If the value is not a finite quantity of the unit's dimension.
-    """
+    """A quantity as a plain number in an SI unit such as "N/m", from a number in that unit, or a
+    string with one number and one unit; a `ValueError` names an example of a right value."""
     wanted = f"expected a quantity such as {example!r}, or a number in {unit}"
     if isinstance(value, bool) or not isinstance(value, Real | str):
         raise ValueError(wanted)
@@ -201,33 +181,33 @@ def _named(name: str) -> Unit | None:
 
 @cache
 def registry() -> UnitRegistry[float]:
-    """pint's units; created at first use, as that takes a while, without a cache file."""
+    """pint's units; creating them is slow, so they are created at first use."""
     import pint
 
     return pint.UnitRegistry(cache_folder=None)
 
 
 def _named_by_pint(name: str) -> Unit | None:
-    """A unit that is not of the SI, by its name."""
+    """A unit outside the SI, by its name."""
     import pint
 
     try:
-        none, one = (registry().Quantity(count, name).to_base_units() for count in (0.0, 1.0))
+        zero, one = (registry().Quantity(count, name).to_base_units() for count in (0.0, 1.0))
     # A number, such as "nan", raises ValueError.
     except (pint.PintError, ValueError):
         return None
-    # Degrees Celsius and decibels have an offset or are logarithmic.
-    if none.magnitude != 0:
+    # Degrees Celsius have an offset, and decibels are logarithmic.
+    if zero.magnitude != 0:
         return None
     powers: dict[str, Any] = dict(one.dimensionality)
-    known = tuple(float(powers.pop(f"[{what}]", 0)) for what in ("length", "mass", "time"))
+    known = tuple(float(powers.pop(f"[{base}]", 0)) for base in ("length", "mass", "time"))
     # No key of a configuration has other dimensions.
     dimension = known + ((1.0,) if powers else ())
     return Unit(Decimal(one.magnitude), dimension)
 
 
 def cf_units(unit: str) -> str:
-    """A unit as CF writes it in files: "N m-1" for "N/m"."""
+    """A unit in the notation of CF: "N m-1" for "N/m"."""
     above, _, below = unit.replace("^", "").partition("/")
     parts = [part for part in (above,) if part != "1"]
     if below:
@@ -237,7 +217,7 @@ def cf_units(unit: str) -> str:
 
 
 def from_cf_units(units: str) -> str:
-    """A unit of a file as configurations write it: "N/m" for "N m-1"."""
+    """A unit of CF in the notation of configurations: "N/m" for "N m-1"."""
     above: list[str] = []
     below: list[str] = []
     for part in units.split():

@@ -412,7 +412,7 @@ def _fastest(passage: Passage) -> float:
 
 
 def _no_trace() -> Trace:
-    from mesoslip.simulation.tables import TRACE_COLUMNS, structured
+    from mesoslip.simulation.recorded_tables import TRACE_COLUMNS, structured
 
     return structured(np.empty((0, len(TRACE_COLUMNS))), TRACE_COLUMNS)
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.simulation.archive import Archive, entries
-from mesoslip.simulation.assembly import NEVER, assemble
 from mesoslip.simulation.kernel import Array, Kernel, Words
-from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
+from mesoslip.simulation.kernel_setup import NEVER, configured_kernel
+from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -147,7 +147,9 @@ class Motion:
 
     def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
         """A kernel at a state, or at the start; the drive ends at a time [s]."""
-        kernel = assemble(self.config, self._template, end_time=end_time, interval=self.interval)
+        kernel = configured_kernel(
+            self.config, self._template, end_time=end_time, interval=self.interval
+        )
         if words is None:
             kernel.start(self.config.contacts.initial)
         else:

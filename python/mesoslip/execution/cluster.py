@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: `distributed`, which is imported only when it is asked for."""
+"""Workers of a Dask cluster; the package `distributed` is imported when they are used."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 # Time for a scheduler to answer [s].
 ANSWER_SECONDS = 10.0
-# Pieces in flight for each thread of the cluster, so that none waits for the next.
+# Pieces in flight for each thread of the cluster, so that threads need not wait for pieces.
 PIECES_PER_THREAD = 3
-# How often the threads of the cluster are counted [s].
+# Time between two counts of the threads of the cluster [s].
 COUNT_SECONDS = 5.0
-# Time without any worker after which that is reported [s].
+# Time without any worker after which a warning is logged [s].
 ALONE_SECONDS = 3.0
-GONE = "the scheduler of the cluster is gone"
-# Libraries that report lost connections in their own words.
+GONE = "the connection to the scheduler of the cluster is lost"
+# Libraries that log lost connections.
 LOGGERS = ("distributed", "tornado", "asyncio")
 
 _LOG = logging.getLogger("mesoslip")
@@ -36,19 +36,8 @@ _LOG = logging.getLogger("mesoslip")
 
 @contextmanager
 def connected(address: str) -> Iterator[Client]:
-    """A client of a scheduler.
-
-    Parameters
-    ----------
-    address
-        Such as "tcp://host:8786", or the file with which the scheduler was started
-        (``--scheduler-file``), whose name ends in ".json".
-
-    Raises
-    ------
-    FileError
-        If `distributed` is not installed, or there is no scheduler.
-    """
+    """A client of a scheduler at an address such as "tcp://host:8786", or in a ``.json`` file that
+    the scheduler wrote (``--scheduler-file``); a `FileError` if there is none."""
     try:
         from distributed import Client
         from distributed.comm.addressing import parse_address, parse_host_port
@@ -61,7 +50,7 @@ def connected(address: str) -> Iterator[Client]:
             given = address
             if address.endswith(".json"):
                 address = str(json.loads(Path(address).read_text(encoding="utf-8"))["address"])
-            # A client that finds nothing complains when it is thrown away: ask before.
+            # A client that finds no scheduler logs errors when deleted: try the address first.
             parse_host_port(parse_address(address)[1])
             client = Client(address, timeout=ANSWER_SECONDS, set_as_default=False)
         except (LookupError, OSError, TypeError, ValueError) as error:
@@ -75,7 +64,7 @@ def connected(address: str) -> Iterator[Client]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what libraries log about connections: it is reported as an error of this program."""
+    """Suppress what libraries log about connections, which errors of this program report."""
     names = [one for one in logging.root.manager.loggerDict if one.split(".")[0] in LOGGERS]
     loggers = [logging.getLogger(name) for name in {*names, *LOGGERS}]
     levels = [(one, one.level) for one in loggers]
@@ -89,9 +78,9 @@ def _quiet() -> Iterator[None]:
 
 
 class ClusterPool(Pool):
-    """The workers of a cluster. A piece whose worker is lost is computed by another one.
+    """The workers of a cluster; a piece whose worker is lost is computed by another one.
 
-    A piece that has cost several workers fails with the error of `distributed` that says so.
+    A piece that ended several workers fails with the error of `distributed` for that.
     """
 
     def __init__(self, client: Client) -> None:
@@ -108,7 +97,7 @@ class ClusterPool(Pool):
         return PIECES_PER_THREAD * max(1, self._threads)
 
     def submit(self, function: Function[Any, Result], piece: object) -> Future[Result]:
-        # Under a key of its own: no result of another client is taken for it.
+        # A unique key, so that results of other clients are not mistaken for this one.
         key = f"mesoslip-{uuid.uuid4()}"
         future: Future[Result] = self._executor.submit(
             compute_elsewhere, function, piece, program(), key=key

@@ -1,4 +1,4 @@
-"""Executors: where pieces of work are computed. The results do not depend on it."""
+"""Executors, which compute pieces of work; the results do not depend on the executor."""
 
 from __future__ import annotations
 
@@ -24,35 +24,18 @@ from mesoslip.execution.stop import Stop, StopRequest
 if TYPE_CHECKING:
     from distributed import Client
 
-# How often progress, signals and workers are looked at [s].
+# Time between two checks of progress, signals and workers [s].
 POLL_SECONDS = 0.1
 
 
 class Executor(ABC):
-    """Where pieces of work are computed.
-
-    Attributes
-    ----------
-    shares_memory
-        Whether pieces are computed in this process, and may change what it holds.
-    """
+    """Computes pieces of work; one that shares memory computes them in this process."""
 
     shares_memory = False
 
     @abstractmethod
     def open(self, stop: Stop) -> AbstractContextManager[Pool]:
-        """Workers, for as long as the context lasts.
-
-        Parameters
-        ----------
-        stop
-            Flag that pieces on threads of this process check.
-
-        Raises
-        ------
-        FileError
-            If there is no cluster.
-        """
+        """Workers for the duration of the context; pieces in this process check the stop."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +58,7 @@ class Threads(_Local):
     Parameters
     ----------
     workers
-        Pieces at the same time; as many as there are processors by default.
+        Number of pieces at the same time; by default the number of processors.
     """
 
     shares_memory = True
@@ -88,20 +71,14 @@ class Processes(_Local):
     Parameters
     ----------
     workers
-        Pieces at the same time; as many as there are processors by default.
+        Number of pieces at the same time; by default the number of processors.
     """
 
     thread_seconds = 0.0
 
 
 class ThreadsThenProcesses(_Local):
-    """Threads, which start at once, and processes for what has not begun after ten seconds.
-
-    Parameters
-    ----------
-    workers
-        Pieces at the same time; as many as there are processors by default.
-    """
+    """Threads, which start at once, and processes for pieces that start after ten seconds."""
 
     thread_seconds = 10.0
 
@@ -132,30 +109,18 @@ ExecutorLike = Union[Executor, int, None]  # noqa: UP007
 
 
 def as_executor(executor: ExecutorLike, default: type[_Local] = Threads) -> Executor:
-    """An executor: itself, or the default one with a number of workers.
-
-    Raises
-    ------
-    ConfigError
-        If it is neither an executor nor a number of at least 1.
-    """
+    """An executor: itself, or the default one with a number of workers."""
     return executor if isinstance(executor, Executor) else default(executor)
 
 
 def checked_workers(workers: Any) -> int:
-    """A number of workers, as an integer of Python's own.
-
-    Raises
-    ------
-    ConfigError
-        If it is not a whole number of at least 1.
-    """
+    """A number of workers of at least 1, by default the number of processors."""
     if workers is None:
         return os.cpu_count() or 1
     if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
         message = (
             "must be a whole number of workers of at least 1, or an executor such as "
-            "mesoslip.Threads(4); as many threads as processors without it"
+            "mesoslip.Threads(4); the default is one thread for each processor"
         )
         raise ConfigError([Problem("", "executor", message, workers)])
     return int(workers)
@@ -168,42 +133,16 @@ def completed(
     stop: StopRequest,
     *,
     in_order: bool = False,
-    look: Callable[[], None] = lambda: None,
+    poll: Callable[[], None] = lambda: None,
     max_wait: float | None = None,
 ) -> Generator[tuple[Piece, Future[Result]]]:
-    """Compute pieces of work, and yield each with its result as soon as it is there.
+    """Compute pieces of work; yield each with a completed future, as soon as it is available.
 
-    Only so many are in flight as keep the workers busy, so a long iterable need not fit into
-    memory. To be closed by whoever ends the iteration early: that waits for pieces on threads.
-
-    Parameters
-    ----------
-    executor
-        Where pieces are computed.
-    function
-        Called with each piece and a stop, after which it should return soon. It and the pieces must
-        be such that they can be pickled, unless the executor shares memory.
-    pieces
-        The pieces.
-    stop
-        Ends the iteration soon; what is in flight is given up.
-    in_order
-        Whether to yield pieces in their order.
-    look
-        Called about ten times a second.
-    max_wait
-        Longest time to wait at the end for pieces that ignore the stop [s]; as long as it takes if
-        None.
-
-    Yields
-    ------
-    tuple
-        The piece; and a future that is done, whose result raises what the function raised.
-
-    Raises
-    ------
-    PoolError
-        If no workers are left, and none can be started.
+    The function is called with a piece and a stop, after which it should return soon; both are
+    pickled unless the executor shares memory. Pieces are taken from the iterable as workers need
+    them. ``poll`` is called about ten times a second. If the iteration ends early, the generator
+    must be closed, which waits at most ``max_wait`` [s] for pieces on threads; None is no limit.
+    A `PoolError` if there are no workers and none can be started.
     """
     inner = Stop(stop)
     waiting = iter(pieces)
@@ -227,7 +166,7 @@ def completed(
                     return
                 if time.monotonic() - last > POLL_SECONDS:
                     pool.check()
-                    look()
+                    poll()
                     last = time.monotonic()
                 try:
                     future = done.get(timeout=POLL_SECONDS)
@@ -248,7 +187,7 @@ def completed(
 
 
 def _first_done(running: Iterable[Future[Any]]) -> Iterator[Future[Any]]:
-    """Those that are done before the first that is not."""
+    """The completed futures before the first one that is not."""
     for future in running:
         if not future.done():
             return
@@ -256,13 +195,7 @@ def _first_done(running: Iterable[Future[Any]]) -> Iterator[Future[Any]]:
 
 
 def _checked(future: Future[Result], pool: Pool) -> Future[Result]:
-    """A future that is done, unless its pool is not there any more.
-
-    Raises
-    ------
-    PoolError
-        If it is not.
-    """
+    """A completed future; a `PoolError` if it failed because its pool has ended."""
     if future.cancelled():
         pool.check()
         raise PoolError(GONE)

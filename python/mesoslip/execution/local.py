@@ -1,8 +1,7 @@
-"""Workers on this machine: threads, each of which may have a process of its own.
+"""Workers on this machine: threads, each of which may use a process.
 
 Threads start at once, and the kernel runs without Python's lock. Processes need most of a second to
-start, and then do not wait for each other; one that is killed costs its piece one attempt and
-nothing else.
+start, and then do not wait for each other. If one is killed, its piece is computed again.
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ from mesoslip.execution.pool import (
 from mesoslip.execution.program import program
 from mesoslip.execution.stop import Stop
 
-# Workers that a piece may cost before it fails.
+# Number of times that a piece is computed if its worker dies.
 MAX_ATTEMPTS = 3
-# Time for a process to end whose pipe is closed [s].
+# Time for a process to end after its pipe was closed [s].
 EXIT_SECONDS = 5.0
 
-# Program of a worker process. It finds the packages of this process, behind its own: with -P, no
-# file of the current folder is taken for a module.
+# Program of a worker process, with the module path of this process after its own; with -P, files of
+# the current folder are not imported as modules.
 PROCESS = (
     "import json, sys; sys.path += [one for one in json.loads(sys.argv[2]) if one not in sys.path];"
     "from mesoslip.execution.worker import main; main(int(sys.argv[1]))"
@@ -51,7 +50,7 @@ class WorkerProcess:
     def __init__(self) -> None:
         self._connection, theirs = multiprocessing.Pipe()
         number = theirs.fileno()
-        # Ctrl-C goes to the whole group of processes, and this one decides what it means.
+        # Ctrl-C reaches the whole group of processes; only this one handles it.
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._process = subprocess.Popen(
@@ -68,19 +67,16 @@ class WorkerProcess:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
     def compute(self, function: Function[Any, Any], piece: object) -> tuple[bool, Any]:
-        """Compute a piece there: whether that succeeded, and the result or the error.
+        """Compute a piece in the process: whether that succeeded, and the result or the error.
 
-        Raises
-        ------
-        OSError, EOFError
-            If the process has died.
+        If the process has died, an `OSError` or `EOFError`.
         """
         self._connection.send((compute_elsewhere, (function, piece, program())))
         answer: tuple[bool, Any] = self._connection.recv()
         return answer
 
     def kill(self) -> None:
-        """End the process, and with it what it computes."""
+        """End the process, also while it computes."""
         self._process.kill()
 
     def close(self) -> None:
@@ -90,7 +86,7 @@ class WorkerProcess:
         self._connection.close()
 
     def ending(self) -> str:
-        """How a process has died, as the end of a sentence."""
+        """How the process has died, as the end of a sentence."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(EXIT_SECONDS)
         status = self._process.returncode
@@ -100,7 +96,7 @@ class WorkerProcess:
 
 
 def search_path() -> list[str]:
-    """Where this process finds modules, without the current folder."""
+    """The module path of this process, without the current folder."""
     here = Path.cwd()
     return [one for one in sys.path if one and Path(one).is_absolute() and Path(one) != here]
 
@@ -108,14 +104,7 @@ def search_path() -> list[str]:
 class LocalPool(Pool):
     """Threads and processes of this machine.
 
-    Parameters
-    ----------
-    workers
-        Pieces that are computed at the same time.
-    stop
-        Passed to pieces on threads.
-    thread_seconds
-        Time after which new pieces go to processes [s].
+    Pieces that start in the first ``thread_seconds`` [s] are computed by threads, with the stop.
     """
 
     def __init__(self, workers: int, stop: Stop, thread_seconds: float) -> None:
@@ -129,29 +118,29 @@ class LocalPool(Pool):
         self._threads: list[threading.Thread] = []
         self._processes: set[WorkerProcess] = set()
         self._lock = threading.Lock()
-        # Processes that died since a piece was computed.
+        # Processes that died since the last completed piece.
         self._deaths = 0
 
     @property
     def capacity(self) -> int:
-        # The next piece is there before the last one is stored.
+        # Each worker has its next piece while the caller stores the last one.
         return 2 * self._workers
 
     def submit(self, function: Function[Any, Result], piece: object) -> Future[Result]:
         future: Future[Result] = Future()
         self._queue.put((future, function, piece))
         if len(self._threads) < self._workers:
-            # Not one of ThreadPoolExecutor's: the interpreter does not wait for it at its end.
+            # Unlike those of ThreadPoolExecutor, it does not keep the interpreter from exiting.
             self._threads.append(threading.Thread(target=self._serve, daemon=True))
             self._threads[-1].start()
         return future
 
     def check(self) -> None:
-        """Nothing to do: processes that cannot be started fail their pieces with a `PoolError`."""
+        """Nothing to check: a process that cannot be started fails its piece with a `PoolError`."""
 
     @property
     def is_alive(self) -> bool:
-        """Whether a thread is there."""
+        """Whether there is a thread."""
         return any(thread.is_alive() for thread in self._threads)
 
     def close(self, wait: float | None) -> None:
@@ -166,7 +155,7 @@ class LocalPool(Pool):
             thread.join(None if end is None else max(0.0, end - time.monotonic()))
 
     def _serve(self) -> None:
-        """Body of a thread: piece after piece, from some time on in a process."""
+        """Compute piece after piece on a thread, and after some time in a process."""
         process: WorkerProcess | None = None
         while (item := self._queue.get()) is not None:
             future, function, piece = item
@@ -186,7 +175,7 @@ class LocalPool(Pool):
             else:
                 future.set_result(result)
                 del result
-            # Nothing of a piece stays until the next one.
+            # Free the memory of the piece while the thread waits for the next one.
             del item, future, piece
         if process is not None:
             self._forget(process)
@@ -196,17 +185,8 @@ class LocalPool(Pool):
     ) -> tuple[WorkerProcess, bool, Any]:
         """Compute a piece in a process, which is replaced if it dies.
 
-        Returns
-        -------
-        tuple
-            The process; whether the piece succeeded; and its result or error.
-
-        Raises
-        ------
-        WorkerLostError
-            If the piece has cost too many processes.
-        PoolError
-            If processes die whatever they compute, or cannot be started, or the pool is closed.
+        Returns the process, whether the piece succeeded, and its result or error. A
+        `WorkerLostError` if all attempts failed, a `PoolError` if processes die with every piece.
         """
         for _ in range(MAX_ATTEMPTS):
             process = process or self._new_process()
@@ -223,7 +203,7 @@ class LocalPool(Pool):
             self._deaths = 0
             return process, succeeded, result
         raise WorkerLostError(
-            f"cost {MAX_ATTEMPTS} workers, of which the last {ending}; is memory too little?"
+            f"{MAX_ATTEMPTS} workers died; the last one {ending}; is there enough memory?"
         )
 
     def _new_process(self) -> WorkerProcess:
@@ -241,7 +221,7 @@ class LocalPool(Pool):
 
 
 def pickled_error(error: BaseException) -> BaseException:
-    """An error that another process can raise: itself, or one that says the same."""
+    """An error that another process can raise: itself, or a `RunError` with the same message."""
     import pickle
 
     try:

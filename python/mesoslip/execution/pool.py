@@ -1,4 +1,4 @@
-"""Pools that an executor opens: workers that take one piece of work each."""
+"""Pools of workers, each of which computes one piece of work at a time."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from mesoslip.execution.stop import Stop
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
-# The function applied to a piece; it returns soon once the stop is set.
+# The function applied to a piece; it returns soon after the stop is set.
 Function = Callable[[Piece, Stop], Result]
 
 
 class PoolError(RunError):
-    """No piece can be computed any more."""
+    """The pool cannot compute further pieces."""
 
 
 class WorkerLostError(RunError):
-    """A piece has cost as many workers as it may."""
+    """The workers of a piece died, in all attempts."""
 
 
 class Pool(ABC):
@@ -32,41 +32,26 @@ class Pool(ABC):
     @property
     @abstractmethod
     def capacity(self) -> int:
-        """Pieces in flight at the same time, enough to keep every worker busy."""
+        """Number of pieces in flight that keeps every worker busy."""
 
     @abstractmethod
     def submit(self, function: Function[Any, Result], piece: object) -> Future[Result]:
-        """Have a piece computed by the next free worker."""
+        """Compute a piece with the next free worker."""
 
     @abstractmethod
     def check(self) -> None:
-        """Make sure, now and then, that there are workers.
-
-        Raises
-        ------
-        PoolError
-            If there will be none any more.
-        """
+        """Raise a `PoolError` if there are no workers any more; called from time to time."""
 
     @abstractmethod
     def close(self, wait: float | None) -> None:
-        """Give up what is in flight.
-
-        Parameters
-        ----------
-        wait
-            Longest time to wait for pieces that ignore the stop [s]; as long as it takes if None.
-        """
+        """Abandon pieces in flight, waiting at most ``wait`` [s] for those that ignore the stop."""
 
 
 def compute_elsewhere(function: Function[Any, Result], piece: object, wanted: str) -> Result:
-    """Compute a piece in another process, which has no stop of its own: it is ended.
+    """Compute a piece in another process, which must run the wanted program.
 
-    Raises
-    ------
-    RunError
-        If it is another program than the one that is wanted.
+    Its stop is never set: to stop it, the process is ended.
     """
     if wanted != program():
-        raise RunError(f"the worker has {program()}, and {wanted} is wanted")
+        raise RunError(f"the worker has {program()}, not {wanted}")
     return function(piece, Stop())

@@ -1,4 +1,4 @@
-"""The program that runs: finished work of another one is not mixed with it."""
+"""Name of the running program, so that finished work of another version is not mixed with it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from importlib.metadata import version
 
 from mesoslip import _build
 
-# The version that runs, not one installed later on.
+# The running version: another one may be installed later.
 _VERSION = version("mesoslip")
 
 
 def program() -> str:
-    """The program: its version and commit."""
+    """Version and commit of the program."""
     return f"mesoslip {_VERSION} {_build.COMMIT}"

@@ -1,4 +1,4 @@
-"""A request to stop soon: of a signal, of Ctrl-C, or of whoever started the work."""
+"""Requests to stop soon, by a signal, by Ctrl-C, or by the caller."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Protocol
 
 from mesoslip.errors import MesoslipError
 
-# Exit status of a program that a signal has ended, less the number of the signal.
+# Exit status of a program that a signal has ended, minus the number of the signal.
 SIGNALLED = 128
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-# How often a waiting thread checks for a stop [s].
+# Time between two checks of a waiting thread [s].
 CHECK_SECONDS = 0.05
 
 
@@ -25,25 +25,15 @@ class StoppedError(MesoslipError):
 
 
 class StopRequest(Protocol):
-    """Anything that says whether to stop, such as a `Stop` or a `threading.Event`."""
+    """A `Stop` or a `threading.Event`."""
 
-    def is_set(self) -> bool:
-        """Whether to stop."""
-        ...
+    def is_set(self) -> bool: ...
 
 
 class Stop:
-    """A request to stop soon. Unlike an event, it may be set by a signal handler.
+    """A request to stop soon, also set if the outer one is; ``signal`` is the signal that set it.
 
-    Parameters
-    ----------
-    outer
-        Another request, which holds for this one too.
-
-    Attributes
-    ----------
-    signal
-        The signal that made the request, if one did.
+    Unlike an event, it may be set by a signal handler.
     """
 
     def __init__(self, outer: StopRequest | None = None) -> None:
@@ -60,10 +50,10 @@ class Stop:
         return self._is_set or (self._outer is not None and self._outer.is_set())
 
     def wait(self, seconds: float) -> bool:
-        """Wait for a request, for a limited time; returns whether there is one."""
+        """Wait for a request at most some seconds; returns whether there is one."""
         end = time.monotonic() + seconds
-        while not self.is_set() and (left := end - time.monotonic()) > 0:
-            time.sleep(min(left, CHECK_SECONDS))
+        while not self.is_set() and (remaining := end - time.monotonic()) > 0:
+            time.sleep(min(remaining, CHECK_SECONDS))
         return self.is_set()
 
     @property
@@ -73,7 +63,7 @@ class Stop:
 
     @contextmanager
     def on_interrupt(self) -> Iterator[None]:
-        """Take Ctrl-C, where no handler of signals does, as a request to stop."""
+        """Make Ctrl-C a request to stop, where no signal handler does."""
         try:
             yield
         except KeyboardInterrupt:
@@ -87,10 +77,10 @@ class Stop:
 
 @contextmanager
 def stopped_by_signals() -> Iterator[Stop]:
-    """A stop that Ctrl-C, SIGTERM and SIGHUP request, so that files are still written whole."""
+    """A stop that Ctrl-C, SIGTERM and SIGHUP set, so that files are still written whole."""
     stop = Stop()
     before = {number: signal.getsignal(number) for number in STOPPING}
-    # A program that was started with nohup does not end at SIGHUP.
+    # A program that was started with nohup ignores SIGHUP.
     handled = [number for number in STOPPING if before[number] is not signal.SIG_IGN]
     for number in handled:
         signal.signal(number, stop._receive)

@@ -1,8 +1,8 @@
-"""Files of work under way: folders that one process at a time writes to, and finished pieces.
+"""Folders of work in progress, which one process at a time writes to, and finished pieces.
 
-A file is written under another name, flushed, and renamed: it is there as a whole or not at all,
-whatever ends the program. What other programs have put into a folder stays as it is: only files of
-known names are replaced or removed, and only in folders that this program has made.
+A file is written under another name, flushed, and renamed, so it is whole whatever ends the
+program. Files of other programs stay: only files of known names are replaced or removed, and only
+in folders that this program has made.
 """
 
 from __future__ import annotations
@@ -25,20 +25,10 @@ LOCK = "lock"
 
 
 class Folder:
-    """A folder that the program has made, which one process at a time writes to.
+    """A folder that this program makes when it locks it, for files with a pattern of names.
 
-    Parameters
-    ----------
-    path
-        Where it is; made when it is locked.
-    kind
-        Kind of its content, such as "checkpoint".
-    names
-        Pattern of the names of its files.
-    shared
-        Whether it may hold files of others from the beginning, though none of these names.
-    last
-        Name of the file that is removed after all others.
+    A shared one may hold other files from the beginning. The file named ``last`` is removed after
+    all others.
     """
 
     def __init__(
@@ -58,7 +48,7 @@ class Folder:
 
     @property
     def is_own(self) -> bool:
-        """Whether this program has made it, or there is nothing in it yet."""
+        """Whether this program has made it, or it is empty."""
         try:
             names = {one.name for one in self.path.iterdir()}
         except FileNotFoundError:
@@ -68,12 +58,12 @@ class Folder:
                 return False
             raise
         mark = self._mark()
-        # An empty lock is that of a process that was killed as it made it.
+        # A process that was killed while it made the lock leaves an empty one.
         return names <= {LOCK} if mark == b"" else mark == self._own_mark
 
     @property
     def _is_free(self) -> bool:
-        """Whether this program may make it its own: it is a folder without files of its names."""
+        """Whether it is a folder without a lock or files of these names."""
         try:
             names = [one.name for one in self.path.iterdir()]
         except OSError:
@@ -86,7 +76,7 @@ class Folder:
         return f"mesoslip {self.kind}\n".encode()
 
     def _mark(self) -> bytes | None:
-        """Content of the lock, empty if there is none; None if it is not a regular file."""
+        """Content of the lock, empty if there is no lock; None if it is not a regular file."""
         try:
             number = self._open_lock(os.O_RDONLY)
         except FileNotFoundError:
@@ -97,17 +87,11 @@ class Folder:
             return file.read(100) if _is_regular(number) else None
 
     def _open_lock(self, flags: int) -> int:
-        # Neither through a link, nor waiting for the other end of a pipe.
+        # Without following a link or waiting for the other end of a pipe.
         return os.open(self.path / LOCK, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
 
     def check(self) -> None:
-        """Make sure that it is not another's.
-
-        Raises
-        ------
-        FileError
-            If something is there that this program has not made.
-        """
+        """Refuse a folder, or another file at its path, that this program has not made."""
         if self.is_own or (self._shared and self._is_free):
             return
         raise FileError(
@@ -116,15 +100,8 @@ class Folder:
         )
 
     def lock(self) -> None:
-        """Be the only process that writes to it.
-
-        Raises
-        ------
-        FileError
-            If it is another's, or another process writes to it.
-        OSError
-            If it cannot be made.
-        """
+        """Make the folder and lock it for this process; a `FileError` if another one writes to it,
+        an `OSError` if it cannot be made."""
         if self._lock is not None:
             return
         while True:
@@ -140,9 +117,9 @@ class Folder:
                     "another output (-o)"
                 ) from None
             except OSError:
-                # A file system without locks: two runs at the same time are not noticed.
+                # The file system has no locks, so concurrent runs are not detected.
                 break
-            # Another process may have removed the folder meanwhile.
+            # Another process may have removed the folder in the meantime.
             with suppress(OSError):
                 if (self.path / LOCK).stat().st_ino == os.fstat(number).st_ino:
                     break
@@ -157,7 +134,7 @@ class Folder:
         self._lock = number
 
     def unlock(self) -> None:
-        """Leave it to other processes; without any files in it, it is removed."""
+        """Unlock it for other processes, and remove it if it is empty."""
         if self._lock is None:
             return
         with suppress(OSError):
@@ -166,12 +143,12 @@ class Folder:
         self._close()
 
     def remove(self) -> None:
-        """Remove its files, and then the folder unless others have put something there."""
+        """Remove its files, and the folder unless it has other files."""
         with suppress(OSError):
             if not self.is_own:
                 return
             self.remove_parts()
-            # States before the rows of tables that they need.
+            # States, by their suffix, before the rows that they need.
             for one in sorted(self.path.iterdir(), key=self._removal_order):
                 if self._names.fullmatch(one.name):
                     one.unlink()
@@ -182,7 +159,7 @@ class Folder:
         return path.name == self._last, path.suffix
 
     def move(self, path: Path) -> None:
-        """Give it another name, and leave it to other processes."""
+        """Rename it, and unlock it for other processes."""
         self.path.replace(path)
         self._close()
 
@@ -196,7 +173,7 @@ class Folder:
         self.path.rmdir()
 
     def remove_parts(self) -> None:
-        """Remove files that were being written by a process that was killed."""
+        """Remove incomplete files of a process that was killed."""
         for one in self.path.glob(".*.part"):
             if self._names.fullmatch(one.name[1:-5]):
                 with suppress(OSError):
@@ -204,15 +181,7 @@ class Folder:
 
     @contextmanager
     def written(self, name: str, *, keep: str | None = None) -> Iterator[IO[bytes]]:
-        """Write a file whole.
-
-        Parameters
-        ----------
-        name
-            Its name.
-        keep
-            A name under which the file that it replaces is kept.
-        """
+        """Write a file whole; the file that it replaces may be kept under another name."""
         part, target = self.path / f".{name}.part", self.path / name
         self.path.mkdir(parents=True, exist_ok=True)
         try:
@@ -239,19 +208,13 @@ def _is_regular(number: int) -> bool:
 
 
 class Pieces:
-    """Finished pieces of work in a folder, to be read: a small file for each.
-
-    Parameters
-    ----------
-    path
-        Where they are; it need not be there.
-    """
+    """Finished pieces of work in a folder that may not exist, a small file for each."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def names(self) -> set[str]:
-        """Names of the pieces that are there."""
+        """Names of the pieces."""
         try:
             return {one.stem for one in self.path.iterdir() if NAME.fullmatch(one.name) is not None}
         except FileNotFoundError:
@@ -260,13 +223,7 @@ class Pieces:
             raise FileError(f"{self.path}: cannot be read: {error.strerror}") from None
 
     def read(self, name: str) -> dict[str, Any] | None:
-        """A piece; None if it is not there, or damaged, as by a disk.
-
-        Raises
-        ------
-        FileError
-            If it is there and the disk does not give it.
-        """
+        """A piece; None if it is missing or damaged."""
         path = self.path / f"{name}.json"
         try:
             content = path.read_bytes()
@@ -283,34 +240,23 @@ class Pieces:
         return body if is_whole else None
 
 
-# Files of pieces: their hash or number, what they have measured, or what else came of them.
+# Files of a piece: its hash or number, then `.json`, or `.nc` for its output.
 PIECE = r"[0-9a-f]{6,32}"
 NAME = re.compile(rf"{PIECE}\.json")
 MANIFEST = "manifest.json"
 
 
 class Store(Pieces):
-    """Finished pieces in a folder that this process alone writes to.
+    """Finished pieces, such as "points", in a folder that this process alone writes to.
 
-    Parameters
-    ----------
-    path
-        Where it is; made if it is not there.
-    kind
-        Name of its pieces, such as "points".
-    fingerprint
-        The work that all pieces belong to; empty if their names contain it.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written to, is another's, another process writes to it, or its pieces belong
-        to something else.
+    All pieces belong to one fingerprint, which is empty if their names contain it. A `FileError` if
+    the folder cannot be locked, or its pieces have another fingerprint.
     """
 
     def __init__(self, path: Path, kind: str, fingerprint: str = "") -> None:
         super().__init__(path)
-        # Of a store whose removal was cut short, what is left still belongs to its fingerprint.
+        # The manifest is removed last: if a removal is interrupted, the remaining pieces still have
+        # their fingerprint.
         names = rf"{PIECE}\.(json|nc)|{re.escape(MANIFEST)}"
         self._folder = Folder(path, kind, names, shared=True, last=MANIFEST)
         try:
@@ -344,21 +290,15 @@ class Store(Pieces):
         self.close()
 
     def close(self) -> None:
-        """Let others write to it."""
+        """Unlock it for other processes."""
         self._folder.unlock()
 
     def remove(self) -> None:
-        """Remove it, when what its pieces belong to is complete."""
+        """Remove it, when the whole work is complete."""
         self._folder.remove()
 
     def write(self, name: str, body: Mapping[str, Any], output: bytes | None = None) -> None:
-        """Keep a piece, after the output that belongs to it.
-
-        Raises
-        ------
-        FileError
-            If it cannot be written.
-        """
+        """Write a piece, after its output if it has one."""
         if output is not None:
             self._write(f"{name}.nc", output)
         body = {"name": name, **body}
@@ -366,13 +306,7 @@ class Store(Pieces):
         self._write(f"{name}.json", content.encode())
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
-        """Keep what belongs to all pieces.
-
-        Raises
-        ------
-        FileError
-            If it cannot be written.
-        """
+        """Write the data that belong to all pieces."""
         self._write(MANIFEST, json.dumps(manifest).encode())
 
     def _write(self, name: str, content: bytes) -> None:

@@ -1,4 +1,4 @@
-"""A process that computes pieces for another one, and ends with it."""
+"""A process that computes pieces for its parent process, and ends with it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,8 @@ from mesoslip.execution.local import pickled_error
 
 
 def main(number: int) -> None:
-    """Compute the pieces that come through a pipe, and send back the results.
-
-    Parameters
-    ----------
-    number
-        Number of the pipe's end.
-    """
-    # Ctrl-C is for the process that started this one.
+    """Compute the pieces received from a pipe, given by its file number, and send the results."""
+    # The parent process handles Ctrl-C.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = Connection(number)
     calls: SimpleQueue[bytes] = SimpleQueue()
@@ -40,7 +34,7 @@ def main(number: int) -> None:
 
 
 def _receive(connection: Connection, calls: SimpleQueue[bytes]) -> None:
-    """Receive calls, and end the process at once when the other one is gone."""
+    """Receive calls, and end the process at once when the parent has ended."""
     while True:
         try:
             calls.put(connection.recv_bytes())

@@ -11,7 +11,7 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.execution.stop import StopRequest
 from mesoslip.simulation.memory import check_memory, free_memory
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.runner import Results
+from mesoslip.simulation.run_realizations import Results
 
 # Work of the first segment, and wall time of later ones [s]: the delay of a stop.
 FIRST_WORK = 5_000.0

@@ -15,7 +15,7 @@ from mesoslip.explorer.live_run import explored, run_live
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.plot import plot
-from mesoslip.simulation.runner import Results
+from mesoslip.simulation.run_realizations import Results
 
 # Snapshots of a movie, and the part of them in the largest slip.
 SNAPSHOTS = 100

@@ -25,7 +25,7 @@ from mesoslip.plots.lattice import is_on_lattice
 from mesoslip.plots.lines import line
 from mesoslip.plots.trace import NAMES, UNITS, force_of
 from mesoslip.quantities import UNKNOWN, Scale, scale_for, with_unit
-from mesoslip.simulation.runner import Results
+from mesoslip.simulation.run_realizations import Results
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.steady_sliding import steady_sliding

@@ -23,7 +23,7 @@ from bokeh.models.widgets import Button, Div, TextInput, Toggle
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, MesoslipError
-from mesoslip.execution.newest import Newest
+from mesoslip.execution.newest_job import NewestJob
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import BY_KEY
 from mesoslip.explorer.figures import FIRST, SECOND, LatticeView, MotionView, TheoryView
@@ -33,7 +33,7 @@ from mesoslip.explorer.movies import movie_of
 from mesoslip.explorer.pictures import Measured, Motion, Theories, Theory, motion
 from mesoslip.explorer.session import Session
 from mesoslip.output.writing import write_results
-from mesoslip.simulation.runner import Results
+from mesoslip.simulation.run_realizations import Results
 
 # Time that theory waits for another change after a picture was drawn [s].
 REST = 0.15
@@ -83,10 +83,10 @@ class Page:
         self._change_count = self._turn = self._shown = self._explained = 0
         self._is_closed = False
         self._workers = {
-            "run": Newest(),
-            "limit": Newest(),
-            "theory": Newest(REST),
-            "movie": Newest(),
+            "run": NewestJob(),
+            "limit": NewestJob(),
+            "theory": NewestJob(REST),
+            "movie": NewestJob(),
         }
         self._theories = Theories()
         self._controls = {

@@ -22,7 +22,7 @@ from mesoslip.inference.prior import WANDER
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.inference.wander import measured_length, wandering
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.tables import TRACE_COLUMNS
+from mesoslip.simulation.recorded_tables import TRACE_COLUMNS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
 from mesoslip.output.layout import DIMENSIONS, Entry, GroupLayout
-from mesoslip.output.results import RunResults
+
+if TYPE_CHECKING:
+    from mesoslip.simulation.run_realizations import Results
 
 Array = NDArray[Any]
 
@@ -22,7 +24,7 @@ BLOCK_NUMBERS = 2**19
 BLOCK_ROWS = 2**16
 
 
-def longest(results: RunResults) -> int:
+def longest(results: Results) -> int:
     """Index of the realization with the longest trace, which has the times of all."""
     return int(np.argmax([len(one.rows("trace")) for one in results.realizations]))
 
@@ -61,7 +63,7 @@ class Block:
 
 
 def fill(
-    results: RunResults,
+    results: Results,
     layout: Mapping[str, GroupLayout],
     destinations: Mapping[str, Mapping[str, Array]],
 ) -> None:
@@ -75,7 +77,7 @@ def fill(
             destinations[block.group][name][where] = values
 
 
-def blocks(results: RunResults, layout: Mapping[str, GroupLayout]) -> Iterator[Block]:
+def blocks(results: Results, layout: Mapping[str, GroupLayout]) -> Iterator[Block]:
     """The rows of all tables of an output; each block is there once."""
     timekeeper = longest(results)
     for group, form in layout.items():
@@ -100,7 +102,7 @@ def block_rows(config: Config, table: str) -> int:
 
 
 def _joined(
-    results: RunResults, table: str
+    results: Results, table: str
 ) -> Iterator[tuple[tuple[Any, ...], list[Array], list[int]]]:
     """Blocks of a table: index in the output, pieces of rows, the realization of each piece.
 

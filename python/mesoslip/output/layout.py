@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 from mesoslip.configuration.config import Config
 from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
-from mesoslip.output.results import RunResults
 from mesoslip.output.variables import Group, Meaning
-from mesoslip.simulation import tables
-from mesoslip.simulation.audit import failed_promises
+from mesoslip.simulation import recorded_tables as tables
+from mesoslip.simulation.audit import failed_checks
+
+if TYPE_CHECKING:
+    from mesoslip.simulation.run_realizations import Results
 
 Array = NDArray[Any]
 
@@ -107,7 +109,7 @@ class _Form:
         self.entries[name] = Entry(dimensions, meaning, dtype, **how)
 
 
-def describe(results: RunResults) -> dict[str, GroupLayout]:
+def describe(results: Results) -> dict[str, GroupLayout]:
     """The layout of the output of a run, by group; the root is ""."""
     config = results.config
     layout = {"": _root(results), "slips": _slips(results), "energy": _energy(results)}
@@ -131,11 +133,11 @@ def recorded(config: Config) -> tuple[str, ...]:
     return (*common, *config.slider.extra_traces)
 
 
-def _count(results: RunResults, table: str) -> int:
+def _count(results: Results, table: str) -> int:
     return sum(len(one.rows(table)) for one in results.realizations)
 
 
-def _root(results: RunResults) -> GroupLayout:
+def _root(results: Results) -> GroupLayout:
     config, realizations = results.config, results.realizations
     writer = _Form(variables.ROOT, config.contact_kind.is_discrete, {})
     lengths = [len(one.rows("trace")) for one in realizations]
@@ -168,7 +170,7 @@ def _root(results: RunResults) -> GroupLayout:
     return GroupLayout(sizes, writer.entries, attributes(results))
 
 
-def _catalogue(results: RunResults, group: Group, table: str) -> _Form:
+def _catalogue(results: Results, group: Group, table: str) -> _Form:
     """The start of a group of rows of all realizations."""
     dimension = DIMENSIONS[table]
     writer = _Form(group, results.config.contact_kind.is_discrete, {})
@@ -187,7 +189,7 @@ DIMENSIONS = {
 }
 
 
-def _slips(results: RunResults) -> GroupLayout:
+def _slips(results: Results) -> GroupLayout:
     writer = _catalogue(results, variables.SLIPS, "slips")
     picks = {name: column("slips", name) for name in tables.SLIP_COLUMNS}
     before, after = picks["force_before"], picks["force_after"]
@@ -198,14 +200,14 @@ def _slips(results: RunResults) -> GroupLayout:
     return GroupLayout({"slip": _count(results, "slips")}, writer.entries, {})
 
 
-def _stages(results: RunResults) -> GroupLayout:
+def _stages(results: Results) -> GroupLayout:
     writer = _catalogue(results, variables.STAGES, "stages")
     for name in tables.STAGE_COLUMNS:
         writer.add(name, ("stage",), table="stages", pick=column("stages", name))
     return GroupLayout({"stage": _count(results, "stages")}, writer.entries, {})
 
 
-def _slip_traces(results: RunResults) -> GroupLayout:
+def _slip_traces(results: Results) -> GroupLayout:
     writer = _catalogue(results, variables.SLIP_TRACES, "slip_trace")
     how: dict[str, Any] = {"table": "slip_trace"}
     writer.add("slip", ("sample",), pick=column("slip_trace", "slip"), **how)
@@ -217,7 +219,7 @@ def _slip_traces(results: RunResults) -> GroupLayout:
     return GroupLayout({"sample": _count(results, "slip_trace")}, writer.entries, {})
 
 
-def _avalanches(results: RunResults) -> GroupLayout:
+def _avalanches(results: Results) -> GroupLayout:
     config, kind = results.config, results.config.contact_kind
     writer = _catalogue(results, variables.AVALANCHES, "avalanches")
     picks = {name: column("avalanches", name) for name in tables.AVALANCHE_COLUMNS}
@@ -241,7 +243,7 @@ def _avalanches(results: RunResults) -> GroupLayout:
     return GroupLayout({"avalanche": _count(results, "avalanches")}, writer.entries, {})
 
 
-def _snapshots(results: RunResults) -> GroupLayout:
+def _snapshots(results: Results) -> GroupLayout:
     """All contacts: dimensions ``snapshot`` and ``contact``; on a lattice ``row``, ``column``."""
     kind, contacts = results.config.contact_kind, results.config.contacts
     writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_events")
@@ -278,7 +280,7 @@ def _snapshots(results: RunResults) -> GroupLayout:
     return GroupLayout(sizes, writer.entries, {})
 
 
-def _energy(results: RunResults) -> GroupLayout:
+def _energy(results: Results) -> GroupLayout:
     """The terms of the energy balance of each realization, from the start of the run [J]."""
     terms = np.array([one.energy for one in results.realizations]).T
     writer = _Form(variables.ENERGY, results.config.contact_kind.is_discrete, {})
@@ -290,7 +292,7 @@ def _energy(results: RunResults) -> GroupLayout:
     return GroupLayout({}, writer.entries, {})
 
 
-def _comment(results: RunResults, reached: float) -> dict[str, str]:
+def _comment(results: Results, reached: float) -> dict[str, str]:
     """How far an interrupted run came; CF wants no empty comment of others."""
     if results.complete:
         return {}
@@ -298,7 +300,7 @@ def _comment(results: RunResults, reached: float) -> dict[str, str]:
     return {"comment": f"interrupted; {each} came to {reached:.6g} s"}
 
 
-def attributes(results: RunResults) -> dict[str, Any]:
+def attributes(results: Results) -> dict[str, Any]:
     """Attributes of an output: configuration, program, and state of the run."""
     config, realizations = results.config, results.realizations
     reached = min(one.time for one in realizations)
@@ -324,7 +326,7 @@ def attributes(results: RunResults) -> dict[str, Any]:
             "ending": "; ".join(sorted({one.ending for one in realizations})),
             "advance_count": sum(one.advances for one in realizations),
             "energy_residual": residual,
-            "audit": "; ".join(failed_promises(config, realizations)) or "passed",
+            "audit": "; ".join(failed_checks(config, realizations)) or "passed",
             "wall_seconds": results.wall_seconds,
         }
     )

@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from mesoslip.output.filling import fill
 from mesoslip.output.layout import describe
-from mesoslip.output.results import RunResults
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from mesoslip.simulation.run_realizations import Results
+
 Array = NDArray[Any]
 
 
-def build_tree(results: RunResults) -> xr.DataTree:
+def build_tree(results: Results) -> xr.DataTree:
     """The results of a run in memory, with the layout of an output file.
 
     Returns

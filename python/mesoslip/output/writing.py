@@ -15,11 +15,12 @@ from mesoslip.output import filling, layout
 from mesoslip.output.chunks import COMPRESSION_LEVEL, write_chunks
 from mesoslip.output.hdf5 import LOCK
 from mesoslip.output.layout import Entry, GroupLayout
-from mesoslip.output.results import RunResults
 from mesoslip.output.targets import written_whole
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mesoslip.simulation.run_realizations import Results
 
 # Variables with fewer values are not worth compressing.
 MIN_COMPRESSED = 1000
@@ -58,7 +59,7 @@ def _fill_value(variable: xr.Variable) -> dict[str, Any]:
     return {key: variable.encoding[key] for key in ("_FillValue",) if key in variable.encoding}
 
 
-def write_results(results: RunResults, path: Path, *, threads: int = 1) -> None:
+def write_results(results: Results, path: Path, *, threads: int = 1) -> None:
     """Write the results of a run, of which only blocks are held in memory.
 
     The file is that of `write` and `mesoslip.output.tree.build_tree`.

@@ -1,7 +1,7 @@
-"""The state of a kernel as named numbers: the words of a checkpoint, taken apart and put together.
+"""The state of a kernel as named entries, decoded from the words of a checkpoint and encoded again.
 
-The words are those of ``fortran/numerics/archive.f90``: for each entry a name of 32 characters, its
-kind and two extents, then its values. Sections are entries without values.
+``fortran/numerics/archive.f90`` defines the words: for each entry a name of 32 characters, its kind
+and two extents, then its values. Sections are entries without values.
 """
 
 from __future__ import annotations
@@ -20,28 +20,16 @@ KIND_SECTION, KIND_REAL, KIND_INTEGER = 0, 1, 2
 
 
 class Entry(NamedTuple):
-    """Numbers of one name."""
+    """Numbers of one name; ``values`` has shape (numbers), a matrix column by column."""
 
     name: str
     kind: int
     extent: tuple[int, int]
     values: NDArray[Any]
-    """Shape (numbers); a matrix column by column."""
 
 
 class Archive:
-    """A state, of which entries can be read and replaced.
-
-    Parameters
-    ----------
-    words
-        The result of `Kernel.save`.
-
-    Raises
-    ------
-    RunError
-        If they are not a state.
-    """
+    """A state whose entries can be read and replaced; see `Kernel.save`."""
 
     def __init__(self, words: Words) -> None:
         self._entries = list(entries(words))
@@ -59,34 +47,30 @@ class Archive:
         except KeyError:
             raise RunError(f"the state has no '{name}' of '{section}'") from None
 
-    def has(self, section: str, name: str | None = None) -> bool:
-        """Whether there is such an entry, or such a section."""
-        return any(section == one and name in (None, other) for one, other in self._at)
-
     def section_with(self, name: str) -> str:
-        """The first section that has an entry of a name."""
+        """The first section that has an entry of that name."""
         for section, one in self._at:
             if one == name:
                 return section
         raise RunError(f"the state has no '{name}'")
 
     def numbers(self, section: str, name: str) -> Array:
-        """All numbers of a name, shape (numbers); two of a sum with its rounding."""
+        """All numbers of a name, shape (numbers); a compensated sum has two."""
         found = [self._entries[one].values for one in self._find(section, name)]
         return np.concatenate(found).astype(float)
 
     def number(self, section: str, name: str) -> float:
-        """A number; of a sum with its rounding the total."""
+        """A number; the total of a compensated sum."""
         return float(np.sum(self.numbers(section, name)))
 
     def matrix(self, section: str, name: str) -> Array:
-        """A matrix as in Fortran."""
+        """A matrix with the rows and columns that it has in Fortran."""
         (at,) = self._find(section, name)
         entry = self._entries[at]
         return entry.values.astype(float).reshape(entry.extent, order="F")
 
     def set_number(self, section: str, name: str, value: float) -> None:
-        """Replace a number; a sum with its rounding has none then."""
+        """Replace a number; the rounding error of a compensated sum becomes 0."""
         first, *rest = self._find(section, name)
         self._replace(first, np.array([value]))
         for one in rest:
@@ -98,11 +82,6 @@ class Archive:
         rows, columns = values.shape
         self._entries[at] = self._entries[at]._replace(extent=(rows, columns))
         self._replace(at, values.ravel(order="F"))
-
-    def set_numbers(self, section: str, name: str, values: Array) -> None:
-        """Replace numbers of one entry, as many as there are."""
-        (at,) = self._find(section, name)
-        self._replace(at, values)
 
     def _replace(self, at: int, values: Array) -> None:
         entry = self._entries[at]
@@ -121,7 +100,7 @@ class Archive:
 
 
 def entries(words: Words) -> Iterator[Entry]:
-    """The entries of a state, one after another."""
+    """The entries of a state in their order; a `RunError` if the words are not a state."""
     place = 0
     while place < len(words):
         heading = words[place : place + HEADING_WORDS]

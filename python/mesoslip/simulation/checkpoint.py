@@ -1,10 +1,10 @@
-"""Checkpoints: a run that was stopped or killed is resumed, to the bit.
+"""Checkpoints, from which a run that was stopped or killed is resumed to the bit.
 
-A checkpoint is a folder beside the output. ``TABLE.rows`` holds what was recorded, appended during
-the run, which also bounds its memory; ``state.npz`` the state of the kernels and the length of each
-table at that moment, ``state.previous.npz`` the one before. A state is written under another name,
-flushed, and renamed, so one of the two is always whole. Rows that were appended after it are cut
-off when the run is resumed.
+A checkpoint is a folder beside the output. ``TABLE.rows`` holds recorded rows, appended during the
+run, which also bounds its memory. ``state.npz`` holds the state of the kernels and the length of
+each table at that time, ``state.previous.npz`` the state before. A state is written under another
+name, flushed, and renamed, so one of the two is always whole. Rows appended after it are dropped
+when the run is resumed.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import os
 import re
 import threading
 import time
+import tomllib
 import zlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -26,22 +27,23 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from mesoslip import _build
+from mesoslip.configuration.differences import by_dotted_key
 from mesoslip.errors import FileError
 from mesoslip.execution.store import Folder
 from mesoslip.simulation.realization import Realization, Saved
-from mesoslip.simulation.tables import TABLES, Rows, Stored
+from mesoslip.simulation.recorded_tables import TABLES, Rows, Stored
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Of the content of the files; only the program that began a run resumes it.
+# Version of the files' content; only the program that started a run resumes it.
 FORMAT = 1
 
 # Wall time between two checkpoints [s].
 INTERVAL = 60.0
-# Time after which a full disk or the like is tried again [s].
+# Time after which a failed write, as on a full disk, is tried again [s].
 RETRY_SECONDS = 10.0
-# Rows in memory before they are written to the files [bytes].
+# Rows in memory above which they are written to the files [bytes].
 MAX_WAITING_BYTES = 64e6
 
 STATE, PREVIOUS = "state.npz", "state.previous.npz"
@@ -50,11 +52,11 @@ NAMES = rf"(damaged\.)?state(\.previous)?\.npz|({'|'.join(TABLES)})\.rows"
 
 
 class DamagedError(Exception):
-    """A state that cannot be read, or whose tables are not there."""
+    """A state that cannot be read, or whose rows are missing."""
 
 
 def checkpoint_folder(output: Path) -> Path:
-    """Where the checkpoint of an output is."""
+    """The folder of the checkpoint of an output."""
     return output.with_name(f"{output.stem}.checkpoint")
 
 
@@ -72,21 +74,8 @@ def _program() -> dict[str, Any]:
 
 
 class Checkpoint:
-    """The checkpoint of a run, kept while it goes on.
-
-    Parameters
-    ----------
-    folder
-        Where it is.
-    config
-        The configuration of the run.
-    interval
-        Wall time between two checkpoints [s]; 0: only when the run is stopped.
-    resume
-        Whether to resume from what is there.
-    report
-        Called with each message for the user.
-    """
+    """The checkpoint of a run, written every ``interval`` [s] of wall time, or with 0 only when the
+    run is stopped; ``report`` is called with messages for the user."""
 
     def __init__(
         self,
@@ -104,16 +93,18 @@ class Checkpoint:
         self._interval = interval
         self._resume = resume
         self._report = report
-        # The version that runs, not one installed by the time of a checkpoint.
+        # The running version: another one may be installed before a checkpoint is written.
         self._program = _program()
         self._paths = {table: folder / f"{table}.rows" for table in TABLES}
         self._sizes = dict.fromkeys(TABLES, 0)
+        # By number of the realization: the latest state with its epoch, and those with new rows.
         self._saved: dict[int, tuple[int, Saved]] = {}
         self._grown: dict[int, Realization] = {}
         self._lock = threading.Lock()
+        # Number of the latest checkpoint that was due, and of the latest one written.
         self._epoch = self._written = 0
         self._start = self._last = time.perf_counter()
-        self._before = 0.0
+        self._earlier_seconds = 0.0
         self._is_failing = False
         self._last_failure = -RETRY_SECONDS
 
@@ -126,7 +117,7 @@ class Checkpoint:
     # Called by the threads of realizations.
 
     def visit(self, realization: Realization) -> None:
-        """Between two segments of a realization: save it if a checkpoint is due or it is over."""
+        """Save a realization between two segments, if a checkpoint is due or the run is over."""
         epoch, _ = self._saved.get(realization.number, (-1, None))
         saved = None
         if epoch < self._epoch or realization.finished:
@@ -138,10 +129,10 @@ class Checkpoint:
 
     # Called by the main thread.
 
-    def look(self, realizations: Sequence[Realization]) -> None:
-        """Now and then: begin a checkpoint when it is due, write it when all are saved."""
+    def update(self, realizations: Sequence[Realization]) -> None:
+        """Begin a checkpoint when it is due, and write it when all realizations are saved."""
         if self._epoch > self._written:
-            # Those of a resumed run that wait for a worker are as they were saved.
+            # Realizations of a resumed run that wait for a worker have not changed.
             running = [one for one in realizations if one.is_open and one.advances > 0]
             running = [one for one in running if not one.finished]
             if all(self._saved.get(one.number, (-1,))[0] == self._epoch for one in running):
@@ -156,7 +147,7 @@ class Checkpoint:
             self._attempt(lambda: self._flush(grown))
 
     def write(self, realizations: Sequence[Realization]) -> bool:
-        """Write a checkpoint of a run that is not advancing; whether that was possible."""
+        """Write a checkpoint of a run that is not advancing; returns whether that succeeded."""
         self._epoch += 1
         for one in realizations:
             if one.advances > 0:
@@ -164,17 +155,9 @@ class Checkpoint:
         return self._write(realizations)
 
     def restore(self, realizations: Sequence[Realization]) -> float:
-        """Set realizations to the state of the checkpoint, if there is one to resume from.
+        """Restore realizations from the checkpoint, if there is one; returns its wall time [s].
 
-        Returns
-        -------
-        float
-            Wall time of the run before [s].
-
-        Raises
-        ------
-        FileError
-            If the checkpoint is of another configuration or program, or in use.
+        A `FileError` if the checkpoint is of another configuration or program, or in use.
         """
         with suppress(OSError):
             self._files.lock()
@@ -188,7 +171,7 @@ class Checkpoint:
                 return self._read(self.folder / name, realizations)
             except DamagedError as error:
                 self._report(f"{self.folder / name}: damaged ({error})")
-                # It must not take the place of the previous one, which may be whole.
+                # It must not replace the previous state, which may be whole.
                 (self.folder / name).replace(self.folder / f"{DAMAGED}{name}")
         if there:
             self._set_aside("no checkpoint can be resumed: starts from the beginning")
@@ -197,7 +180,7 @@ class Checkpoint:
         return 0.0
 
     def _set_aside(self, reason: str) -> None:
-        """Keep the checkpoint of an earlier run, which is not resumed, under another name."""
+        """Rename the checkpoint of an earlier run, which is not resumed."""
         for number in count(1):
             aside = self.folder.with_name(f"{self.folder.name}.old{number if number > 1 else ''}")
             if not os.path.lexists(aside):
@@ -206,12 +189,12 @@ class Checkpoint:
         with suppress(OSError):
             self._files.lock()
         self._report(
-            f"{reason}; the checkpoint of a run that was stopped is kept as {aside} until this one "
-            f"is complete (renamed to {self.folder}, it is resumed by --resume)"
+            f"{reason}; the checkpoint of the earlier run is kept as {aside} until this run is "
+            f"complete (to resume it, rename it to {self.folder} and use --resume)"
         )
 
     def remove(self) -> None:
-        """Remove it, and those that were kept until the output is there."""
+        """Remove the checkpoint and those of earlier runs, when the output is complete."""
         old = re.compile(rf"{re.escape(self.folder.name)}\.old\d*")
         with suppress(OSError):
             for path in self.folder.parent.iterdir():
@@ -220,11 +203,11 @@ class Checkpoint:
         self._files.remove()
 
     def close(self) -> None:
-        """Leave it to another run; it stays where it is, unless it is empty."""
+        """Unlock the folder, and remove it if it is empty."""
         self._files.unlock()
 
     def _attempt(self, action: Callable[[], None]) -> bool:
-        """Do what a full disk may prevent: the run goes on without it, and reports that."""
+        """Write to the folder; a failure, as on a full disk, is reported and the run continues."""
         try:
             self._files.lock()
             action()
@@ -232,7 +215,7 @@ class Checkpoint:
             if not self._is_failing:
                 self._report(
                     f"{self.folder}: the checkpoint cannot be written: {error.strerror or error}; "
-                    "the run goes on, and tries again later"
+                    "the run continues, and tries again later"
                 )
             self._is_failing = True
             self._last_failure = time.perf_counter()
@@ -270,7 +253,7 @@ class Checkpoint:
         return is_written
 
     def _write_state(self, realizations: Sequence[Realization]) -> None:
-        # Before rows are written: a realization that ends meanwhile is saved with more of them.
+        # Before rows are written: a realization that ends meanwhile is saved with more rows.
         with self._lock:
             saved = {number: one for number, (_, one) in self._saved.items()}
         self._flush([realizations[number] for number in saved])
@@ -285,18 +268,18 @@ class Checkpoint:
             if one.words is not None:
                 arrays[f"words.{number}"] = one.words
             for table, rows in realizations[number].waiting:
-                left = one.counts.get(table, 0)
+                remaining = one.counts.get(table, 0)
                 for piece in rows.pieces:
-                    if left <= 0:
+                    if remaining <= 0:
                         break
                     assert isinstance(piece, Stored)
                     tables[table].append((number, piece.place, *piece.shape, piece.checksum))
-                    left -= len(piece)
+                    remaining -= len(piece)
         for table, pieces in tables.items():
             arrays[f"pieces.{table}"] = np.array(pieces, dtype=np.int64).reshape(-1, 5)
         header = self._program | {
             "configuration": self._config.to_toml(),
-            "wall_seconds": self._before + time.perf_counter() - self._start,
+            "wall_seconds": self._earlier_seconds + time.perf_counter() - self._start,
             "realizations": {
                 number: {"scalars": one.scalars, "counts": one.counts}
                 for number, one in saved.items()
@@ -306,15 +289,7 @@ class Checkpoint:
             np.savez(file, header=np.array(json.dumps(header)), **arrays)
 
     def _read(self, path: Path, realizations: Sequence[Realization]) -> float:
-        """Set realizations to a state.
-
-        Raises
-        ------
-        DamagedError
-            If it is not whole.
-        FileError
-            If it is of another configuration or program.
-        """
+        """Restore realizations from a state, unless it is damaged or `_compare` refuses it."""
         try:
             data = path.read_bytes()
         except OSError as error:
@@ -323,7 +298,7 @@ class Checkpoint:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
                 arrays = {name: file[name] for name in file.files if name != "header"}
-        # The errors that libraries raise for a damaged archive are not specified.
+        # The libraries do not specify the errors of a damaged archive.
         except Exception as error:
             raise DamagedError(str(error) or type(error).__name__) from error
         self._compare(header)
@@ -351,27 +326,20 @@ class Checkpoint:
             realizations[number].restore(saved, tables[number])
             self._saved[number] = (0, saved)
         self._sizes = sizes
-        self._before = float(header["wall_seconds"])
-        return self._before
+        self._earlier_seconds = float(header["wall_seconds"])
+        return self._earlier_seconds
 
     def _compare(self, header: dict[str, Any]) -> None:
-        """Refuse a state that this run cannot resume from.
-
-        Raises
-        ------
-        FileError
-            If it is of another configuration or program.
-        """
+        """Refuse a state of another configuration or program with a `FileError`."""
         advice = (
             "; without --resume the run starts from the beginning, and with another output (-o) "
-            "this one is kept"
+            "this checkpoint is kept"
         )
         for name, value in self._program.items():
             if header.get(name) != value:
                 raise FileError(
                     f"{self.folder}: the checkpoint was made with {name} {header.get(name)} of "
-                    f"mesoslip, and this is {value}: only the same program resumes it to the bit"
-                    + advice
+                    f"mesoslip, not {value}: only the same program resumes it to the bit" + advice
                 )
         if header["configuration"] != self._config.to_toml():
             raise FileError(
@@ -382,19 +350,7 @@ class Checkpoint:
 
 
 def _difference(old: str, new: str) -> str:
-    """The first keys in which two configurations differ."""
-    import tomllib
-
-    def flat(tables: dict[str, Any], outer: str = "") -> dict[str, Any]:
-        keys: dict[str, Any] = {}
-        for name, value in tables.items():
-            if isinstance(value, dict):
-                keys |= flat(value, f"{outer}{name}.")
-            else:
-                keys[outer + name] = value
-        return keys
-
-    before, now = flat(tomllib.loads(old)), flat(tomllib.loads(new))
+    """The first keys in which two configurations, as TOML, differ."""
+    before, now = (by_dotted_key(tomllib.loads(text)) for text in (old, new))
     names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
-    changes = [f"{name} was {before.get(name)}, is {now.get(name)}" for name in names[:3]]
-    return ", ".join(changes)
+    return ", ".join(f"{name} was {before.get(name)}, is {now.get(name)}" for name in names[:3])

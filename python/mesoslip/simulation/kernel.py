@@ -22,36 +22,29 @@ MAX_NAMES = 64
 
 
 class Progress(NamedTuple):
-    """How far a simulation has come."""
+    """The progress of a simulation; ``ending`` says why it is over, and is empty before."""
 
     ending: str
-    """Why it is over; empty if it is not."""
     time: float
     """Time [s]."""
     displacement: float
     """Displacement of the slider [m]."""
     breaks: float
     detached: float
-    """Contacts that are detached."""
+    """Number of detached contacts."""
     avalanche_slip: float
     """Displacement of the slider in avalanches [m]."""
     force_error: float
     """Estimated error of the contact force [N]; 0 where contacts are kept one by one."""
     advances: int
-    """Advances of the slider, each to an event or less far."""
+    """Advances of the slider, each at most to the next event."""
     avalanches: int
     integrator_counts: NDArray[np.int64]
     """Steps, evaluations and failed steps of the slider's integrator, if it has one."""
 
 
 def checked(results: Any) -> tuple[Any, ...]:
-    """Results of a kernel without its status and message.
-
-    Raises
-    ------
-    RunError
-        If the kernel failed.
-    """
+    """Results of a kernel without its status and message; a `RunError` if it failed."""
     *values, status, message = results
     if status != 0:
         raise RunError(message.decode().strip())
@@ -61,14 +54,8 @@ def checked(results: Any) -> tuple[Any, ...]:
 class Kernel:
     """A simulation in Fortran: its parts are set, then it is started or restored, then it advances.
 
-    It is freed with this object, or by `close`. Different simulations are independent of each
-    other, on whatever threads; one simulation is at work on one thread at a time.
-
-    Raises
-    ------
-    RunError
-        By every method, if the simulation was closed, is at work on another thread, lacks a part,
-        or fails.
+    Simulations are independent of each other; each is used by one thread at a time. Every method
+    raises a `RunError` if the simulation is closed, in use on another thread, incomplete, or fails.
     """
 
     def __init__(self) -> None:
@@ -77,7 +64,7 @@ class Kernel:
         _core.open_simulation(self._handle)
         # The finalizer holds the handle, not this object.
         self._free = weakref.finalize(self, _core.close_simulation, self._handle)
-        # Not at exit, when a thread may still be at work with it.
+        # At exit a thread may still use the simulation.
         self._free.atexit = False
 
     def _call(self, procedure: Any, *arguments: Any) -> tuple[Any, ...]:
@@ -89,7 +76,7 @@ class Kernel:
             self._lock.release()
 
     def close(self) -> None:
-        """Free the simulation; waits until it is not at work."""
+        """Free the simulation when no thread uses it any more."""
         with self._lock:
             self._free()
 
@@ -98,7 +85,7 @@ class Kernel:
         return self._free.alive
 
     def __copy__(self) -> NoReturn:
-        raise TypeError("a simulation cannot be copied; save it, and restore another from that")
+        raise TypeError("a simulation cannot be copied; save it, and restore another one from it")
 
     def __deepcopy__(self, _: Any) -> NoReturn:
         self.__copy__()
@@ -111,8 +98,8 @@ class Kernel:
         self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
     def copy_contacts(self, template: Kernel) -> None:
-        """Take the contacts of another simulation, which is not started: less work than to make
-        them."""
+        """Copy the contacts of a simulation that is not started, which is faster than making them
+        again."""
         self._call(_core.copy_contacts, template._handle)
 
     def set_slider(self, kind: str, parameters: Mapping[str, float | str]) -> None:
@@ -126,8 +113,8 @@ class Kernel:
         end_velocity: Array,
         stage: NDArray[np.integer[Any]],
     ) -> None:
-        """Parts of the drive, shape (parts): when each ends [s], its velocities at the start and at
-        the end [m/s], and the number of the stage that it is of."""
+        """Parts of the drive, shape (parts): end time [s], velocities at start and end [m/s], and
+        the number of the stage."""
         self._call(_core.set_drive, part_end, start_velocity, end_velocity, stage)
 
     def set_drive_values(self, start_value: Array) -> None:
@@ -143,8 +130,8 @@ class Kernel:
         blocks: int,
         tolerance: float,
     ) -> None:
-        """Set what ends the run before its drive: a number of slips, a displacement of the slider
-        [m], a steady state, by blocks of a displacement of the drive [m]; 0 for what does not."""
+        """Conditions that end the run early: number of slips, displacement of the slider [m],
+        steady state over blocks of a distance of the drive [m]; 0 for those that are not set."""
         self._call(_core.set_stop, slips, displacement, block_distance, blocks, tolerance)
 
     def set_recorder(
@@ -157,7 +144,7 @@ class Kernel:
         duration: float,
         layers: int,
     ) -> None:
-        """Set what to record of the motion; intervals, times in s, 0 for what is not recorded."""
+        """Set the record of the motion; intervals and times in s, 0 for what is not recorded."""
         self._call(
             _core.set_recorder,
             interval,
@@ -176,22 +163,20 @@ class Kernel:
         max_avalanches: int,
         snapshot_times: Array,
     ) -> None:
-        """Set what to record of avalanches; 0 for what is not recorded, and for no bound."""
+        """Set the record of avalanches; 0 for what is not recorded, and for no bound."""
         self._call(_core.set_avalanches, min_size, snapshot_size, max_avalanches, snapshot_times)
 
     def start(self, initial: str) -> None:
-        """Draw the contacts in an initial state, and put the slider in balance with them."""
+        """Draw the contacts in an initial state, with the slider in equilibrium with them."""
         self._call(_core.start_simulation, initial)
 
     def advance(self, max_advances: int, max_work: float) -> None:
-        """Go on for some advances or some work, until much waits to be drained, or to the end.
-
-        Work is in units of an advance of a rigid slider or a contact that breaks.
-        """
+        """Advance by a number of advances or an amount of work, until buffers should be drained, or
+        to the end; the unit of work is an advance of a rigid slider or the break of a contact."""
         self._call(_core.advance_simulation, max_advances, max_work)
 
     def ask(self) -> Progress:
-        """How far it has come."""
+        """The present progress."""
         ending, *numbers = self._call(_core.ask_simulation)
         return Progress(ending.decode().strip(), *numbers)
 
@@ -201,12 +186,12 @@ class Kernel:
         return np.asarray(values)
 
     def contacts(self, count: int) -> Array:
-        """Of each contact origin, stiffness, breaking stretch and renewals, shape (4, count)."""
+        """Origin, stiffness, breaking stretch and renewals of each contact, shape (4, count)."""
         (values,) = self._call(_core.ask_contacts, count)
         return np.asarray(values)
 
     def drain(self, table: str) -> Array:
-        """Take what was recorded of a table away, shape (rows, numbers in a row)."""
+        """Remove the recorded rows of a table and return them, shape (rows, columns)."""
         columns, rows = self._call(_core.count_rows, table)
         values = np.empty((rows, columns))
         if rows:
@@ -214,30 +199,29 @@ class Kernel:
         return values
 
     def save(self) -> Words:
-        """The whole state, to go on from it in another simulation with the same parts."""
+        """The whole state, from which another simulation with the same parts can continue."""
         (length,) = self._call(_core.save_simulation)
         words = np.empty(length, dtype=np.int64)
         self._call(_core.fetch_state, words)
         return words
 
     def displace_drive(self, distance: float) -> None:
-        """Displace the drive at once by a distance [m]; the motion goes on from there."""
+        """Displace the drive instantly by a distance [m]."""
         self._call(_core.displace_drive, distance)
 
     def follow(self) -> None:
-        """Go on from the end of another run, whose state was restored.
+        """Continue another run from its end, which was restored, with the second part of the drive.
 
-        The first part of the drive is over, and the second begins. Time, displacement and counts go
-        on from those of the state.
+        Time, displacement and counts continue from those of the state.
         """
         self._call(_core.follow_simulation)
 
     def restore(self, words: Words) -> None:
-        """Go on from a state, instead of starting."""
+        """Continue from a state, instead of starting."""
         self._call(_core.restore_simulation, words)
 
 
 def name_list(which: str) -> tuple[str, ...]:
-    """Names that the kernels state once: the columns of a table, or the kinds of something."""
+    """A list of names that the kernels define: the columns of a table, or kinds of parts."""
     names, count = checked(_core.list_names(which, MAX_NAMES))
     return tuple(str(name) for name in np.char.strip(np.char.decode(names[:count])))

@@ -12,8 +12,7 @@ from mesoslip.errors import ConfigError, Problem
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Memory that a run needs for each sample of the trace, avalanche in the catalogue, and contact in a
-# snapshot [bytes].
+# Memory of a run for each row of a table [bytes].
 BYTES_PER_SAMPLE = 3 * 7 * 8
 BYTES_PER_SAMPLE_OF_SLIP = 3 * 10 * 8
 BYTES_PER_LAYER = 2 * 8
@@ -27,9 +26,7 @@ def machine_memory() -> int:
 
 
 def free_memory() -> int:
-    """Memory of this machine that programs may still take [bytes]; all of it where the system does
-    not say.
-    """
+    """Free memory of this machine [bytes]; all of it where the system does not report it."""
     try:
         lines = Path("/proc/meminfo").read_text("ascii").splitlines()
         return next(1024 * int(one.split()[1]) for one in lines if one.startswith("MemAvailable:"))
@@ -38,19 +35,9 @@ def free_memory() -> int:
 
 
 def check_memory(config: Config, available: float | None = None) -> None:
-    """Make sure, before a run, that what it records fits into memory.
+    """Refuse a run whose record exceeds the available memory [bytes], by default the machine's.
 
-    Parameters
-    ----------
-    config
-        The run.
-    available
-        Memory that it may take [bytes]; by default that of this machine.
-
-    Raises
-    ------
-    ConfigError
-        If it does not, with each key that asks for too much.
+    The `ConfigError` names each key that needs too much.
     """
     run, output, contacts = config.run, config.output, config.contacts
     memory = machine_memory() if available is None else available
@@ -63,51 +50,33 @@ def check_memory(config: Config, available: float | None = None) -> None:
     lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
     after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
     problems = []
+    samples = config.expected_duration / config.output_interval
+    contact_bytes = config.contact_kind.bytes_per_contact * contacts.count * together
     for key, needed, value in (
-        (
-            "contacts.count",
-            config.contact_kind.bytes_per_contact * contacts.count * together,
-            contacts.count,
-        ),
+        ("contacts.count", contact_bytes, contacts.count),
         ("run.avalanches", BYTES_PER_AVALANCHE * in_catalogue * run.realizations, run.avalanches),
-        (
-            "output.snapshots",
-            lattices * len(output.snapshots),
-            f"{len(output.snapshots)} times",
-        ),
+        ("output.snapshots", lattices * len(output.snapshots), f"{len(output.snapshots)} times"),
         (
             "output.snapshot_size",
             lattices * min(after, run.avalanches or math.inf),
             output.snapshot_size,
         ),
-        (
-            "output.interval",
-            per_sample * config.expected_duration / config.output_interval * run.realizations,
-            config.output_interval,
-        ),
-        (
-            "output.slip_interval",
-            BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations,
-            fine,
-        ),
+        ("output.interval", per_sample * samples * run.realizations, config.output_interval),
+        ("output.slip_interval", BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations, fine),
     ):
         if needed > memory:
-            problems.append(
-                Problem(
-                    "",
-                    key,
-                    f"the run may need {needed / 2**30:.3g} GiB for this, and {owner} "
-                    f"{memory / 2**30:.3g} GiB",
-                    value,
-                )
+            message = (
+                f"the run may need {needed / 2**30:.3g} GiB for this, and {owner} "
+                f"{memory / 2**30:.3g} GiB"
             )
+            problems.append(Problem("", key, message, value))
     if problems:
         raise ConfigError(problems)
 
 
 def _breaks(config: Config) -> float:
-    """About how many contacts break: one after each mean breaking stretch, and under a force each
-    of them about once, before the slider slides without end."""
+    """Estimated number of breaks: each contact breaks once in each mean breaking stretch, under a
+    force about once before the slider slides without end."""
     contacts = config.contacts
     if not contacts.reattach or config.drive.is_force:
         return contacts.count

@@ -1,7 +1,6 @@
 """One run of a configuration with its own random numbers, advanced in segments.
 
-Its numbers do not depend on where segments end, on what runs beside it, or on whether it was put
-away and taken up again.
+Its results do not depend on where segments end, on other runs, or on being saved and resumed.
 """
 
 from __future__ import annotations
@@ -17,15 +16,20 @@ import numpy as np
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
-from mesoslip.simulation.recorded import Recorded
+from mesoslip.simulation.recorded_tables import (
+    CONTACT_COLUMNS,
+    ENERGY_COLUMNS,
+    TABLES,
+    Recorded,
+    Rows,
+)
 from mesoslip.simulation.start import START, End, follow
 from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
-from mesoslip.simulation.tables import CONTACT_COLUMNS, ENERGY_COLUMNS, TABLES, Rows
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Why a run is over, by the kernel's names.
+# Reasons why a run is over, by the kernel's names.
 ENDINGS = {
     "": "",
     "drive": "end of the drive",
@@ -41,35 +45,40 @@ ENDINGS = {
 # Minimum scale of energy residuals, over the energy of all contacts about to break.
 MIN_ENERGY_RATIO = 1e-9
 
-# Wall time of a segment, between two looks at progress and signals [s]; work of the first one.
+# Wall time of a segment, after which progress and signals are checked [s]; work of the first one.
 SEGMENT_SECONDS = 0.25
 SEGMENT_WORK = 100_000.0
-# Work of estimating the errors over that of the run and it.
+# Work of estimating the errors over the whole work.
 COARSE_PART = 0.25
 # No bound on the advances or the work of a segment.
 ANY_NUMBER = 2**62
-# Advances at a time on the way to a time.
+# Maximum number of advances at a time in `Realization.advance_to`.
 MAX_ADVANCES = 100_000
+
+# Attributes of a realization that a checkpoint keeps as they are.
+SAVED_ATTRIBUTES = (
+    *("time", "ending", "breaks", "detached", "advances", "kernel_seconds", "avalanche_count"),
+    *("avalanche_slip", "displacement", "force_error", "slip_time_error"),
+)
 
 
 @dataclass(frozen=True)
 class Saved:
-    """A realization as a checkpoint keeps it."""
+    """A realization in a checkpoint: attributes, number of rows by table, and the state of the
+    kernel, None if the run is over."""
 
     scalars: dict[str, Any]
     counts: dict[str, int]
-    """Rows of each table up to here."""
     words: Words | None
-    """State of the kernel; None if the run is over."""
 
 
 class Realization(Recorded):
-    """One run of a configuration, which goes on as far as one wants.
+    """One run of a configuration, advanced step by step.
 
-    Its numbers do not depend on how far it goes each time. What it records stays in memory. It
-    frees the memory of the kernel at `close`, at the end of a ``with`` block, or with this object.
+    Its results do not depend on how far it advances at a time. Recorded rows stay in memory. The
+    memory of the kernel is freed by `close`, at the end of a ``with`` block, or with this object.
     Realizations are independent of each other and release the interpreter's lock while they
-    advance, so that several can run in threads; each is to be used by one thread at a time.
+    advance, so several can run in threads; each is to be used by one thread at a time.
 
     Parameters
     ----------
@@ -78,14 +87,14 @@ class Realization(Recorded):
     number
         Number of the realization, from 0; each has its own random numbers.
     estimates_errors
-        Whether to repeat a run of the master equation with steps twice as long at its end, which
-        estimates the errors of its steps.
+        Whether a run of the master equation is repeated with steps twice as long, which estimates
+        the errors due to its steps.
     coarsening
-        Length of steps over the configured one, where there are steps.
+        Length of steps relative to the configured one, where there are steps.
     after
-        The end of another run, from which this one goes on, see `end`; by default it starts as
-        `contacts.initial` says. Its errors are not estimated then. Its time and its displacement
-        count from its own start.
+        The end of another run, which this one continues, see `end`; its errors are then not
+        estimated, and its time and displacement start at 0. By default the run starts with
+        ``contacts.initial``.
 
     Raises
     ------
@@ -108,23 +117,22 @@ class Realization(Recorded):
     ----------
     config, number
         The configuration, and the number of the realization, from 0.
-    time
-        Time it has come to [s].
+    time, displacement
+        Time reached [s], and displacement of the slider [m].
     ending
-        Why it is over; empty if it is not.
+        The reason why the run is over; empty before.
     breaks, detached, advances
-        Breaks so far, contacts that are detached, advances of the slider so far.
+        Breaks so far, number of detached contacts, advances of the slider so far.
     kernel_seconds
-        Computing time.
+        Computing time [s].
     avalanche_count, avalanche_slip
         Avalanches so far, and the displacement of the slider in them [m].
-    displacement
-        Displacement of the slider [m].
     force_error
         Estimated error of the contact force [N], before the first slip if there is one; 0 where
-        contacts are kept one by one, NaN where it is not known yet.
+        contacts are kept one by one, NaN before it is known.
     slip_time_error
-        Estimated error of the time at which a slip starts, the greatest of all [s]; the same.
+        Estimated error of the time at which a slip starts [s], maximum over the slips; 0 or NaN as
+        ``force_error``.
     integrator_counts
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
@@ -180,7 +188,7 @@ class Realization(Recorded):
             kernel, self._start = follow(self.config, self._parameters, self.number, self._after)
             self._after = None
         else:
-            kernel = self._start.assemble(self.config, self._parameters, self.number)
+            kernel = self._start.configured_kernel(self.config, self._parameters, self.number)
             if self._words is not None:
                 kernel.restore(self._words)
                 self._words = None
@@ -190,14 +198,14 @@ class Realization(Recorded):
         return kernel
 
     def advance(self, advances: int | None = None, *, work: float | None = None) -> None:
-        """Go on for one segment: a number of advances, an amount of work, or a quarter of a second.
+        """Advance by one segment: a number of advances, an amount of work, or about 0.25 s.
 
-        Work is in units of an advance of a rigid slider or a contact that breaks.
+        The unit of work is an advance of a rigid slider or the break of a contact.
 
         Raises
         ------
         RunError
-            If the kernel cannot go on.
+            If the kernel fails.
         """
         if self.finished:
             return
@@ -220,7 +228,7 @@ class Realization(Recorded):
             self._work *= min(2.0, max(0.1, SEGMENT_SECONDS / max(seconds, 1e-9)))
 
     def _estimate_errors(self, advances: int | None, work: float | None) -> None:
-        """Go on for one segment of the run with longer steps; at its end, errors are known."""
+        """Advance the run with longer steps by one segment; at its end the errors are known."""
         if self._coarse is None:
             self._coarse = Realization(
                 self.config, self.number, estimates_errors=False, coarsening=COARSENING
@@ -233,7 +241,7 @@ class Realization(Recorded):
                 return
             errors = step_errors(self.trace, self.slips, coarse.trace, coarse.slips)
         except RunError:
-            # Steps that were too long to go on with are no measure.
+            # Twice the step was too long, so the errors have no estimate.
             errors = StepErrors(math.inf, math.inf)
         self.force_error, self.slip_time_error = errors
         self._lacks_errors = False
@@ -241,47 +249,47 @@ class Realization(Recorded):
         self._coarse = None
 
     def advance_to(self, time: float) -> None:
-        """Go on until a time [s] has come, or the run is over.
+        """Advance until a time [s] is reached, or the run is over.
 
-        An advance of the slider ends at an event, so the run comes to a halt at the first event at
-        or after the time, and never later than 500 intervals of the trace.
+        The run stops at the first event at or after the time, at most 500 intervals of the trace
+        later.
 
         Raises
         ------
         RunError
-            If the kernel cannot go on.
+            If the kernel fails.
         """
         before, advances = self.time, 1
         while not self.finished and self.time < time:
             self.advance(advances)
             pace, before = self.time - before, self.time
-            # Half the distance at the present pace, so as not to pass the time.
+            # Half the remaining time at the present pace, so as not to pass the end.
             wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
             advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
 
     @property
     def end(self) -> End:
-        """The end of the run, for another one to go on from; before `close`.
+        """The end of the run, which another one can continue.
 
         Raises
         ------
         RunError
-            If the run is not over, or the memory of the kernel was given back.
+            If the run is not over, or was closed.
         """
         if self._kernel is None or not self.ending:
             raise RunError(f"realization {self.number}: the run is not at its end")
         return End(self.config, self._kernel.save())
 
     def twin(self, distance: float) -> Realization:
-        """Another realization that goes on from here with the same random numbers.
+        """Another realization that continues from here with the same random numbers.
 
-        It records from here on, and its errors are not estimated.
+        Its record starts here, and its errors are not estimated.
 
         Parameters
         ----------
         distance
-            How far its drive is ahead of that of this one [m]. The spring joins the drive to a
-            slider with inertia (`rigid`, `layered`).
+            Displacement of its drive ahead of this one's [m]; for sliders with inertia on a spring
+            (`rigid`, `layered`).
         """
         saved = self.save()
         other = Realization(self.config, self.number, estimates_errors=False)
@@ -297,7 +305,7 @@ class Realization(Recorded):
         self.close()
 
     def _take(self, kernel: Kernel) -> None:
-        """Take what was recorded, and how far the kernel has come."""
+        """Take the recorded rows and the progress of the kernel."""
         progress = self._start.progress_since(kernel.ask())
         with self._lock:
             for table in TABLES:
@@ -321,7 +329,7 @@ class Realization(Recorded):
             self._energy = self._start.energy_since(kernel.energy()) if self.ending else None
 
     def close(self) -> None:
-        """Give back the memory of the kernel, when it will not go on."""
+        """Free the memory of the kernel, when the run is not continued."""
         if self._kernel is not None:
             self._kernel.close()
             self._kernel = None
@@ -331,17 +339,17 @@ class Realization(Recorded):
 
     @property
     def is_open(self) -> bool:
-        """Whether it has a kernel, which may be at work."""
+        """Whether it has a kernel, which a thread may use."""
         return self._kernel is not None
 
     @property
     def finished(self) -> bool:
-        """Whether the run is over, and its errors are known if they are to be estimated."""
+        """Whether the run is over, and its errors, if they are to be estimated, are known."""
         return bool(self.ending) and not self._lacks_errors
 
     @property
     def part_done(self) -> float:
-        """Part of the run that is done, 0 to 1."""
+        """Completed part of the run, 0 to 1."""
         if self.finished:
             return 1.0
         part = 1.0 if self.ending else self._part_of_run()
@@ -353,13 +361,13 @@ class Realization(Recorded):
     def _part_of_run(self) -> float:
         wanted = self.config.run.avalanches
         by_avalanches = self.avalanche_count / wanted if wanted else 0.0
-        far = self.config.run.stops.displacement
-        by_displacement = self.displacement / far if far else 0.0
+        end = self.config.run.stops.displacement
+        by_displacement = self.displacement / end if end else 0.0
         return min(1.0, max(by_avalanches, by_displacement, self.time / self.config.duration))
 
     @property
     def energy(self) -> Array:
-        """Terms of the energy balance up to now, in the order of `ENERGY_COLUMNS` [J]."""
+        """Terms of the energy balance so far, in the order of `ENERGY_COLUMNS` [J]."""
         if self._energy is not None:
             return self._energy
         if self._kernel is None:
@@ -374,25 +382,25 @@ class Realization(Recorded):
     @property
     def step_work(self) -> float:
         """Work on the contact force in steps beyond that on the contacts, relative to the work of
-        the drive; 0 where contacts are followed one by one."""
+        the drive; 0 where contacts are kept one by one."""
         return self._part_of_work(self.energy[ENERGY_COLUMNS.index("step_work")])
 
     def _part_of_work(self, term: float) -> float:
         contacts, energy = self.config.contacts, self.energy
-        # A run in which hardly anything happens is measured by what may happen.
+        # The minimum scale is for runs in which hardly any work is done.
         unit = contacts.static_force**2 / contacts.stiffness
         scale = abs(energy[0]) or float(np.max(np.abs(energy)))
         return float(term / max(scale, MIN_ENERGY_RATIO * unit))
 
     @property
     def contacts(self) -> dict[str, Array]:
-        """Of each of N contacts: origin [m], stiffness [N/m], 0 if it is detached, breaking stretch
-        [m], number of renewals.
+        """Origin [m], stiffness [N/m] (0 if detached), breaking stretch [m] and number of renewals
+        of each of the N contacts.
 
         Raises
         ------
         RunError
-            If the run is over and the memory of the kernel was given back.
+            If the run is over and was closed.
         """
         if self.ending and self._kernel is None:
             raise RunError(
@@ -404,38 +412,26 @@ class Realization(Recorded):
 
     @property
     def energy_terms(self) -> dict[str, float]:
-        """Terms of the energy balance up to now by name [J]; NaN before the first advance."""
+        """Terms of the energy balance so far by name [J]; NaN before the first advance."""
         return dict(zip(ENERGY_COLUMNS, self.energy.tolist(), strict=True))
 
     def save(self) -> Saved:
-        """Its part of a checkpoint; to be called between two segments."""
+        """Its part of a checkpoint, between two segments."""
         words = None
         if not self.ending and (self._kernel is not None or self._words is not None):
             words = self._words if self._kernel is None else self._kernel.save()
-        scalars = {
-            "time": self.time,
-            "ending": self.ending,
-            "breaks": self.breaks,
-            "detached": self.detached,
-            "advances": self.advances,
-            "kernel_seconds": self.kernel_seconds,
-            "avalanche_count": self.avalanche_count,
-            "avalanche_slip": self.avalanche_slip,
-            "displacement": self.displacement,
-            "force_error": self.force_error,
-            "slip_time_error": self.slip_time_error,
-            "integrator_counts": [int(count) for count in self.integrator_counts],
-            "energy": None if self._energy is None else [float(term) for term in self._energy],
+        scalars = {name: getattr(self, name) for name in SAVED_ATTRIBUTES} | {
+            "integrator_counts": self.integrator_counts.tolist(),
+            "energy": None if self._energy is None else self._energy.tolist(),
             "columns": {table: rows.columns for table, rows in self._tables.items()},
         }
         counts = {table: len(rows) for table, rows in self._tables.items()}
         return Saved(scalars, counts, words)
 
     def restore(self, saved: Saved, tables: dict[str, Rows]) -> None:
-        """Go on from what a checkpoint has kept, with the rows that were recorded until then."""
-        for name, value in saved.scalars.items():
-            if name not in {"columns", "energy", "integrator_counts"}:
-                setattr(self, name, value)
+        """Continue from a checkpoint, with the rows that were recorded until then."""
+        for name in SAVED_ATTRIBUTES:
+            setattr(self, name, saved.scalars[name])
         energy = saved.scalars["energy"]
         self._energy = None if energy is None else np.array(energy)
         self.integrator_counts = np.array(saved.scalars["integrator_counts"], dtype=np.int64)

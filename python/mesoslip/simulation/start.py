@@ -1,7 +1,7 @@
-"""Where a run starts: at time 0, or at the end of another run, from which it goes on.
+"""The start of a run: time 0, or the end of another run, which it continues.
 
-The motion goes on exactly: a chain of runs under one velocity after another is one run with stages
-of the drive, to the bit. What a run records counts from its own start.
+The motion continues exactly: a chain of runs at successive velocities equals one run with stages of
+the drive to the bit. Times, displacements and counts of a run are relative to its own start.
 """
 
 from __future__ import annotations
@@ -13,54 +13,46 @@ import numpy as np
 
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.simulation.archive import Archive
-from mesoslip.simulation.assembly import assemble
 from mesoslip.simulation.kernel import Array, Kernel, Progress, Words
-from mesoslip.simulation.tables import COLUMNS, ENERGY_COLUMNS
+from mesoslip.simulation.kernel_setup import configured_kernel
+from mesoslip.simulation.recorded_tables import COLUMNS, ENERGY_COLUMNS
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Keys of which the next run may have another value: those that leave the contacts as they are.
+# Keys whose values may change from one run to the next: those that do not affect the contacts.
 CONTINUED = ("drive.velocity", "drive.force", "slider.stiffness")
-# Terms of the energy balance that are of the present state, not sums since the start.
+# Terms of the energy balance that belong to the present state; the others add up from the start.
 PRESENT_TERMS = ("slider_energy", "contact_energy")
-# The base has an origin of its own, which does not move.
+# Columns with an origin that does not move.
 FIXED_COLUMNS = ("base_displacement",)
 
 
 class End(NamedTuple):
-    """The end of a run, from which another can go on."""
+    """The end of a run, which another one can continue: configuration and state of the kernel."""
 
     config: Config
     words: Words
-    """State of the kernel."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """The start of a run, from which what it records is counted.
-
-    Attributes
-    ----------
-    progress
-        How far the kernel had come; None at time 0.
-    slips
-        Slips before.
-    energy
-        Terms of the energy balance at the start [J].
-    """
+    """The start of a run: progress of the kernel (None at time 0), earlier slips, and terms of the
+    energy balance [J], which are subtracted from those of the kernel."""
 
     progress: Progress | None = None
     slips: int = 0
     energy: Array = field(default_factory=lambda: np.zeros(len(ENERGY_COLUMNS)))
 
-    def assemble(self, config: Config, parameters: Parameters, number: int) -> Kernel:
-        """A kernel of the run, to be restored, or started at time 0."""
+    def configured_kernel(self, config: Config, parameters: Parameters, number: int) -> Kernel:
+        """A kernel of the run, to be restored or, at time 0, started."""
         time = None if self.progress is None else self.progress.time
-        return assemble(config, parameters, number, start_time=time, earlier_slips=self.slips)
+        return configured_kernel(
+            config, parameters, number, start_time=time, earlier_slips=self.slips
+        )
 
     def progress_since(self, now: Progress) -> Progress:
-        """How far the run has come."""
+        """The progress of the run, from that of the kernel."""
         if self.progress is None:
             return now
         before = self.progress
@@ -75,7 +67,7 @@ class Start:
         )
 
     def rows_since(self, table: str, rows: Array) -> Array:
-        """Rows of a table of the kernel as those of the run."""
+        """Rows of a table of the run, from those of the kernel."""
         if self.progress is None or not rows.size:
             return rows
         if table == "layers":
@@ -84,7 +76,7 @@ class Start:
         return rows - shift if shift.size else rows
 
     def _shift(self, table: str, name: str) -> float:
-        """Value at the start of what a column counts."""
+        """Value of a column at the start."""
         assert self.progress is not None
         if name.endswith("time"):
             return self.progress.time
@@ -103,23 +95,14 @@ START = Start()
 
 
 def follow(config: Config, parameters: Parameters, number: int, end: End) -> tuple[Kernel, Start]:
-    """A kernel that goes on from the end of another run, and its start.
+    """A kernel that continues another run with the same number, and its start.
 
-    Parameters
-    ----------
-    config
-        The configuration, of which the keys of `CONTINUED` may differ from that of the other run.
-    parameters
-        Parameters of the contacts.
-    number
-        Number of the realization, the same as that of the other run.
-    end
-        The end of the other run.
+    The configurations may differ in the keys of `CONTINUED`; ``parameters`` are the contacts'.
     """
     archive = Archive(end.words)
     slider = archive.section_with("drive part")
     slips = int(archive.number("slips", "slip_count"))
-    kernel = assemble(
+    kernel = configured_kernel(
         config,
         parameters,
         number,
@@ -138,10 +121,10 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
 
 
 def put_on_spring(archive: Archive, slider: str, before: Config, config: Config) -> None:
-    """Put a state of a rigid slider on another spring and damper.
+    """Change spring and damper of a rigid slider in a state.
 
-    Velocities, also the damper's, and all forces but that of the damper stay as they are. The drive
-    is displaced, so that the spring bears the same force.
+    Velocities, also the damper's, and all forces but the damper's stay the same: the drive is
+    displaced, so that the spring bears the same force.
     """
     here, value = (archive.number(slider, name) for name in ("displacement", "drive value"))
     time, since, rate = (
@@ -152,8 +135,8 @@ def put_on_spring(archive: Archive, slider: str, before: Config, config: Config)
     archive.set_number(slider, "drive value", value + (here + gap - drive))
     earlier, now = before.slider.oscillator, config.slider.oscillator
     if earlier is not None and now is not None and earlier.damping > 0:
-        # The damper pulls in proportion to its rate, which a damping ratio ties to stiffness and
-        # mass.
+        # The damper's force is proportional to its rate, which a damping ratio derives from
+        # stiffness and mass.
         damper, acceleration = (archive.number(slider, one) for one in ("damper", "acceleration"))
         change = damper * (now.damping / earlier.damping - 1)
         archive.set_number(slider, "damper", damper + change)

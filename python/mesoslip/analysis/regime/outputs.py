@@ -19,11 +19,12 @@ from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run
-from mesoslip.output.results import RunResults
-from mesoslip.simulation.tables import SLIP_COLUMNS, TRACE_COLUMNS
+from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mesoslip.simulation.run_realizations import Results
 
 Array = NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def regime(output: OutputLike) -> xr.Dataset:
         return regimes(tree, name)
 
 
-def regimes_of_results(results: RunResults) -> Iterator[RegimeResult]:
+def regimes_of_results(results: Results) -> Iterator[RegimeResult]:
     """The regimes of the realizations of a run; only the evaluated samples are held in memory."""
     index = {name: number for number, name in enumerate(TRACE_COLUMNS)}
     wanted = [index[name] for name in ("time", "elastic_force", "velocity")]

@@ -36,7 +36,7 @@ from mesoslip.analysis.response.steps import step_rows
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, Values, Variable, in_xarray
 from mesoslip.output.inputs import OutputLike, opened_run_arrays, several
-from mesoslip.output.tables import write_table
+from mesoslip.output.table_files import write_table
 from mesoslip.output.variables import Group
 
 if TYPE_CHECKING:

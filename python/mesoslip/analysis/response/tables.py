@@ -9,7 +9,7 @@ from typing import Any
 
 from mesoslip.analysis.response.dataset import ratio_name, rows_of, scalars_of
 from mesoslip.output.arrays import Tree
-from mesoslip.output.tables import PrintedTable
+from mesoslip.output.table_files import PrintedTable
 from mesoslip.quantities import column, with_error, with_unit
 
 Row = Mapping[str, Any]

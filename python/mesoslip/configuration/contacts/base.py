@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaint, Complaints, Table
-from mesoslip.configuration.tables import Run
 
 Array = NDArray[Any]
 

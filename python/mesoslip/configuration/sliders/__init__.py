@@ -1,7 +1,4 @@
-"""Kinds of sliders, each in a file of its own and listed here.
-
-Adding a kind is adding a file with a `SliderTable` and naming it in `KINDS`.
-"""
+"""Kinds of sliders: each is a `SliderTable` in a file of its own, named in `KINDS`."""
 
 from __future__ import annotations
 
@@ -27,19 +24,19 @@ KINDS: tuple[type[SliderTable], ...] = (
     ForceSlider,
 )
 
-# The first one is the default.
+# By name; the first kind is the default.
 SLIDERS: dict[str, type[SliderTable]] = {kind.model_fields["kind"].default: kind for kind in KINDS}
 DEFAULT = next(iter(SLIDERS))
 
 
 def _kind_of(table: Any) -> Any:
-    """Name of the kind of a table of a file, or of a slider."""
+    """Name of the kind of a slider, or of a table of a file."""
     if isinstance(table, Mapping):
         return table.get("kind", DEFAULT)
     return getattr(table, "kind", DEFAULT)
 
 
-# For the type checker a slider is what all kinds have in common.
+# For type checkers a slider has the interface of all kinds.
 if TYPE_CHECKING:
     Slider: TypeAlias = SliderTable
 else:

@@ -9,8 +9,8 @@ from typing import ClassVar, NamedTuple, Protocol
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import Contacts
 from mesoslip.configuration.drive import Drive
+from mesoslip.configuration.run_tables import Output
 from mesoslip.configuration.table import Complaints, Table
-from mesoslip.configuration.tables import Output
 
 
 class Oscillator(NamedTuple):
@@ -47,21 +47,13 @@ class SliderTable(Table):
     """A kind of slider: its keys, its parameters in the kernel, and the combinations it refuses.
 
     The defaults are those of a slider without inertia, slips or layers.
-
-    Attributes
-    ----------
-    jumps
-        Whether it has no inertia: contacts break in avalanches while the drive stands still.
-    ignores_delay
-        Whether contacts attach at once and bear no drag, whatever their delay and film.
-    driven_by_force
-        Whether the drive may be a force that grows from 0, without a spring.
-    takes_forces
-        Whether the drive may be any force, which may jump.
     """
 
+    # Whether it has no inertia: contacts break in avalanches while the drive stands still.
     jumps: ClassVar[bool] = False
+    # Whether contacts attach at once and have no drag, whatever their delay and film.
     ignores_delay: ClassVar[bool] = False
+    # Whether the drive may be a force that grows from 0, and whether it may be any force.
     driven_by_force: ClassVar[bool] = False
     takes_forces: ClassVar[bool] = False
 
@@ -84,7 +76,7 @@ class SliderTable(Table):
 
     @property
     def series_stiffness(self) -> float:
-        """Stiffness of all springs that the contacts are in series with [N/m]."""
+        """Stiffness of all springs in series with the contacts [N/m]."""
         return self.spring_stiffness
 
     @property
@@ -93,7 +85,7 @@ class SliderTable(Table):
         return 1.0
 
     def slip_velocity(self, config: Setting) -> float:  # noqa: ARG002
-        """Velocity relative to the drive above which it slips [m/s]; 0 if there are no slips."""
+        """Velocity relative to the drive above which it slips [m/s]; 0 if it has no slips."""
         return 0.0
 
     def ringing_period(self, config: Setting) -> float:  # noqa: ARG002
@@ -101,7 +93,7 @@ class SliderTable(Table):
         return math.inf
 
     def time_in_slips(self, config: Setting) -> float:  # noqa: ARG002
-        """About how long the slips of a run take together [s]."""
+        """Estimated duration of all slips of a run together [s]."""
         return 0.0
 
     @property
@@ -116,7 +108,7 @@ class SliderTable(Table):
 
     @property
     def extra_traces(self) -> tuple[str, ...]:
-        """Names of traces that only this kind has."""
+        """Names of traces of this kind only."""
         return ()
 
     def layers_recorded(self, config: Setting) -> int:  # noqa: ARG002
@@ -133,7 +125,7 @@ class SliderTable(Table):
 
     @property
     def remedy(self) -> str:
-        """Advice for a run that exceeds that bound."""
+        """Advice for runs with a larger residual."""
         return ""
 
     def problems(self, config: Setting) -> Complaints:  # noqa: ARG002

@@ -13,8 +13,8 @@ from mesoslip.configuration.table import Complaint, Complaints, Mass, Rate
 class ForceSlider(SliderTable):
     """A block with a mass under a force, without a spring: M dV/dt = F_ext − F − M η_S V.
 
-    It is at rest at first; a force that does not grow from 0 acts suddenly. It creeps or slides
-    without end, so it has no slips, and once it slides, damping alone limits its velocity.
+    It starts at rest; a constant force acts suddenly. It creeps or slides without end, so it has no
+    slips, and only damping limits its velocity when it slides.
     """
 
     driven_by_force: ClassVar[bool] = True

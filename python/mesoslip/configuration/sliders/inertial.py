@@ -1,4 +1,4 @@
-"""Keys that sliders with a mass have in common."""
+"""Keys of all sliders with a mass on a spring."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field
 from mesoslip.configuration.sliders.base import Setting, SliderTable
 from mesoslip.configuration.table import Mass, Stiffness
 
-# Velocity relative to the drive above which the slider slips, in units of Omega_S F_s/K.
+# Velocity relative to the drive above which the slider slips, over Ω_S F_s/K.
 SLIP_VELOCITY_RATIO = 0.02
 
 
@@ -33,21 +33,20 @@ class InertialSlider(SliderTable):
 
     @property
     def quiet_time(self) -> float:
-        """Half a period of the setup [s]."""
+        # Half a period of the setup.
         return math.pi / self.omega_s
 
     def velocity_scale(self, config: Setting) -> float:
-        """Velocity of a slip, Omega_S F_s/K [m/s]."""
+        """Velocity of a slip, Ω_S F_s/K [m/s]."""
         return self.omega_s * config.contacts.static_force / self.stiffness
 
     def ringing_period(self, config: Setting) -> float:
-        """2π √(M/(K + Nk)) [s]."""
         return 2 * math.pi * math.sqrt(self.mass / (self.stiffness + config.contacts.stiffness))
 
     def time_in_slips(self, config: Setting) -> float:
-        """Each slip takes about two periods, after the spring's loading to the static force [s]."""
         if config.drive_speed == 0:
             return 0.0
+        # A slip of about two periods follows each loading of the spring to the static force.
         loading = config.contacts.static_force / self.stiffness / config.drive_speed
         return config.expected_duration * min(1.0, 4 * self.quiet_time / loading)
 

@@ -1,4 +1,4 @@
-"""An elastic block of layers (S24), and the base that it may slide on."""
+"""An elastic block of layers (S24), and the base on which it may slide."""
 
 from __future__ import annotations
 
@@ -100,17 +100,16 @@ class Cantilever(Table):
         return (lowest / self.length) ** 2 * math.sqrt(stiffness_over_mass)
 
 
-# Maximum residual of the energy balance with CVODE, in units of its tolerance: errors add up over
-# very many steps.
+# Maximum residual of the energy balance with CVODE over its tolerance: errors of many steps add up.
 RESIDUAL_OVER_TOLERANCE = 1e4
 
 
 class LayeredSlider(InertialSlider):
     """An elastic block of layers joined by springs; the first layer carries the contacts.
 
-    ``layer_damping`` γ [1/s] gives the force γ M/N_l times the relative velocity of neighbouring
-    layers. It does not act on the spring to the drive: with one layer the block is a rigid slider
-    without damping (model section 8).
+    The damping force is γ M/N_l times the relative velocity of neighbouring layers, with the
+    ``layer_damping`` γ [1/s]. The spring to the drive has no damping: with one layer the block is a
+    rigid slider without damping (model section 8).
     """
 
     kind: Literal["layered"] = "layered"
@@ -122,7 +121,7 @@ class LayeredSlider(InertialSlider):
     base: Base | None = None
     """The lower body, if it moves."""
     solver: Solver = Solver()
-    """How the layers are integrated."""
+    """Method of integration of the layers."""
     cantilever: Cantilever | None = None
     """A rod that gives mass and stiffness of the slider."""
 
@@ -140,8 +139,8 @@ class LayeredSlider(InertialSlider):
         return {"mass": cantilever.mass, "stiffness": cantilever.stiffness, **given}
 
     @model_serializer(mode="wrap")
-    def _without_what_follows(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out mass and stiffness that follow from the cantilever."""
+    def _without_derived(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out mass and stiffness of the cantilever."""
         table: dict[str, Any] = handler(self)
         for name in ("mass", "stiffness"):
             if self.cantilever is not None and getattr(self.cantilever, name) == table.get(name):
@@ -150,7 +149,7 @@ class LayeredSlider(InertialSlider):
 
     @property
     def frequencies(self) -> tuple[float, ...]:
-        """Frequencies of the chain while no contact is pinned, on a fixed base [1/s]."""
+        """Frequencies of the chain on a fixed base, without pinned contacts [1/s]."""
         n = self.layers
         return tuple(
             2 * n * self.omega_s * math.sin((2 * j - 1) * math.pi / (2 * (2 * n + 1)))
@@ -159,26 +158,25 @@ class LayeredSlider(InertialSlider):
 
     @property
     def series_stiffness(self) -> float:
-        """K, in series with the spring of the base [N/m]."""
         if self.base is None:
             return self.stiffness
         return 1 / (1 / self.stiffness + 1 / self.base.stiffness)
 
     @property
     def quiet_time(self) -> float:
-        """Half a period of the setup [s], or of slider and base together where that is longer."""
         setup = super().quiet_time
         if self.base is None:
             return setup
+        # Slider and base together may have a longer period than the setup.
         return max(setup, math.pi * math.sqrt((self.base.mass + self.mass) / self.base.stiffness))
 
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:
         solver = self.solver_name(config)
-        # Files of such runs can be read without SUNDIALS; only runs need it.
+        # Only a run needs SUNDIALS; its output can be read without.
         if solver != "series" and not has_cvode():
             message = (
-                "needs CVODE, and this copy of mesoslip was built without SUNDIALS; "
-                'method = "series" needs nothing'
+                "needs CVODE, but this copy of mesoslip was built without SUNDIALS; "
+                'use method = "series"'
             )
             raise ConfigError([Problem("", "slider.solver.method", message, solver)])
         relative = self.solver.relative_tolerance
@@ -211,16 +209,12 @@ class LayeredSlider(InertialSlider):
         return self.layers if config.output.layers else 0
 
     def solver_name(self, config: Setting) -> str:
-        """The method, chosen for a run if it is "auto".
-
-        Series need a few steps per period of the fastest rate, even if it does not affect the
-        motion. BDF does not, and is chosen where series would take too long, if this copy of
-        mesoslip has it.
-        """
         if self.solver.method != AUTOMATIC:
             return self.solver.method
         if not config.contact_kind.is_discrete or not has_cvode():
             return "series"
+        # Series need a few steps per period of the fastest rate, even if it does not affect the
+        # motion; BDF does not.
         mass = self.mass / self.layers
         drag = config.contacts.count * config.contacts.contact_drag
         rate = 2 * self.layers * self.omega_s
@@ -241,7 +235,7 @@ class LayeredSlider(InertialSlider):
     def remedy(self) -> str:
         return (
             "a smaller slider.solver.relative_tolerance helps, or slider.solver.method = "
-            '"series", exact to rounding'
+            '"series", which is exact to rounding'
         )
 
     def problems(self, config: Setting) -> Complaints:

@@ -13,8 +13,8 @@ from mesoslip.configuration.table import Complaint, Complaints, Stiffness
 class QuasistaticSlider(SliderTable):
     """A block without inertia that follows the stable equilibrium of spring and contacts.
 
-    Its contacts attach at once and have no drag, whatever their delay and film. A force may drive
-    it without a spring.
+    Its contacts attach at once and have no drag, whatever their delay and film. With
+    drive.force_rate a force drives it, without a spring.
     """
 
     jumps: ClassVar[bool] = True
@@ -24,7 +24,7 @@ class QuasistaticSlider(SliderTable):
     kind: Literal["quasistatic"] = "quasistatic"
     """A block without inertia."""
     stiffness: Annotated[Stiffness, Field(gt=0)] | None = None
-    """Stiffness of the drive's spring, K; none with drive.force_rate."""
+    """Stiffness of the drive's spring, K; not with drive.force_rate."""
 
     @property
     def spring_stiffness(self) -> float:

@@ -1,4 +1,4 @@
-"""The newest of several jobs: each one replaces the job before it."""
+"""A thread for jobs of which only the newest counts."""
 
 from __future__ import annotations
 
@@ -15,16 +15,10 @@ from mesoslip.execution.stop import Stop
 Job = Callable[[Stop], None]
 
 
-class Newest:
-    """A thread that does the newest of the jobs that it is given.
+class NewestJob:
+    """A thread for jobs, each of which stops or replaces the job before it.
 
-    Each job requests that the one before it stops; of those that have not begun only the newest is
-    done. A job that fails does not end the thread.
-
-    Parameters
-    ----------
-    delay
-        How long a job waits for a newer one [s].
+    A job starts after ``delay`` [s] without a newer one. A failed job does not end the thread.
     """
 
     def __init__(self, delay: float = 0.0) -> None:
@@ -35,20 +29,20 @@ class Newest:
         self._pool = LocalPool(1, self._closed, float("inf"))
 
     def submit(self, job: Job) -> None:
-        """Do a job instead of those before it."""
+        """Run a job instead of the earlier ones."""
         with self._lock:
             self._stop.set()
             if not self._closed.is_set():
                 self._stop = Stop(self._closed)
-                self._pool.submit(self._do, (job, self._stop))
+                self._pool.submit(self._run, (job, self._stop))
 
     def cancel(self) -> None:
-        """Do nothing until the next job."""
+        """Stop the present job."""
         with self._lock:
             self._stop.set()
 
     def close(self) -> None:
-        """End the thread, as soon as the job under way checks its stop."""
+        """End the thread when the present job checks its stop."""
         with self._lock:
             self._pool.close(0.0)
 
@@ -57,14 +51,14 @@ class Newest:
         """Whether the thread has not ended."""
         return self._pool.is_alive
 
-    def _do(self, piece: tuple[Job, Stop], _: Stop) -> None:
+    def _run(self, piece: tuple[Job, Stop], _: Stop) -> None:
         job, stop = piece
         if stop.wait(self._delay):
             return
         try:
             job(stop)
         except Exception:
-            # Reported where the program was started, as for any thread.
+            # Printed like the uncaught exception of any thread.
             threading.excepthook(
                 threading.ExceptHookArgs((*sys.exc_info(), threading.current_thread()))
             )
@@ -73,11 +67,10 @@ class Newest:
 
 
 def _return_memory() -> None:
-    """Free what is left of a job, and return it to the system where the C library can.
+    """Free the memory of a job, and return it to the system where the C library can.
 
-    Trees of data refer to themselves, so they wait for the collector of garbage. The C library
-    keeps what it gets back otherwise, for each thread: after many runs as much as the largest of
-    them took, several times.
+    Trees of data refer to themselves, so only the garbage collector frees them. The C library would
+    keep their memory for each thread, several times that of the largest run.
     """
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None

@@ -1,7 +1,4 @@
-"""The tables [run], [output] and [curve] of a configuration file. Adding a key is adding a field.
-
-Sliders, contacts and the drive have their tables in files of their own.
-"""
+"""The tables [run], [output] and [curve] of a configuration file; each field is a key."""
 
 from __future__ import annotations
 
@@ -22,24 +19,25 @@ from mesoslip.configuration.table import (
 
 
 def _or_flag(value: object) -> object:
-    """A table; true is one with its defaults, false is none."""
+    """A table: true means its defaults, false no table."""
     if isinstance(value, bool):
         return {} if value else None
     return value
 
 
 class Steady(Table):
-    """Criterion for a steady state. The mean spring force over the last blocks and over as many
-    blocks before must agree within their standard error, or within ``tolerance``, and the earlier
-    blocks must not scatter twice as much. Each block is a distance that the drive moves."""
+    """Criterion for a steady state. The mean spring forces over the last blocks and over the same
+    number of blocks before must agree within their standard error, or within ``tolerance``, and the
+    scatter of the earlier blocks must be at most twice that of the last ones. A block is a distance
+    of the drive."""
 
     displacement: Annotated[Length, Field(gt=0)] | None = None
-    """Distance that the drive moves in one block; by default the one that loads spring and contacts
-    to the static force."""
+    """Distance that the drive moves in one block; by default the distance that loads spring and
+    contacts to the static force."""
     blocks: Annotated[Whole, Field(ge=2, le=10_000)] = 10
     """Number of blocks in each of the two means."""
     tolerance: Annotated[Number, Field(ge=0, lt=1)] = 1e-4
-    """Difference of the means, relative to the static force, that counts as none."""
+    """Difference of the means, relative to the static force, that is ignored."""
 
 
 class Stop(Table):
@@ -86,7 +84,7 @@ class Run(Table):
 
     @property
     def stops(self) -> Stop:
-        """The conditions that end the run early; without any of them by default."""
+        """The conditions that end the run early."""
         return self.stop or Stop()
 
 
@@ -96,9 +94,10 @@ class Output(Table):
     interval: Annotated[Time, Field(gt=0)] | None = None
     """Sampling interval of the trace; by default 1/10000 of the run."""
     slip_interval: Annotated[Time, Field(ge=0)] | None = None
-    """Sampling interval of the finer traces around slips; 0 for none. By default 1/50 of the period
-    of ringing on the pinned contacts, or 1/5 of the delay if that is less; longer where slips would
-    then take more samples than the trace and than 20 000, and none where the trace is as fine."""
+    """Sampling interval of the finer traces around slips; 0 for no finer traces. By default 1/50 of
+    the period of ringing on the pinned contacts, or 1/5 of the delay if that is shorter. It is
+    longer where slips would then have more than 20 000 samples and more than the trace, and there
+    are no finer traces where the trace itself is as fine."""
     slip_velocity: Annotated[Velocity, Field(gt=0)] | None = None
     """Velocity relative to the drive above which a slip is recorded; by default 0.02 Ω_S F_s/K."""
     layers: StrictBool = False

@@ -1,4 +1,4 @@
-"""All realizations of a run, on any executor, with checkpoints on the way."""
+"""All realizations of a run, on any executor, with checkpoints."""
 
 from __future__ import annotations
 
@@ -17,28 +17,24 @@ from mesoslip.execution.executors import Executor, ExecutorLike, as_executor, co
 from mesoslip.execution.pool import PoolError, WorkerLostError
 from mesoslip.execution.stop import Stop, StopRequest
 from mesoslip.simulation.realization import Realization, Saved
-from mesoslip.simulation.tables import Rows
+from mesoslip.simulation.recorded_tables import Rows
 
 if TYPE_CHECKING:
     from mesoslip.simulation.checkpoint import Checkpoint
 
 NO_MEMORY = (
-    "not enough memory for what is recorded: a larger output.avalanche_size or "
-    "output.snapshot_size, or a longer output.interval, takes less"
+    "not enough memory for the record: a larger output.avalanche_size or output.snapshot_size, or "
+    "a longer output.interval, needs less"
 )
-
-# A realization on its way to another process: the configuration as nested tables, and its number.
-Remote = tuple[dict[str, Any], int]
 
 
 @dataclass
 class Results:
-    """Results of a run."""
+    """Results of a run, ``complete`` unless it was stopped."""
 
     config: Config
     realizations: list[Realization]
     complete: bool
-    """Whether every realization came to its end; false if the run was stopped."""
     wall_seconds: float
 
 
@@ -50,31 +46,11 @@ def run_realizations(
     stop: StopRequest | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Results:
-    """Run all realizations of a configuration.
+    """Run all realizations of a configuration, or continue them from a checkpoint.
 
-    Parameters
-    ----------
-    config
-        The configuration.
-    executor
-        Where realizations are computed, or how many threads compute them; on as many threads as
-        there are processors by default.
-    progress
-        Called now and then, from this thread, with the fraction of the work that is done.
-    stop
-        A request to stop between two segments; Ctrl-C is one too.
-    checkpoint
-        Where checkpoints are kept, and what an earlier run has left there; none by default. On
-        other executors than threads it keeps the realizations that are complete.
-
-    Raises
-    ------
-    ConfigError
-        If the number of workers is not positive.
-    FileError
-        If the checkpoint cannot be resumed.
-    RunError
-        If a realization fails, or no worker is left; the checkpoint stays.
+    ``progress`` is called with the completed fraction, 0 to 1. ``stop`` or Ctrl-C ends the run
+    between two segments. On executors other than threads a checkpoint keeps complete realizations
+    only.
     """
     run = _Run(config, as_executor(executor), progress, checkpoint)
     start = time.perf_counter()
@@ -91,7 +67,7 @@ def run_realizations(
         has_failed = True
         raise
     finally:
-        # Whatever ends the run: it can be resumed, unless it failed.
+        # A run that did not fail can be resumed, whatever has ended it.
         is_complete = all(one.finished for one in run.realizations)
         if checkpoint is not None and not (has_failed or is_complete):
             checkpoint.write(run.realizations)
@@ -99,7 +75,7 @@ def run_realizations(
 
 
 class _Run:
-    """Realizations under way."""
+    """The realizations of a run, and where they are computed."""
 
     def __init__(
         self,
@@ -118,22 +94,16 @@ class _Run:
         self._under_way: set[Realization] = set()
 
     def check(self) -> None:
-        """Make sure that realizations that are under way can go on.
-
-        Raises
-        ------
-        FileError
-            If they cannot.
-        """
+        """Refuse to continue realizations that are under way on other executors than threads."""
         under_way = any(one.advances > 0 and not one.finished for one in self.realizations)
         if under_way and not self._executor.shares_memory:
             raise FileError(
-                "the checkpoint has realizations that are under way, which only threads resume: "
-                "without --scheduler"
+                "the checkpoint has realizations that are under way; only threads can resume them: "
+                "run it without --scheduler"
             )
 
     def compute(self, stop: Stop) -> None:
-        """Advance all realizations to their ends, or until the stop."""
+        """Advance all realizations to their ends, unless stopped."""
         waiting = [one for one in self.realizations if not one.finished]
         self._done = len(self.realizations) - len(waiting)
         if self._executor.shares_memory:
@@ -142,7 +112,7 @@ class _Run:
             self._compute_elsewhere(waiting, stop)
 
     def _compute_here(self, waiting: Sequence[Realization], stop: Stop) -> None:
-        work = completed(self._executor, self._advance, waiting, stop, look=self._look)
+        work = completed(self._executor, self._advance, waiting, stop, poll=self._update)
         with closing(work):
             for realization, future in work:
                 try:
@@ -151,10 +121,10 @@ class _Run:
                     raise RunError(NO_MEMORY) from None
                 self._done += realization.finished
                 self._under_way.discard(realization)
-                self._look()
+                self._update()
 
     def _advance(self, realization: Realization, stop: Stop) -> None:
-        """Advance a realization to its end; called on threads."""
+        """Advance a realization to its end, on a thread."""
         self._under_way.add(realization)
         while not (realization.finished or stop.is_set()):
             realization.advance()
@@ -181,25 +151,22 @@ class _Run:
                 self._done += 1
                 if self._checkpoint is not None:
                     self._checkpoint.visit(self.realizations[number])
-                self._look()
+                self._update()
 
-    def _look(self) -> None:
+    def _update(self) -> None:
         if self._progress is not None:
             part = sum(one.part_done for one in list(self._under_way))
             self._progress(min(1.0, (self._done + part) / len(self.realizations)))
         if self._checkpoint is not None:
-            self._checkpoint.look(self.realizations)
+            self._checkpoint.update(self.realizations)
 
 
 def compute_realization(
-    piece: Remote, stop: StopRequest
+    piece: tuple[dict[str, Any], int], stop: StopRequest
 ) -> tuple[Saved, dict[str, NDArray[np.float64]]]:
-    """Run a realization in another process: its state at the end, and its tables.
+    """Run a realization, given by nested tables and its number, in another process.
 
-    Raises
-    ------
-    RunError
-        If it fails.
+    Returns its state at the end, and its tables.
     """
     tables, number = piece
     realization = Realization(Config.from_dict(tables), number)
@@ -214,7 +181,7 @@ def compute_realization(
 def _restore(
     realization: Realization, saved: Saved, tables: dict[str, NDArray[np.float64]]
 ) -> None:
-    """Set a realization to its state at the end of a run in another process."""
+    """Restore a realization from its state at the end of a run in another process."""
     rows = {}
     for name, values in tables.items():
         rows[name] = Rows(values.shape[1])

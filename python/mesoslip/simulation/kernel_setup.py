@@ -1,4 +1,4 @@
-"""A kernel with all its parts, made from a configuration."""
+"""Kernels with all their parts, as a configuration has them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from mesoslip.simulation.kernel import Kernel
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# The end of a drive that does not end: the maximum double.
+# End of a drive without end: the maximum double.
 NEVER = float(np.finfo(np.float64).max)
 
 
-def assemble(
+def configured_kernel(
     config: Config,
     parameters: Parameters | Kernel,
     number: int = 0,
@@ -27,25 +27,11 @@ def assemble(
     interval: float | None = None,
     earlier_slips: int = 0,
 ) -> Kernel:
-    """A kernel that can be started or restored.
+    """A kernel that can be started or restored; its contacts may be copied from another one.
 
-    Parameters
-    ----------
-    config
-        The configuration.
-    parameters
-        Parameters of the contacts, or a kernel that has the contacts and is not started.
-    number
-        Number of the realization.
-    start_time
-        When the run starts [s], for one that follows another: until then the drive has one part
-        more.
-    end_time
-        When the last part of the drive ends [s]; by default, at the end of the run.
-    interval
-        Interval of the trace [s]; that of the configuration by default.
-    earlier_slips
-        Slips before the run, for one that follows another.
+    A run that continues another has ``start_time`` [s], until which the drive has an additional
+    part, and ``earlier_slips``. ``end_time`` [s] of the drive and ``interval`` [s] of the trace
+    replace those of the configuration.
     """
     slider, contacts, output = config.slider, config.contact_kind, config.output
     kernel = Kernel()

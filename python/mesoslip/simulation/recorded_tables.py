@@ -1,0 +1,274 @@
+"""The tables of a run: rows of numbers, in memory or in the files of a checkpoint."""
+
+from __future__ import annotations
+
+import threading
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import RunError
+from mesoslip.simulation.kernel import name_list
+
+Array = NDArray[np.float64]
+
+# Columns of the tables, as the kernels state them.
+TRACE_COLUMNS = name_list("trace")
+SLIP_COLUMNS = name_list("slips")
+STAGE_COLUMNS = name_list("stages")
+AVALANCHE_COLUMNS = name_list("avalanches")
+SNAPSHOT_COLUMNS = name_list("snapshot_events")
+# Numbers of each contact in a snapshot, and at present.
+SNAPSHOT_NUMBERS = name_list("snapshots")
+CONTACT_COLUMNS = name_list("contacts")
+ENERGY_COLUMNS = name_list("energy")
+
+# Columns by table. The width of the tables without named columns depends on the run: displacements
+# of all layers, numbers of all contacts.
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "trace": TRACE_COLUMNS,
+    "slip_trace": name_list("slip_trace"),
+    "slips": SLIP_COLUMNS,
+    "stages": STAGE_COLUMNS,
+    "layers": (),
+    "avalanches": AVALANCHE_COLUMNS,
+    "snapshot_events": SNAPSHOT_COLUMNS,
+    "snapshots": (),
+}
+TABLES = tuple(COLUMNS)
+
+# Sentinel: the stretch of a detached contact.
+DETACHED = 1e300
+
+
+def structured(values: Array, columns: Sequence[str]) -> NDArray[np.void]:
+    """Rows of shape (rows, columns) as a structured array of shape (rows) with named columns."""
+    row = np.dtype([(name, np.float64) for name in columns])
+    return np.ascontiguousarray(values).view(row)[:, 0]
+
+
+@dataclass(slots=True)
+class Stored:
+    """Rows in a file, from ``place`` [bytes] on."""
+
+    path: Path
+    place: int
+    shape: tuple[int, int]
+    checksum: int
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def load(self) -> Array:
+        """Read them; a `RunError` if they are not what was written."""
+        count = self.shape[0] * self.shape[1]
+        try:
+            values = np.fromfile(self.path, dtype=np.float64, count=count, offset=self.place)
+        except OSError as error:
+            raise RunError(f"{self.path}: cannot be read: {error.strerror}") from error
+        if values.size != count or zlib.crc32(values.data) != self.checksum:
+            raise RunError(f"{self.path}: damaged: it differs from the rows that the run wrote")
+        return values.reshape(self.shape)
+
+
+class Rows:
+    """The rows of a table of one realization, in pieces; ``columns`` is the length of a row.
+
+    The thread of the realization adds pieces; another one moves them into files.
+    """
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self.pieces: list[Array | Stored] = []
+        # Memory of the pieces that are not in a file yet.
+        self.waiting_bytes = 0
+        self._lock = threading.Lock()
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, values: Array | Stored) -> None:
+        """Add rows, shape (rows, columns)."""
+        if len(values) == 0:
+            return
+        with self._lock:
+            self.pieces.append(values)
+            self._count += len(values)
+            if isinstance(values, np.ndarray):
+                self.waiting_bytes += values.nbytes
+
+    def waiting(self) -> list[tuple[int, Array]]:
+        """Pieces that are not in a file yet, with their numbers."""
+        with self._lock:
+            return [
+                (number, one)
+                for number, one in enumerate(self.pieces)
+                if isinstance(one, np.ndarray)
+            ]
+
+    def store(self, number: int, stored: Stored) -> None:
+        """Replace a piece by its place in a file."""
+        with self._lock:
+            piece = self.pieces[number]
+            if isinstance(piece, np.ndarray):
+                self.waiting_bytes -= piece.nbytes
+            self.pieces[number] = stored
+
+    def blocks(self, max_rows: int) -> Iterator[Array]:
+        """The rows in their order, at most ``max_rows`` at a time."""
+        with self._lock:
+            pieces = list(self.pieces)
+        for piece in pieces:
+            values = piece.load() if isinstance(piece, Stored) else piece
+            for start in range(0, len(values), max_rows):
+                yield values[start : start + max_rows]
+
+    def read(self) -> Array:
+        """All rows, shape (rows, columns)."""
+        return np.concatenate(
+            [np.empty((0, self.columns)), *self.blocks(max(1, len(self)))], dtype=np.float64
+        )
+
+
+class FirstRows:
+    """The first rows of a table."""
+
+    def __init__(self, rows: Rows, count: int) -> None:
+        self._rows, self._count = rows, count
+        self.columns = rows.columns
+
+    def __len__(self) -> int:
+        return self._count
+
+    def blocks(self, max_rows: int) -> Iterator[Array]:
+        """See `Rows.blocks`."""
+        remaining = self._count
+        for block in self._rows.blocks(max_rows):
+            if remaining == 0:
+                return
+            yield block[:remaining]
+            remaining -= min(remaining, len(block))
+
+    def read(self) -> Array:
+        """See `Rows.read`."""
+        return np.concatenate([np.empty((0, self.columns)), *self.blocks(max(1, self._count))])
+
+
+class SnapshotRows:
+    """Snapshots of the contacts, shape (snapshots, contacts, 3), see `SNAPSHOT_NUMBERS`."""
+
+    def __init__(self, rows: Rows | FirstRows) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def _shaped(self, values: Array) -> Array:
+        shaped = values.reshape(len(values), -1, len(SNAPSHOT_NUMBERS))
+        return np.where(shaped > DETACHED, np.nan, shaped)
+
+    def blocks(self, max_rows: int) -> Iterator[Array]:
+        """The snapshots in their order; the stretch of a detached contact is NaN."""
+        for values in self._rows.blocks(max_rows):
+            yield self._shaped(values)
+
+    def read(self) -> Array:
+        """All snapshots."""
+        return self._shaped(self._rows.read())
+
+
+class Recorded:
+    """Rows that a run has recorded, by table."""
+
+    def __init__(self) -> None:
+        self._tables: dict[str, Rows] = {}
+
+    def rows(self, table: str) -> Rows | FirstRows | SnapshotRows:
+        """Rows of one of `TABLES`; samples around a slip come with the slip's row."""
+        rows = self._tables.get(table) or Rows(len(COLUMNS[table]))
+        if table == "slip_trace":
+            return FirstRows(rows, self._slip_samples(rows))
+        if table == "snapshots":
+            return SnapshotRows(rows)
+        return rows
+
+    def table(self, name: str) -> NDArray[np.void]:
+        """Rows recorded in a table up to now, as a structured array with named columns.
+
+        Parameters
+        ----------
+        name
+            "trace" (samples at fixed intervals), "slips", "slip_trace" (finer samples around
+            slips), "stages" (completed stages of the drive), "avalanches", or "snapshot_events".
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (rows), in SI units.
+
+        Raises
+        ------
+        RunError
+            If there is no such table, or its columns have no names.
+        """
+        columns = COLUMNS.get(name)
+        if not columns:
+            known = ", ".join(repr(other) for other, names in COLUMNS.items() if names)
+            raise RunError(f"there is no table {name!r} with named columns, but there are {known}")
+        return structured(self.rows(name).read(), columns)
+
+    @property
+    def trace(self) -> Array:
+        """The samples of the trace, columns `TRACE_COLUMNS`."""
+        return self.rows("trace").read()
+
+    @property
+    def slips(self) -> Array:
+        """The catalogue of slips, columns `SLIP_COLUMNS`."""
+        return self.rows("slips").read()
+
+    @property
+    def slip_trace(self) -> Array:
+        """The finer samples around slips: columns of the trace and the number of the slip."""
+        return self.rows("slip_trace").read()
+
+    @property
+    def layer_trace(self) -> Array:
+        """Displacements of the layers at the samples of the trace."""
+        return self.rows("layers").read()
+
+    @property
+    def avalanches(self) -> Array:
+        """The catalogue of avalanches, columns `AVALANCHE_COLUMNS`."""
+        return self.rows("avalanches").read()
+
+    @property
+    def snapshot_events(self) -> Array:
+        """Times and displacements of the snapshots, columns `SNAPSHOT_COLUMNS`."""
+        return self.rows("snapshot_events").read()
+
+    @property
+    def snapshots(self) -> Array:
+        """The snapshots, shape (snapshots, contacts, 3), numbers `SNAPSHOT_NUMBERS`."""
+        return self.rows("snapshots").read()
+
+    def _slip_samples(self, rows: Rows) -> int:
+        """Number of samples that belong to completed slips; those of a slip under way follow."""
+        slips = len(self._tables["slips"]) if "slips" in self._tables else 0
+        count = len(rows)
+        for piece in reversed(rows.pieces):
+            number = (piece if isinstance(piece, np.ndarray) else piece.load())[:, -1]
+            if number[0] < slips:
+                return count - int(np.count_nonzero(number >= slips))
+            count -= len(piece)
+        return count
+
+    @property
+    def waiting(self) -> Iterator[tuple[str, Rows]]:
+        """Tables with their rows, some of which may not be in a file yet."""
+        yield from list(self._tables.items())

@@ -102,6 +102,8 @@ int mesoslip_cvode_open(struct integration **opened, rates_function rates_of,
 #if SUNDIALS_VERSION_MAJOR < 7
   TRY(CVodeSetErrHandlerFn(self->memory, keep, self));
 #else
+  /* Or the context's own handler prints as well. */
+  TRY(SUNContext_ClearErrHandlers(self->context));
   TRY(SUNContext_PushErrHandler(self->context, keep, self));
 #endif
   TRY(CVodeInit(self->memory, rates, time, self->state));

@@ -1,10 +1,10 @@
 !> The onset of slip, Eqs. S46 and S47, dimensionless: x = K (X - X_c)/F_s, time times Omega_S.
 module mesoslip_theory_onset
-   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_loc, c_ptr
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length
-   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_bdf, vector_values
+   use mesoslip_numerics_sundials_cvode, only: cvode_type, method_bdf
    implicit none
    private
 
@@ -63,10 +63,8 @@ contains
       samples(:, 1) = [0.0_wp, state]
       count = 1
       ended = .false.
-      call cvode%open(c_funloc(rates), c_loc(onset), method_bdf, 2, 0.0_wp, state, tolerance, &
-         & tolerance * onset%D(1) * least, error)
-      if (allocated(error)) return
-      call cvode%find_roots(c_funloc(ends), 1, error)
+      call cvode%open(rates, c_loc(onset), method_bdf, 2, 0.0_wp, state, tolerance, &
+         & tolerance * onset%D(1) * least, root=distance_to_end, error=error)
       if (allocated(error)) return
       do while (count < size(samples, 2) .and. .not. ended)
          call cvode%integrate(count * interval, time, ended, error)
@@ -77,52 +75,48 @@ contains
       call cvode%close()
    end subroutine integrate_onset
 
-   !> Rates of displacement, velocity and running mean of the velocity, for CVODE.
-   function rates(time, state, rate, user_data) bind(c, name="mesoslip_onset_rates") &
+   !> Rates of displacement, velocity and running mean of the velocity.
+   function rates(time, size, state, rate, data) bind(c, name="mesoslip_onset_rates") &
       & result(status)
       real(c_double), value :: time
-      type(c_ptr), value :: state, rate
-      type(c_ptr), value :: user_data
+      integer(c_int), value :: size
+      real(c_double), intent(in) :: state(size)
+      real(c_double), intent(inout) :: rate(size)
+      type(c_ptr), value :: data
       integer(c_int) :: status
 
       type(onset_type), pointer :: onset
-      real(c_double), pointer :: y(:), dy(:)
 
-      call c_f_pointer(user_data, onset)
-      y => vector_values(state)
-      dy => vector_values(rate)
-      dy(1) = y(2)
-      dy(3) = onset%damping * (y(2) - y(3))
+      call c_f_pointer(data, onset)
+      rate(1) = state(2)
+      rate(3) = onset%damping * (state(2) - state(3))
       if (onset%equation == equation_sequential) then
-         dy(2) = onset%D(1) * time + (onset%D(2) + onset%D(3) * y(1)) * y(1)**2 - dy(3)
+         rate(2) = onset%D(1) * time + (onset%D(2) + onset%D(3) * state(1)) * state(1)**2 - rate(3)
       else
-         dy(2) = onset%D(0) + onset%D(1) * time - y(1) - onset%drag * y(2) - dy(3)
+         rate(2) = onset%D(0) + onset%D(1) * time - state(1) - onset%drag * state(2) - rate(3)
       end if
       status = 0
    end function rates
 
-   !> Zero where an equation ends, for CVODE.
-   function ends(time, state, value, user_data) bind(c, name="mesoslip_onset_ends") &
-      & result(status)
+   !> Zero where an equation ends.
+   function distance_to_end(time, size, state, data) bind(c, name="mesoslip_onset_end") &
+      & result(value)
       real(c_double), value :: time
-      type(c_ptr), value :: state
-      real(c_double) :: value(*)
-      type(c_ptr), value :: user_data
-      integer(c_int) :: status
+      integer(c_int), value :: size
+      real(c_double), intent(in) :: state(size)
+      type(c_ptr), value :: data
+      real(c_double) :: value
 
       type(onset_type), pointer :: onset
-      real(c_double), pointer :: y(:)
 
-      call c_f_pointer(user_data, onset)
-      y => vector_values(state)
+      call c_f_pointer(data, onset)
       if (onset%equation == equation_sequential) then
-         value(1) = onset%end_displacement - y(1)
+         value = onset%end_displacement - state(1)
       else
          ! At the start the slider is as slow as the drive as well.
-         value(1) = y(2) - onset%D(1)
-         if (.not. time > 0.0_c_double) value(1) = onset%D(0)
+         value = state(2) - onset%D(1)
+         if (.not. time > 0.0_c_double) value = onset%D(0)
       end if
-      status = 0
-   end function ends
+   end function distance_to_end
 
 end module mesoslip_theory_onset

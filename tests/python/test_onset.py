@@ -5,7 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip import ConfigError
+from mesoslip import ConfigError, RunError
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.slip_onset import EXPANSION_ERROR, end_of_expansion, solve
 from scipy import integrate
@@ -115,3 +115,10 @@ def test_a_film_too_viscous_to_let_the_force_drop(klein):
     assert set(tree.children) == {"sequential"}
     assert "S47 has no solution" in tree.attrs["comment"]
     assert "beta" not in tree.attrs
+
+
+def test_a_failure_of_cvode_is_an_error_and_prints_nothing(capfd):
+    coefficients = (0.796, 2.1e-3, 1e200, 1e300)
+    with pytest.raises(RunError, match=r"^CVODE failed \(integration, code -4\): At t = 0 "):
+        solve("sequential", coefficients, end_displacement=1e200, interval=1.0)
+    assert capfd.readouterr() == ("", "")

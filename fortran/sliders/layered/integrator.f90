@@ -3,11 +3,11 @@
 !>
 !> It restarts after each event, and events are found in the polynomial of each of its steps.
 module mesoslip_sliders_layered_integrator
-   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_funloc, c_int, c_loc, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_loc, c_ptr
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_sundials_cvode, only: band_entries, cvode_type, vector_values
-   use mesoslip_sliders_layered_system, only: accelerate, push, solver_bdf, system_type
+   use mesoslip_numerics_sundials_cvode, only: cvode_type
+   use mesoslip_sliders_layered_system, only: accelerate, push, system_type
    implicit none
    private
 
@@ -112,12 +112,9 @@ contains
       if (self%cvode%is_open()) then
          call self%cvode%restart(0.0_wp, error)
       else
-         call self%cvode%open(c_funloc(rates), c_loc(system), system%parameters%solver, &
-            & half_bandwidth, 0.0_wp, self%vector, system%parameters%relative, &
-            & system%parameters%absolute, error)
-         if (.not. allocated(error) .and. system%parameters%solver == solver_bdf) then
-            call self%cvode%set_jacobian(c_funloc(jacobian), error)
-         end if
+         call self%cvode%open(rates, c_loc(system), system%parameters%solver, half_bandwidth, &
+            & 0.0_wp, self%vector, system%parameters%relative, system%parameters%absolute, &
+            & jacobian=jacobian, error=error)
       end if
       self%is_stale = .false.
       self%steps = 0
@@ -161,42 +158,38 @@ contains
    end subroutine close
 
    !> Rates of the state in CVODE's order.
-   function rates(time, state, rate, user_data) bind(c, name="mesoslip_layers_rates") &
+   function rates(time, size, state, rate, data) bind(c, name="mesoslip_layers_rates") &
       & result(status)
       real(c_double), value :: time
-      type(c_ptr), value :: state, rate
-      type(c_ptr), value :: user_data
+      integer(c_int), value :: size
+      real(c_double), intent(in) :: state(size)
+      real(c_double), intent(inout) :: rate(size)
+      type(c_ptr), value :: data
       integer(c_int) :: status
 
       type(system_type), pointer :: system
-      real(c_double), pointer :: y(:), dy(:)
       real(wp), allocatable :: acceleration(:)
 
-      call c_f_pointer(user_data, system)
-      y => vector_values(state)
-      dy => vector_values(rate)
+      call c_f_pointer(data, system)
       allocate (acceleration(0:system%parameters%layers))
-      call accelerate(system, 1.0_wp, 0.0_wp, y(1::2), y(2::2), acceleration)
+      call accelerate(system, 1.0_wp, 0.0_wp, state(1::2), state(2::2), acceleration)
       call push(system, time, acceleration)
-      dy(1::2) = y(2::2)
-      dy(2::2) = acceleration
+      rate(1::2) = state(2::2)
+      rate(2::2) = acceleration
       status = 0
    end function rates
 
    !> The Jacobian of rates, a banded matrix.
-   function jacobian(time, state, rate, matrix, user_data, first, second, third) &
-      & bind(c, name="mesoslip_layers_jacobian") result(status)
-      real(c_double), value :: time
-      type(c_ptr), value :: state, rate, matrix, user_data, first, second, third
-      integer(c_int) :: status
+   subroutine jacobian(rows, size, upper, entries, data) bind(c, name="mesoslip_layers_jacobian")
+      integer(c_int), value :: rows, size, upper
+      real(c_double), intent(inout) :: entries(rows, size)
+      type(c_ptr), value :: data
 
       type(system_type), pointer :: system
-      real(c_double), pointer, contiguous :: entries(:, :)
       real(wp) :: spring, dashpot, base
-      integer :: upper, layer, last
+      integer :: layer, last
 
-      call c_f_pointer(user_data, system)
-      call band_entries(matrix, entries, upper)
+      call c_f_pointer(data, system)
       last = system%parameters%layers
       entries = 0.0_c_double
       spring = system%spring / system%layer_mass
@@ -222,7 +215,6 @@ contains
                & -law%drag * base - parameters%base_damping)
          end if
       end associate
-      status = 0
 
    contains
 
@@ -246,6 +238,6 @@ contains
          entries(place, column) = entries(place, column) + value
       end subroutine add
 
-   end function jacobian
+   end subroutine jacobian
 
 end module mesoslip_sliders_layered_integrator

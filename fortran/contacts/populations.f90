@@ -19,14 +19,13 @@ module mesoslip_contacts_populations
    private
 
    public :: contact_populations_type, new_contact_populations, make_contact_populations
-   public :: make_ageing_populations, make_activated_populations, &
-      & make_activated_ageing_populations
+   public :: make_ageing_populations, make_thermal_ageing_populations, make_thermal_populations
 
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: max_attached_part = 0.1_wp
    !> Part of a step for which nothing may attach in it. Contacts that break by activation do so in
    !> every step, and gaps of rounding between steps would come back after each delay.
-   real(wp), parameter :: activated_gap = 1.0e-3_wp
+   real(wp), parameter :: thermal_gap = 1.0e-3_wp
    !> Populations of contacts.
    type, extends(population_state_type) :: contact_populations_type
    contains
@@ -118,7 +117,7 @@ contains
    end subroutine make_ageing_populations
 
    !> Set up populations that break by thermal activation from named numbers.
-   subroutine make_activated_populations(contacts, common, parameters, error)
+   subroutine make_thermal_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
@@ -139,11 +138,11 @@ contains
       call activate(populations, parameters, error)
       if (allocated(error)) return
       call move_alloc(populations, contacts)
-   end subroutine make_activated_populations
+   end subroutine make_thermal_populations
 
    !> Set up populations whose thresholds change with age, and that break by thermal activation,
    !> from named numbers.
-   subroutine make_activated_ageing_populations(contacts, common, parameters, error)
+   subroutine make_thermal_ageing_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
@@ -169,7 +168,7 @@ contains
       call activate(populations, parameters, error)
       if (allocated(error)) return
       call move_alloc(populations, contacts)
-   end subroutine make_activated_ageing_populations
+   end subroutine make_thermal_ageing_populations
 
    !> Let populations break by thermal activation.
    subroutine activate(self, parameters, error)
@@ -191,7 +190,7 @@ contains
          return
       end if
       call self%pinned%activate(rate, force / self%parameters%static_force, self%resolution)
-      self%detached%short_gap = activated_gap
+      self%detached%short_gap = thermal_gap
    end subroutine activate
 
    !> Prepare the populations for the start of a run.
@@ -273,7 +272,7 @@ contains
       call exchange_contacts(self, archive)
       call self%pinned%exchange(archive)
       call self%detached%exchange(archive)
-      if (.not. self%pinned%is_activated) return
+      if (.not. self%pinned%is_thermal) return
       call archive%exchange("last_duration", self%last_duration)
       call archive%exchange("last_velocity", self%last_velocity)
       call archive%exchange("excess", self%excess)

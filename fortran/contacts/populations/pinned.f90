@@ -5,7 +5,7 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
       & coupling_table, initial_steady, initial_uniform
    use mesoslip_contacts_partial_moments, only: new_partial_moments
-   use mesoslip_contacts_populations_activated, only: activated_populations_type, joining_part
+   use mesoslip_contacts_populations_thermal, only: thermal_populations_type, joining_part
    use mesoslip_contacts_populations_activation, only: new_activation
    use mesoslip_contacts_populations_breaking, only: unresolved_part
    use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
@@ -30,7 +30,7 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: reach = 6.0_wp
 
    !> Populations of pinned contacts.
-   type, extends(activated_populations_type) :: pinned_populations_type
+   type, extends(thermal_populations_type) :: pinned_populations_type
       !> Mean stiffness of a contact that attaches [N/m], and the energy it gains [J]
       real(wp) :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
       !> Mean relative force of a contact that attaches
@@ -280,7 +280,7 @@ contains
       lost = 0.0_wp
       origin = moment / births
       joins = .false.
-      if (self%is_activated) joins = self%may_join_last(origin, birth, direction)
+      if (self%is_thermal) joins = self%may_join_last(origin, birth, direction)
       do class = 1, self%classes
          force = direction * self%class_force(class)
          mean_force = force + 0.5_wp * (displacement - origin) / self%stretch
@@ -292,7 +292,7 @@ contains
                & self%law_of(class, direction), self%class_broken(class), displacement, birth, &
                & time, error)
             if (allocated(error)) return
-            if (self%is_activated) call self%begin_hazard(self%count, time - birth, mean_force)
+            if (self%is_thermal) call self%begin_hazard(self%count, time - birth, mean_force)
          end if
       end do
       if (joins) return

@@ -1,8 +1,8 @@
 !> Schedules of contacts that break by thermal activation: which of them are listed, and the books
 !> of those that came.
-module mesoslip_contacts_activated_lists
-   use mesoslip_contacts_activated_keys, only: activated_keys_type, life_clock, life_key, &
-      & life_left, life_next, motions, set_up_activated
+module mesoslip_contacts_thermal_lists
+   use mesoslip_contacts_thermal_keys, only: thermal_keys_type, life_clock, life_key, &
+      & life_left, life_next, motions, set_up_keys
    use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
    use mesoslip_hazard, only: never
@@ -15,13 +15,13 @@ module mesoslip_contacts_activated_lists
    implicit none
    private
 
-   public :: activated_lists_type, set_up_lists
+   public :: thermal_lists_type, set_up_lists
 
    !> Minimum length of a schedule
    integer, parameter :: min_length = 4
 
    !> Contacts that break by thermal activation, and write schedules.
-   type, abstract, extends(activated_keys_type) :: activated_lists_type
+   type, abstract, extends(thermal_keys_type) :: thermal_lists_type
       !> Contacts of the schedule, by coordinate and by clock, and those that attach in it
       integer, private :: listed(max_events) = 0, clock_listed(max_events) = 0, &
          & attaching(max_events) = 0
@@ -40,14 +40,14 @@ module mesoslip_contacts_activated_lists
       procedure, non_overridable :: settle_lists
       procedure, non_overridable, private :: list_attaching, list_breaks, detach_came, turn_came, &
          & attach_came
-   end type activated_lists_type
+   end type thermal_lists_type
 
 contains
 
    !> Set up contacts that write schedules.
    subroutine set_up_lists(self, parameters, error)
       !> The contacts, of which is known what is common to all kinds
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or wrong, or there is not enough memory
@@ -55,14 +55,14 @@ contains
 
       integer :: stat
 
-      call set_up_activated(self, parameters, error)
+      call set_up_keys(self, parameters, error)
       allocate (self%entry(self%parameters%count), source=0, stat=stat)
       if (stat /= 0) call raise(error, status_memory, "not enough memory for lists of contacts")
    end subroutine set_up_lists
 
    !> Find where the clocks come to their next keys.
    subroutine set_next(self)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
 
       integer :: number
 
@@ -76,7 +76,7 @@ contains
 
    !> Draw the deviates of the next lives of contacts that have none yet.
    subroutine draw_deviates(self, contact, later)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       !> Their numbers, at most max_events
       integer, intent(in) :: contact(:)
       !> Renewals until those lives: 1 for pinned contacts
@@ -106,7 +106,7 @@ contains
    !> force has the sign of the motion, and attachments.
    subroutine plan_by_clocks(self, pose, limit, schedule)
       !> The contacts
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
@@ -138,7 +138,7 @@ contains
 
    !> List the next attachments, and the births of those that may attach in the schedule.
    subroutine list_attaching(self, limit, direction, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       !> Maximum number of attachments
       integer, intent(in) :: limit
       !> Sign of the velocity at which they attach
@@ -179,7 +179,7 @@ contains
    !> List the next breaks at thresholds, those whose forces get the sign of the motion with them,
    !> and breaks by the clock. That list ends at a key that is not known.
    subroutine list_breaks(self, limit, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       !> Maximum length of each list
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
@@ -242,7 +242,7 @@ contains
    !> Keep the books of the contacts of a schedule.
    subroutine settle_lists(self, schedule)
       !> The contacts
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       !> The schedule, as far as the slider came
       type(schedule_type), intent(in) :: schedule
 
@@ -257,7 +257,7 @@ contains
 
    !> Keep the books of the contacts of a schedule that broke.
    subroutine detach_came(self, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       real(wp) :: delay
@@ -288,7 +288,7 @@ contains
 
    !> Keep the books of the contacts of a schedule whose forces changed their signs.
    subroutine turn_came(self, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       integer :: event
@@ -307,7 +307,7 @@ contains
 
    !> Keep the books of the contacts of a schedule that attached.
    subroutine attach_came(self, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       integer :: event, contact(max_events)
@@ -320,4 +320,4 @@ contains
       end do
    end subroutine attach_came
 
-end module mesoslip_contacts_activated_lists
+end module mesoslip_contacts_thermal_lists

@@ -2,7 +2,7 @@
 !>
 !> In a step only a small part of the contacts breaks by activation. A slider that hardly oscillates
 !> is taken to creep on as in the step before: the step may then be as long as what breaks allows.
-module mesoslip_contacts_populations_activated_step
+module mesoslip_contacts_populations_thermal_step
    use mesoslip_contacts_populations_motion, only: distance_in, time_to_move
    use mesoslip_contacts_populations_packets, only: expected_births_type
    use mesoslip_contacts_populations_state, only: population_state_type
@@ -11,7 +11,7 @@ module mesoslip_contacts_populations_activated_step
    implicit none
    private
 
-   public :: expect_motion, look_ahead_activated, max_growth, min_part, quiet_force, smooth_excess
+   public :: expect_motion, look_ahead_thermal, max_growth, min_part, quiet_force, smooth_excess
 
    !> Force of an oscillation that counts as none, over f_T of all contacts and at resolution 1
    real(wp), parameter :: quiet_part = 1.0e-2_wp
@@ -66,7 +66,7 @@ contains
    end subroutine expect_motion
 
    !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
-   subroutine look_ahead_activated(self, pose, direction, max_births, span, distance, reach, &
+   subroutine look_ahead_thermal(self, pose, direction, max_births, span, distance, reach, &
       & limit, births)
       !> The populations
       class(population_state_type), intent(inout) :: self
@@ -146,7 +146,7 @@ contains
          distance = distance_in(pose, direction, span)
       end subroutine shorten
 
-   end subroutine look_ahead_activated
+   end subroutine look_ahead_thermal
 
    !> Let the offered force go on from that of the step before, and come to that of the contacts at
    !> the end of the step: a jump would shake the slider.
@@ -164,4 +164,4 @@ contains
       law%rate = law%rate - self%excess / span
    end subroutine smooth_excess
 
-end module mesoslip_contacts_populations_activated_step
+end module mesoslip_contacts_populations_thermal_step

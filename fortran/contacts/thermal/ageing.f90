@@ -7,10 +7,10 @@
 !> (1979) 403). No error is made, and there is no time step. The bound of a growing threshold is its
 !> last value; that of a falling one is its value after a time, when the contact gets another
 !> bound.
-module mesoslip_contacts_activated_ageing
-   use mesoslip_contacts_activated_contacts, only: contact_activated_type, initialize_activated, &
-      & offer_activated
-   use mesoslip_contacts_activated_keys, only: exchange_activated, life_left, set_up_activated
+module mesoslip_contacts_thermal_ageing
+   use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
+      & offer_by_clocks
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_left, set_up_keys
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
@@ -26,7 +26,7 @@ module mesoslip_contacts_activated_ageing
    implicit none
    private
 
-   public :: contact_activated_ageing_type, make_activated_ageing
+   public :: thermal_ageing_contacts_type, make_thermal_ageing_contacts
 
    !> Gap to its threshold over the mean breaking stretch at which a contact breaks
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
@@ -41,9 +41,9 @@ module mesoslip_contacts_activated_ageing
    integer, parameter :: age_length = 4
    integer, parameter :: age_birth = 1, age_limit = 2, age_renewal = 3, age_attempts = 4
 
-   !> Activated contacts that age. The limit in a record is a bound from below on the breaking
-   !> stretch.
-   type, extends(contact_activated_type) :: contact_activated_ageing_type
+   !> Thermally activated contacts that age. The limit in a record is a bound from below on the
+   !> breaking stretch.
+   type, extends(thermal_contacts_type) :: thermal_ageing_contacts_type
       !> How thresholds change
       type(ageing_law_type), private :: ageing
       !> Numbers of their ages, shape (age_length, count)
@@ -63,12 +63,12 @@ module mesoslip_contacts_activated_ageing
       procedure :: records
       procedure :: exchange
       procedure, non_overridable, private :: bound, renew, threshold
-   end type contact_activated_ageing_type
+   end type thermal_ageing_contacts_type
 
 contains
 
    !> Set up contacts from named numbers.
-   subroutine make_activated_ageing(contacts, common, parameters, error)
+   subroutine make_thermal_ageing_contacts(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
@@ -78,14 +78,14 @@ contains
       !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
-      type(contact_activated_ageing_type), allocatable :: self
+      type(thermal_ageing_contacts_type), allocatable :: self
       integer :: stat
 
       allocate (self)
       self%parameters = common
       call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
       if (allocated(error)) return
-      call set_up_activated(self, parameters, error)
+      call set_up_keys(self, parameters, error)
       if (allocated(error)) return
       allocate (self%age(age_length, common%count), source=0.0_wp, stat=stat)
       if (stat /= 0) then
@@ -94,24 +94,24 @@ contains
       end if
       call new_break_tree(self%order_renewal, common%count, error)
       call move_alloc(self, contacts)
-   end subroutine make_activated_ageing
+   end subroutine make_thermal_ageing_contacts
 
    !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
 
       self%is_start = .true.
-      call initialize_activated(self, state)
+      call initialize_thermal(self, state)
       self%is_start = .false.
    end subroutine initialize
 
    !> Contact force as a law, which holds until something happens, or a bound changes.
    subroutine offer(self, pose, law, window)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
@@ -119,14 +119,14 @@ contains
       !> Range in which it holds
       type(window_type), intent(out) :: window
 
-      call offer_activated(self, pose, law, window)
+      call offer_by_clocks(self, pose, law, window)
       window%end_time = min(window%end_time, self%order_renewal%first())
    end subroutine offer
 
    !> Write no schedule: bounds of thresholds change with the time.
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
@@ -140,7 +140,7 @@ contains
    !> Prepare the life of a contact that has attached.
    subroutine prepare(self, contact, pose)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> Pose of the slider
@@ -153,7 +153,7 @@ contains
 
    !> Threshold of a contact at a time, as a stretch.
    pure function threshold(self, contact, time)
-      class(contact_activated_ageing_type), intent(in) :: self
+      class(thermal_ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
       real(wp), intent(in) :: time
       real(wp) :: threshold
@@ -164,7 +164,7 @@ contains
 
    !> Find a lower bound on the threshold of a contact, and until when it is one.
    subroutine bound(self, contact, pose)
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
@@ -195,7 +195,7 @@ contains
 
    !> Give a contact another bound.
    subroutine renew(self, contact, pose)
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
@@ -208,7 +208,7 @@ contains
    !> Whether a contact breaks that has come to its bound, or its clock to its key.
    function confirms(self, contact, pose, by_clock)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> Pose of the slider
@@ -258,7 +258,7 @@ contains
    !> Give contacts other bounds whose bounds change now; those that fell to their forces break.
    subroutine renew_due(self, pose)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
@@ -274,13 +274,13 @@ contains
    !> Rebuild the queue from the records, lives and ages.
    subroutine rebuild(self, displacement)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact
 
-      call self%contact_activated_type%rebuild(displacement)
+      call self%thermal_contacts_type%rebuild(displacement)
       call self%order_renewal%clear()
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
@@ -292,7 +292,7 @@ contains
    !> State of some contacts.
    pure subroutine records(self, time, first, values)
       !> The contacts
-      class(contact_activated_ageing_type), intent(in) :: self
+      class(thermal_ageing_contacts_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
       !> The first of the contacts
@@ -303,7 +303,7 @@ contains
 
       integer :: contact, place
 
-      call self%contact_activated_type%records(time, first, values)
+      call self%thermal_contacts_type%records(time, first, values)
       do place = 1, size(values, 2)
          contact = first + place - 1
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
@@ -314,13 +314,13 @@ contains
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call exchange_activated(self, archive)
-      call archive%section("ages of activated contacts")
+      call exchange_thermal(self, archive)
+      call archive%section("ages of thermal contacts")
       call archive%exchange("age", self%age)
    end subroutine exchange
 
-end module mesoslip_contacts_activated_ageing
+end module mesoslip_contacts_thermal_ageing

@@ -4,7 +4,7 @@
 !> relative to a reference displacement near the slider's, which moves along. In a motion ahead, the
 !> direction that is kept until something happens on the way back, a contact comes to its threshold,
 !> or to where its force changes its sign; on the way back that is bounded.
-module mesoslip_contacts_activated_keys
+module mesoslip_contacts_thermal_keys
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_contacts_individual_scan_order, only: new_scan_order, scan_order_type
@@ -18,7 +18,7 @@ module mesoslip_contacts_activated_keys
    implicit none
    private
 
-   public :: activated_keys_type, set_up_activated, exchange_activated
+   public :: thermal_keys_type, set_up_keys, exchange_thermal
    public :: life_clock, life_left, life_key, life_next, motions
 
    !> Stretch over the mean breaking stretch beyond zero at which the sign of a force changes: less
@@ -36,7 +36,7 @@ module mesoslip_contacts_activated_keys
    integer, parameter :: motions = 2
 
    !> Contacts that break by thermal activation, in order.
-   type, abstract, extends(individual_contacts_type) :: activated_keys_type
+   type, abstract, extends(individual_contacts_type) :: thermal_keys_type
       !> The clocks
       type(hazard_type) :: hazard
       !> Mean breaking stretch [m]
@@ -77,14 +77,14 @@ module mesoslip_contacts_activated_keys
       !> Turn to the other direction of motion
       procedure, non_overridable :: turn_round
       procedure, non_overridable, private :: set_key
-   end type activated_keys_type
+   end type thermal_keys_type
 
 contains
 
    !> Set up contacts that break by thermal activation.
-   subroutine set_up_activated(self, parameters, error)
+   subroutine set_up_keys(self, parameters, error)
       !> The contacts, of which is known what is common to all kinds
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or wrong, or there is not enough memory
@@ -126,11 +126,11 @@ contains
             call new_scan_order(self%order(motions + number), self%parameters%count, error)
          end if
       end do
-   end subroutine set_up_activated
+   end subroutine set_up_keys
 
    !> The force of a contact changes its sign: what is left of its deviate goes by the other clock.
    subroutine change_sign(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       integer :: old
@@ -144,7 +144,7 @@ contains
 
    !> Put a contact into all orders.
    subroutine put(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       call self%set_key(contact)
@@ -154,7 +154,7 @@ contains
 
    !> Put a contact with a key into all orders.
    subroutine place(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       integer :: number
@@ -179,7 +179,7 @@ contains
 
    !> Take a contact out of all orders.
    subroutine take_out(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       integer :: number
@@ -198,7 +198,7 @@ contains
    !> Distance ahead of its origin at which a contact breaks at its threshold, or its force gets the
    !> sign of the motion.
    pure function distance_ahead(self, number, limit) result(distance)
-      class(activated_keys_type), intent(in) :: self
+      class(thermal_keys_type), intent(in) :: self
       !> The clock it goes by
       integer, intent(in) :: number
       !> Stretch at which it breaks [m]
@@ -211,7 +211,7 @@ contains
 
    !> The same on the way back.
    pure function distance_behind(self, number, limit) result(distance)
-      class(activated_keys_type), intent(in) :: self
+      class(thermal_keys_type), intent(in) :: self
       !> The clock it goes by
       integer, intent(in) :: number
       !> Stretch at which it breaks [m]
@@ -225,7 +225,7 @@ contains
    !> Coordinate at which a pinned contact breaks on the way back, or its force changes its sign.
    pure function behind_of(self, contact) result(coordinate)
       !> The contacts
-      class(activated_keys_type), intent(in) :: self
+      class(thermal_keys_type), intent(in) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> The coordinate [m]
@@ -238,7 +238,7 @@ contains
 
    !> Set the key of a contact from what is left of its deviate.
    subroutine set_key(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       self%life(life_key, contact) = self%hazard%key(int(self%life(life_clock, contact)), &
@@ -248,7 +248,7 @@ contains
 
    !> Find what is left of the deviate of a contact now.
    subroutine settle_deviate(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       self%life(life_left, contact) = self%hazard%left(int(self%life(life_clock, contact)), &
@@ -258,7 +258,7 @@ contains
 
    !> Move the reference of a clock to the slider, if that is far from it or no contact goes by it.
    subroutine move_reference(self, number, displacement)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
@@ -289,7 +289,7 @@ contains
 
    !> Count the keys in the lives of the contacts of a clock from its reading, in another unit.
    subroutine rescale_lives(self, number, reading, factor)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
       real(wp), intent(in) :: reading, factor
 
@@ -305,7 +305,7 @@ contains
 
    !> Find what is left of the deviates of the contacts of a clock now.
    subroutine settle_deviates(self, number)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
 
       integer :: contact
@@ -317,7 +317,7 @@ contains
 
    !> Set the keys of the contacts of a clock.
    subroutine set_keys(self, number)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
 
       integer :: contact
@@ -333,7 +333,7 @@ contains
    !> Turn to the other direction of motion, if something happens to a contact where the slider is
    !> on the way back: the bound may be that of a contact which has broken since.
    subroutine turn_round(self, displacement)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
@@ -349,7 +349,7 @@ contains
    !> Rebuild the queue from the records and lives.
    subroutine rebuild(self, displacement)
       !> The contacts
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
@@ -369,23 +369,23 @@ contains
    !> Move the references of the clocks.
    subroutine shift_order(self, shift)
       !> The contacts, their records moved
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       self%hazard%reference = self%hazard%reference - shift
    end subroutine shift_order
 
-   !> Put what all activated contacts keep into an archive or take it out.
-   subroutine exchange_activated(self, archive)
+   !> Put what all thermal contacts keep into an archive or take it out.
+   subroutine exchange_thermal(self, archive)
       !> The contacts
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
       integer :: number
 
-      call archive%section("activated contacts")
+      call archive%section("thermal contacts")
       call exchange_individual(self, archive)
       call archive%exchange("life", self%life)
       call archive%exchange("is_steady", self%is_steady)
@@ -395,6 +395,6 @@ contains
          call archive%exchange("reference", self%hazard%reference(number))
          call archive%exchange("max_exponent", self%hazard%max_exponent(number))
       end do
-   end subroutine exchange_activated
+   end subroutine exchange_thermal
 
-end module mesoslip_contacts_activated_keys
+end module mesoslip_contacts_thermal_keys

@@ -7,10 +7,10 @@
 !> by the deviate times exp((f_s + s k (Y - R))/f_T), a key known when it attaches. Where its force
 !> changes its sign, what is left of the deviate goes on with the other clock. There is no time
 !> step.
-module mesoslip_contacts_activated_contacts
-   use mesoslip_contacts_activated_keys, only: exchange_activated, life_clock, life_key, &
+module mesoslip_contacts_thermal_contacts
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_clock, life_key, &
       & life_left, life_next, motions
-   use mesoslip_contacts_activated_steady, only: activated_steady_type, set_up_steady
+   use mesoslip_contacts_thermal_steady, only: thermal_steady_type, set_up_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
    use mesoslip_contacts_individual_record, only: row_origin
@@ -24,16 +24,16 @@ module mesoslip_contacts_activated_contacts
    implicit none
    private
 
-   public :: contact_activated_type, make_contact_activated
+   public :: thermal_contacts_type, make_thermal_contacts
    ! For kinds that extend this one: a call by a component would lose their own procedures.
-   public :: initialize_activated, offer_activated
+   public :: initialize_thermal, offer_by_clocks
 
    !> Contacts that break by thermal activation.
-   type, extends(activated_steady_type) :: contact_activated_type
+   type, extends(thermal_steady_type) :: thermal_contacts_type
    contains
-      procedure :: initialize => initialize_activated
+      procedure :: initialize => initialize_thermal
       procedure :: offer
-      procedure :: respond => respond_activated
+      procedure :: respond
       procedure :: plan
       procedure :: settle
       procedure :: join
@@ -46,14 +46,14 @@ module mesoslip_contacts_activated_contacts
       procedure :: renew_due
       !> A contact breaks
       procedure, non_overridable :: break_contact
-      procedure, non_overridable, private :: respond_here, pass_ahead, break_activated, &
+      procedure, non_overridable, private :: respond_here, pass_ahead, break_by_clock, &
          & respond_steadily
-   end type contact_activated_type
+   end type thermal_contacts_type
 
 contains
 
    !> Set up contacts from named numbers.
-   subroutine make_contact_activated(contacts, common, parameters, error)
+   subroutine make_thermal_contacts(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
@@ -63,18 +63,18 @@ contains
       !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
-      type(contact_activated_type), allocatable :: self
+      type(thermal_contacts_type), allocatable :: self
 
       allocate (self)
       self%parameters = common
       call set_up_steady(self, parameters, error)
       call move_alloc(self, contacts)
-   end subroutine make_contact_activated
+   end subroutine make_thermal_contacts
 
    !> Draw all contacts for the start of a run.
-   subroutine initialize_activated(self, state)
+   subroutine initialize_thermal(self, state)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
 
@@ -85,13 +85,13 @@ contains
       do contact = 1, self%parameters%count
          call self%join(contact, pose)
       end do
-   end subroutine initialize_activated
+   end subroutine initialize_thermal
 
    !> Contact force as a law, which holds until a contact breaks or attaches, or its force changes
    !> its sign.
    subroutine offer(self, pose, law, window)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
@@ -103,7 +103,7 @@ contains
 
       call self%follow_motion(pose)
       if (.not. self%is_steady) then
-         call offer_activated(self, pose, law, window)
+         call offer_by_clocks(self, pose, law, window)
          return
       end if
       law = total_law(self)
@@ -115,7 +115,7 @@ contains
    !> Write a schedule of what comes next.
    subroutine plan(self, pose, limit, schedule)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
@@ -132,9 +132,9 @@ contains
    end subroutine plan
 
    !> The same by clocks: until a contact breaks, attaches or bears no force.
-   subroutine offer_activated(self, pose, law, window)
+   subroutine offer_by_clocks(self, pose, law, window)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> The law
@@ -150,12 +150,12 @@ contains
       call self%set_next()
       call self%hazard%offer(pose%displacement, self%clock)
       call self%hazard%limit_window(window)
-   end subroutine offer_activated
+   end subroutine offer_by_clocks
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
-   subroutine respond_activated(self, before, after)
+   subroutine respond(self, before, after)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
@@ -165,11 +165,11 @@ contains
       end if
       call self%hazard%go_on(self%clock)
       call self%respond_here(after)
-   end subroutine respond_activated
+   end subroutine respond
 
    !> Break and attach contacts in a uniform motion.
    subroutine respond_steadily(self, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -187,7 +187,7 @@ contains
 
    !> Break and attach contacts where the slider is.
    subroutine respond_here(self, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -195,7 +195,7 @@ contains
 
       breaks = self%breaks
       do number = 1, clocks
-         call self%break_activated(number, pose)
+         call self%break_by_clock(number, pose)
       end do
       call self%turn_round(pose%displacement)
       call self%pass_ahead(pose)
@@ -208,8 +208,8 @@ contains
    end subroutine respond_here
 
    !> Break the contacts whose keys a clock has come to.
-   subroutine break_activated(self, number, pose)
-      class(contact_activated_type), intent(inout) :: self
+   subroutine break_by_clock(self, number, pose)
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: number
       type(pose_type), intent(in) :: pose
 
@@ -221,12 +221,12 @@ contains
          if (contact == 0) return
          if (self%confirms(contact, pose, .true.)) call self%break_contact(contact, pose)
       end do
-   end subroutine break_activated
+   end subroutine break_by_clock
 
    !> Let contacts respond to a motion ahead: they break at their thresholds, or their forces change
    !> their signs.
    subroutine pass_ahead(self, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -244,7 +244,7 @@ contains
 
    !> A contact breaks.
    subroutine break_contact(self, contact, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
@@ -256,7 +256,7 @@ contains
    !> Give a contact that has attached a deviate and a place in each order.
    subroutine join(self, contact, pose)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> Pose of the slider
@@ -285,7 +285,7 @@ contains
    !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> The schedule, as far as the slider came; a moment in which contacts broke may be added
       type(schedule_type), intent(inout) :: schedule
       !> Pose of the slider
@@ -317,7 +317,7 @@ contains
    !> Prepare the life of a contact that has attached: nothing unless a kind has more to prepare.
    subroutine prepare(self, contact, pose)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> Pose of the slider
@@ -329,7 +329,7 @@ contains
    !> unless these were bounds.
    function confirms(self, contact, pose, by_clock)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
       !> Pose of the slider
@@ -345,7 +345,7 @@ contains
    !> Take note of what has changed with the time alone: nothing unless thresholds do.
    subroutine renew_due(self, pose)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
@@ -354,11 +354,11 @@ contains
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       !> The contacts
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive
 
-      call exchange_activated(self, archive)
+      call exchange_thermal(self, archive)
    end subroutine exchange
 
-end module mesoslip_contacts_activated_contacts
+end module mesoslip_contacts_thermal_contacts

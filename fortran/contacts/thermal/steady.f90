@@ -7,9 +7,9 @@
 !> if that comes first, as a contact without temperature does. No clock is needed, and schedules are
 !> those of contacts without temperature. Under negative force the same holds for the stretch of the
 !> other sign. When the velocity changes, what is left of the deviates goes on with the clocks.
-module mesoslip_contacts_activated_steady
-   use mesoslip_contacts_activated_keys, only: life_clock, life_key, life_left, life_next, motions
-   use mesoslip_contacts_activated_lists, only: activated_lists_type, set_up_lists
+module mesoslip_contacts_thermal_steady
+   use mesoslip_contacts_thermal_keys, only: life_clock, life_key, life_left, life_next, motions
+   use mesoslip_contacts_thermal_lists, only: thermal_lists_type, set_up_lists
    use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_interface_law, only: clocks, pose_type
@@ -20,7 +20,7 @@ module mesoslip_contacts_activated_steady
    implicit none
    private
 
-   public :: activated_steady_type, set_up_steady
+   public :: thermal_steady_type, set_up_steady
 
    !> Minimum velocity, over that at which a threshold force is passed by f_T in the time 1/omega_0:
    !> the displacement of a slower slider does not resolve the time to rounding
@@ -29,8 +29,8 @@ module mesoslip_contacts_activated_steady
    !> the deviate is used up
    integer, parameter :: next_limit = 1, next_key = 2, next_length = 2
 
-   !> Activated contacts whose breaking displacements are known in advance if the motion is uniform.
-   type, abstract, extends(activated_lists_type) :: activated_steady_type
+   !> Contacts whose breaking displacements are known in advance if the motion is uniform.
+   type, abstract, extends(thermal_lists_type) :: thermal_steady_type
       !> Contacts of the schedule that break
       integer, private :: steady_listed(max_events) = 0
       !> Numbers of the next lives of contacts of the schedule, shape (next_length, count)
@@ -46,14 +46,14 @@ module mesoslip_contacts_activated_steady
       procedure, non_overridable :: plan_steadily, settle_steadily
       procedure, non_overridable, private :: begin_steady, end_steady, breaking_stretch, &
          & list_next
-   end type activated_steady_type
+   end type thermal_steady_type
 
 contains
 
    !> Set up contacts whose breaking displacements are known in a uniform motion.
    subroutine set_up_steady(self, parameters, error)
       !> The contacts, of which is known what is common to all kinds
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or wrong, or there is not enough memory
@@ -70,7 +70,7 @@ contains
    !> See whether the motion is uniform now, and to it that contacts are ordered for that.
    subroutine follow_motion(self, pose)
       !> The contacts
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
@@ -87,7 +87,7 @@ contains
 
    !> Order contacts by where they break in a uniform motion.
    subroutine begin_steady(self, pose)
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -108,7 +108,7 @@ contains
    !> Order contacts by the clocks again: what is left of their deviates follows from the distance
    !> to where they would break.
    subroutine end_steady(self, pose)
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch, growth
@@ -152,7 +152,7 @@ contains
 
    !> Stretch at which the hazard of a contact has grown to its deviate.
    pure function breaking_stretch(self, limit, stretch, left) result(breaking)
-      class(activated_steady_type), intent(in) :: self
+      class(thermal_steady_type), intent(in) :: self
       !> Stretch at the threshold, and now, along the motion [m]
       real(wp), intent(in) :: limit, stretch
       !> Remaining deviate
@@ -177,7 +177,7 @@ contains
    !> Find a contact that is due in a uniform motion.
    subroutine find_due(self, pose, contact)
       !> The contacts
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Number of the contact, 0 if none is due
@@ -189,7 +189,7 @@ contains
    !> Put a contact that has attached in a uniform motion into the order of breaking.
    subroutine join_steadily(self, contact, pose)
       !> The contacts
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> Number of the contact, of which the deviate is known
       integer, intent(in) :: contact
       !> Pose of the slider
@@ -211,7 +211,7 @@ contains
    !> Write a schedule of a uniform motion: the next breaks, and about as many attachments.
    subroutine plan_steadily(self, pose, limit, schedule)
       !> The contacts
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
       !> Maximum number of breaks, and of attachments
@@ -253,7 +253,7 @@ contains
 
    !> List where contacts will break that are born in a uniform motion.
    subroutine list_next(self, contact, stretch, limit)
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> Numbers of the contacts, of which the deviates are known
       integer, intent(in) :: contact(:)
       !> Stretches when they attach [m]
@@ -275,7 +275,7 @@ contains
    !> Keep the books of a schedule of a uniform motion.
    subroutine settle_steadily(self, schedule)
       !> The contacts
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       !> The schedule, as far as the slider came
       type(schedule_type), intent(in) :: schedule
 
@@ -303,4 +303,4 @@ contains
       end do
    end subroutine settle_steadily
 
-end module mesoslip_contacts_activated_steady
+end module mesoslip_contacts_thermal_steady

@@ -44,7 +44,6 @@ contains
 
    !> Set up populations.
    subroutine new_contact_populations(self, parameters, resolution, error)
-      !> The populations
       type(contact_populations_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -193,11 +192,8 @@ contains
       self%detached%short_gap = thermal_gap
    end subroutine activate
 
-   !> Prepare the populations for the start of a run.
    subroutine initialize(self, state)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       call self%pinned%initialize(state, self%failure)
@@ -205,35 +201,24 @@ contains
 
    !> Contact force as a law, and where it holds: until contacts break, or for a step.
    subroutine offer(self, pose, law, window)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       call offer_step(self, pose, law, window)
    end subroutine offer
 
-   !> Break and attach contacts after a motion of the slider.
    subroutine respond(self, before, after)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       call respond_to_motion(self, before, after)
    end subroutine respond
 
-   !> Move the origin of displacements.
    subroutine shift_origin(self, shift, displacement)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
-      !> Displacement of the slider from the new origin [m]
       real(wp), intent(in) :: displacement
 
       call self%pinned%shift_origin(shift)
@@ -241,7 +226,6 @@ contains
 
    !> Number of contacts that are pinned.
    pure function pinned_count(self) result(total)
-      !> The populations
       class(contact_populations_type), intent(in) :: self
       !> Their number, in the mean of what it may be
       real(wp) :: total
@@ -249,23 +233,16 @@ contains
       total = self%pinned%number_of_contacts()
    end function pinned_count
 
-   !> Elastic energy of the pinned contacts.
    pure function elastic_energy(self, displacement) result(energy)
-      !> The populations
       class(contact_populations_type), intent(in) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Energy [J]
       real(wp) :: energy
 
       energy = self%pinned%elastic_energy(displacement)
    end function elastic_energy
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contact populations")
@@ -280,9 +257,7 @@ contains
 
    !> Nothing is derived from the state: all of it is in the archive.
    subroutine rebuild(self, displacement)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       call self%pinned%forget_trial()

@@ -187,11 +187,8 @@ contains
          & self%stretch, time - self%life(life_birth, contact))
    end subroutine refresh
 
-   !> Rebuild the queue and the keys of the leaders from the records.
    subroutine rebuild(self, displacement)
-      !> The contacts
       class(ageing_contacts_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact, position
@@ -213,11 +210,8 @@ contains
    !> Greatest coordinate at which a pinned contact may break on the way back; of those whose
    !> thresholds fall it is known otherwise.
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
       class(ageing_contacts_type), intent(in) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       coordinate = -huge(1.0_wp)
@@ -278,7 +272,6 @@ contains
    !> Add the work of visiting contacts: a segment of a run must not last long, however many of them
    !> an advance visits.
    pure subroutine count_visits(self, visits)
-      !> The contacts
       class(ageing_contacts_type), intent(inout) :: self
       !> Number of visits
       integer, intent(in) :: visits
@@ -286,16 +279,10 @@ contains
       self%cost = self%cost + visits / visits_per_cost
    end subroutine count_visits
 
-   !> State of some contacts.
    pure subroutine records(self, time, first, values)
-      !> The contacts
       class(ageing_contacts_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The first of the contacts
       integer, intent(in) :: first
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
-      !> number of renewals of each contact, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact, place

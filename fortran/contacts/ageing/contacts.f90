@@ -113,11 +113,8 @@ contains
       call move_alloc(self, contacts)
    end subroutine make_contact_ageing
 
-   !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       integer :: contact
@@ -131,15 +128,10 @@ contains
       call self%rebuild_queue(0.0_wp)
    end subroutine initialize
 
-   !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
       real(wp) :: upper, lower, end_time
@@ -164,9 +156,7 @@ contains
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
    subroutine respond(self, before, after)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       real(wp) :: breaks
@@ -191,13 +181,9 @@ contains
 
    !> Write a schedule of what comes next, in the steady motion of a slider that keeps to its drive.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
@@ -207,13 +193,9 @@ contains
       if (self%is_steady) call plan_steady(self, pose, limit, schedule)
    end subroutine plan
 
-   !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
       type(schedule_type), intent(inout) :: schedule
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%now = pose%time
@@ -261,11 +243,8 @@ contains
 
    !> Find where a contact belongs that has attached.
    subroutine join(self, contact, pose)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%life(life_birth, contact) = pose%time
@@ -318,9 +297,7 @@ contains
 
    !> Move the coordinates of the last scan, and the last law.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
       class(contact_ageing_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       self%law_offered%offset = self%law_offered%offset - self%law_offered%stiffness * shift
@@ -330,11 +307,8 @@ contains
       end if
    end subroutine shift_order
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contacts that age")

@@ -68,7 +68,6 @@ contains
 
    !> Take a law of ageing, and the law of thresholds of contacts that can attach with it.
    subroutine take_ageing_law(self, law, parameters, error)
-      !> The law of ageing
       type(ageing_law_type), intent(out) :: self
       !> Law of the configured thresholds, conditional on what is above the back force; on return
       !> also on what is so when it is young
@@ -117,7 +116,6 @@ contains
 
    !> Threshold at an age, and its rate.
    pure subroutine evaluate(self, configured, mean, age, threshold, rate)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
@@ -144,7 +142,6 @@ contains
 
    !> Change of the rate of a threshold in a second.
    elemental function bend(self, rate, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Rate of the threshold, in any unit for a second, and age [s]
       real(wp), intent(in) :: rate, age
@@ -158,7 +155,6 @@ contains
    !> Growth of a threshold from an age on. In a short time it is that of a series, which takes less
    !> time than a transcendental function.
    elemental subroutine grow(self, rate, age, time, growth, later_rate)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Rate of the threshold at the age, in any unit for a second
       real(wp), intent(in) :: rate
@@ -196,7 +192,6 @@ contains
 
    !> Deficit of the threshold of a contact at birth.
    elemental function lack(self, configured, mean)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
@@ -208,7 +203,6 @@ contains
 
    !> Threshold at an age.
    pure function threshold(self, configured, mean, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
@@ -224,7 +218,6 @@ contains
 
    !> Configured threshold of the contacts that break at an age under a force.
    pure function configured(self, force, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Force over the mean configured threshold
       real(wp), intent(in) :: force
@@ -249,7 +242,6 @@ contains
    !> Whether the threshold falls with age: the young are weaker in the mean, but often wider
    !> spread, so that the strongest of them become weaker.
    pure function falls(self, configured, mean)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
@@ -261,7 +253,6 @@ contains
 
    !> Whether any threshold changes with age.
    pure function acts(self)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Whether one does
       logical :: acts
@@ -271,7 +262,6 @@ contains
 
    !> Whether the threshold of a contact is the same at any age.
    pure function is_constant(self, configured, mean)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
@@ -287,7 +277,6 @@ contains
 
    !> Whether the threshold does not change any more.
    pure function is_old(self, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
       !> Age [s]
       real(wp), intent(in) :: age

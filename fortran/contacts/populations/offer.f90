@@ -38,7 +38,6 @@ contains
 
    !> Contact force as a law, and where it holds: until contacts break, or for a step.
    subroutine offer_step(self, pose, law, window)
-      !> The populations
       class(population_state_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose

@@ -58,7 +58,6 @@ contains
 
    !> Set up populations: none.
    subroutine new_pinned_populations(self, parameters, resolution)
-      !> The populations
       type(pinned_populations_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -112,7 +111,6 @@ contains
    !> Let contacts break by thermal activation, which spreads their breaking stretches too. If their
    !> thresholds change with age, that has been set before.
    subroutine activate(self, rate, width, resolution)
-      !> The populations, of equal contacts
       class(pinned_populations_type), intent(inout) :: self
       !> Rate of breaking at the threshold [1/s], f_T/f_s, and length of a step over the spread
       real(wp), intent(in) :: rate, width, resolution
@@ -171,7 +169,6 @@ contains
 
    !> Let thresholds change with age.
    subroutine set_ageing(self, ageing)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> How they change
       type(ageing_law_type), intent(in) :: ageing
@@ -184,7 +181,6 @@ contains
 
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state, error)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
@@ -220,7 +216,6 @@ contains
 
    !> Add contacts that attached with one force, as many in each displacement.
    subroutine add_sliding(self, force, share, moments, broken, error)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> Relative force at attaching, and relative number of contacts
       real(wp), intent(in) :: force, share
@@ -258,7 +253,6 @@ contains
 
    !> Attach contacts as one population for each force, where they do on average.
    subroutine attach(self, births, moment, direction, displacement, birth, time, lost, error)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> How many they are, the sum of their displacements [m], and the direction of their forces
       real(wp), intent(in) :: births, moment, direction

@@ -19,7 +19,6 @@ contains
 
    !> Break and attach contacts after a motion of the slider.
    subroutine respond_to_motion(self, before, after)
-      !> The populations
       class(population_state_type), intent(inout) :: self
       !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after

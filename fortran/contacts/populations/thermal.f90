@@ -59,7 +59,6 @@ contains
 
    !> Let contacts break by activation.
    subroutine set_activation(self, activation, resolution)
-      !> The populations
       class(thermal_populations_type), intent(inout) :: self
       !> How they do
       type(activation_type), intent(in) :: activation
@@ -82,7 +81,6 @@ contains
 
    !> Find what breaks in a motion of the slider.
    subroutine try_motion(self, before, after, displacement, late, onset, error)
-      !> The populations
       class(thermal_populations_type), intent(inout) :: self
       !> Pose of the slider, and where it comes to
       type(pose_type), intent(in) :: before, after
@@ -293,7 +291,6 @@ contains
 
    !> Whether contacts may join a population: hardly any of it have broken, and it is not older.
    pure function may_join(self, row, birth)
-      !> The populations
       class(thermal_populations_type), intent(in) :: self
       !> Which one, and when the contacts attached [s]
       integer, intent(in) :: row
@@ -311,7 +308,6 @@ contains
 
    !> Note what the contacts of a population have gone through since they attached.
    subroutine begin_hazard(self, row, duration, force)
-      !> The populations
       class(thermal_populations_type), intent(inout) :: self
       !> Which one
       integer, intent(in) :: row
@@ -325,7 +321,6 @@ contains
 
    !> Let contacts that attach join a population that attached close by.
    subroutine join_last(self, row, origin, birth, contacts, force, displacement, time, energy)
-      !> The populations
       class(thermal_populations_type), intent(inout) :: self
       !> Which population
       integer, intent(in) :: row

@@ -30,7 +30,6 @@ contains
 
    !> Force of an oscillation that counts as none [N].
    pure function quiet_force(self) result(force)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> The force
       real(wp) :: force
@@ -43,7 +42,6 @@ contains
 
    !> The motion that is expected: even, as in the step before, of a slider that hardly oscillates.
    subroutine expect_motion(self, pose, expected, is_quiet)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -68,7 +66,6 @@ contains
    !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
    subroutine look_ahead_thermal(self, pose, direction, max_births, span, distance, reach, &
       & limit, births)
-      !> The populations
       class(population_state_type), intent(inout) :: self
       !> Pose of the slider, and its expected motion
       type(pose_type), intent(in) :: pose
@@ -151,7 +148,6 @@ contains
    !> Let the offered force go on from that of the step before, and come to that of the contacts at
    !> the end of the step: a jump would shake the slider.
    pure subroutine smooth_excess(self, span, law)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> Duration of the step [s]
       real(wp), intent(in) :: span

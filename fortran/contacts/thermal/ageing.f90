@@ -96,11 +96,8 @@ contains
       call move_alloc(self, contacts)
    end subroutine make_thermal_ageing_contacts
 
-   !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       self%is_start = .true.
@@ -110,13 +107,9 @@ contains
 
    !> Contact force as a law, which holds until something happens, or a bound changes.
    subroutine offer(self, pose, law, window)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       call offer_by_clocks(self, pose, law, window)
@@ -125,25 +118,17 @@ contains
 
    !> Write no schedule: bounds of thresholds change with the time.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule, at its end
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
    end subroutine plan
 
-   !> Prepare the life of a contact that has attached.
    subroutine prepare(self, contact, pose)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp]
@@ -207,15 +192,10 @@ contains
 
    !> Whether a contact breaks that has come to its bound, or its clock to its key.
    function confirms(self, contact, pose, by_clock)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Whether it is the clock
       logical, intent(in) :: by_clock
-      !> Whether it breaks
       logical :: confirms
 
       real(wp) :: here, uniform(2)
@@ -257,9 +237,7 @@ contains
 
    !> Give contacts other bounds whose bounds change now; those that fell to their forces break.
    subroutine renew_due(self, pose)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -271,11 +249,8 @@ contains
       end do
    end subroutine renew_due
 
-   !> Rebuild the queue from the records, lives and ages.
    subroutine rebuild(self, displacement)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact
@@ -289,16 +264,10 @@ contains
       call self%order_renewal%arrange()
    end subroutine rebuild
 
-   !> State of some contacts.
    pure subroutine records(self, time, first, values)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The first of the contacts
       integer, intent(in) :: first
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
-      !> number of renewals of each contact, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact, place
@@ -311,11 +280,8 @@ contains
       end do
    end subroutine records
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
       class(thermal_ageing_contacts_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call exchange_thermal(self, archive)

@@ -71,11 +71,8 @@ contains
       call move_alloc(self, contacts)
    end subroutine make_thermal_contacts
 
-   !> Draw all contacts for the start of a run.
    subroutine initialize_thermal(self, state)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       type(pose_type) :: pose
@@ -90,13 +87,9 @@ contains
    !> Contact force as a law, which holds until a contact breaks or attaches, or its force changes
    !> its sign.
    subroutine offer(self, pose, law, window)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: ahead
@@ -112,15 +105,10 @@ contains
       self%clock%is_used = .false.
    end subroutine offer
 
-   !> Write a schedule of what comes next.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       call self%follow_motion(pose)
@@ -133,13 +121,9 @@ contains
 
    !> The same by clocks: until a contact breaks, attaches or bears no force.
    subroutine offer_by_clocks(self, pose, law, window)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: ahead
@@ -154,9 +138,7 @@ contains
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
    subroutine respond(self, before, after)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       if (self%is_steady) then
@@ -255,11 +237,8 @@ contains
 
    !> Give a contact that has attached a deviate and a place in each order.
    subroutine join(self, contact, pose)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch
@@ -282,13 +261,9 @@ contains
       call self%put(contact)
    end subroutine join
 
-   !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> The schedule, as far as the slider came; a moment in which contacts broke may be added
       type(schedule_type), intent(inout) :: schedule
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -316,7 +291,6 @@ contains
 
    !> Prepare the life of a contact that has attached: nothing unless a kind has more to prepare.
    subroutine prepare(self, contact, pose)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -328,7 +302,6 @@ contains
    !> Whether a contact breaks that has come to its threshold, or its clock to its key: it does
    !> unless these were bounds.
    function confirms(self, contact, pose, by_clock)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
       !> Number of the contact
       integer, intent(in) :: contact
@@ -344,18 +317,14 @@ contains
 
    !> Take note of what has changed with the time alone: nothing unless thresholds do.
    subroutine renew_due(self, pose)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
    end subroutine renew_due
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
       class(thermal_contacts_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call exchange_thermal(self, archive)

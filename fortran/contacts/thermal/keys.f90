@@ -83,7 +83,6 @@ contains
 
    !> Set up contacts that break by thermal activation.
    subroutine set_up_keys(self, parameters, error)
-      !> The contacts, of which is known what is common to all kinds
       class(thermal_keys_type), intent(inout) :: self
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -224,11 +223,8 @@ contains
 
    !> Coordinate at which a pinned contact breaks on the way back, or its force changes its sign.
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
       class(thermal_keys_type), intent(in) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       coordinate = self%direction * self%record(row_origin, contact) &
@@ -346,11 +342,8 @@ contains
       if (self%direction > 0.0_wp) call self%order(2)%rest()
    end subroutine turn_round
 
-   !> Rebuild the queue from the records and lives.
    subroutine rebuild(self, displacement)
-      !> The contacts
       class(thermal_keys_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact, number
@@ -368,9 +361,7 @@ contains
 
    !> Move the references of the clocks.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
       class(thermal_keys_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       self%hazard%reference = self%hazard%reference - shift
@@ -378,7 +369,6 @@ contains
 
    !> Put what all thermal contacts keep into an archive or take it out.
    subroutine exchange_thermal(self, archive)
-      !> The contacts
       class(thermal_keys_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

@@ -46,7 +46,6 @@ contains
 
    !> Set up contacts that write schedules.
    subroutine set_up_lists(self, parameters, error)
-      !> The contacts, of which is known what is common to all kinds
       class(thermal_lists_type), intent(inout) :: self
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -105,7 +104,6 @@ contains
    !> Write a schedule of what comes next: breaks at thresholds and by the clock of those whose
    !> force has the sign of the motion, and attachments.
    subroutine plan_by_clocks(self, pose, limit, schedule)
-      !> The contacts
       class(thermal_lists_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -241,7 +239,6 @@ contains
 
    !> Keep the books of the contacts of a schedule.
    subroutine settle_lists(self, schedule)
-      !> The contacts
       class(thermal_lists_type), intent(inout) :: self
       !> The schedule, as far as the slider came
       type(schedule_type), intent(in) :: schedule

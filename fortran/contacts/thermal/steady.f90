@@ -52,7 +52,6 @@ contains
 
    !> Set up contacts whose breaking displacements are known in a uniform motion.
    subroutine set_up_steady(self, parameters, error)
-      !> The contacts, of which is known what is common to all kinds
       class(thermal_steady_type), intent(inout) :: self
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
@@ -69,7 +68,6 @@ contains
 
    !> See whether the motion is uniform now, and to it that contacts are ordered for that.
    subroutine follow_motion(self, pose)
-      !> The contacts
       class(thermal_steady_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -176,7 +174,6 @@ contains
 
    !> Find a contact that is due in a uniform motion.
    subroutine find_due(self, pose, contact)
-      !> The contacts
       class(thermal_steady_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -188,7 +185,6 @@ contains
 
    !> Put a contact that has attached in a uniform motion into the order of breaking.
    subroutine join_steadily(self, contact, pose)
-      !> The contacts
       class(thermal_steady_type), intent(inout) :: self
       !> Number of the contact, of which the deviate is known
       integer, intent(in) :: contact
@@ -210,7 +206,6 @@ contains
 
    !> Write a schedule of a uniform motion: the next breaks, and about as many attachments.
    subroutine plan_steadily(self, pose, limit, schedule)
-      !> The contacts
       class(thermal_steady_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -274,7 +269,6 @@ contains
 
    !> Keep the books of a schedule of a uniform motion.
    subroutine settle_steadily(self, schedule)
-      !> The contacts
       class(thermal_steady_type), intent(inout) :: self
       !> The schedule, as far as the slider came
       type(schedule_type), intent(in) :: schedule

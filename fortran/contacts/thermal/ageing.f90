@@ -165,7 +165,7 @@ contains
             gap = min(max_drop / self%hazard%slope, &
                & max_gap_part * max(gap, tiny_gap * self%stretch))
             if (here - gap > age(age_limit)) then
-               lack = self%ageing%lack(age(age_limit), self%stretch)
+               lack = self%ageing%deficit(age(age_limit), self%stretch)
                age(age_renewal) = max(nearest(pose%time, huge(1.0_wp)), age(age_birth) &
                   & - self%ageing%time * log((here - gap - age(age_limit)) / (-lack)))
                self%record(row_limit, contact) = min(here - gap, &
